@@ -19,31 +19,31 @@ static int by_position(const void *a, const void *b)
     return (p->vertex > q->vertex) - (p->vertex < q->vertex);
 }
 
-static int longer_side(const bt_graph *g, int n, const key *k)
+static int longer_side(const bt_graph *graph, int n, const key *k)
 {
     double low[2] = {0, 0}, high[2] = {0, 0};
     for (int c = 0; c < 2; c++) {
-        low[c] = high[c] = g->at[k[0].vertex][c];
+        low[c] = high[c] = graph->at[k[0].vertex][c];
         for (int i = 1; i < n; i++) {
-            low[c] = bt_min(low[c], g->at[k[i].vertex][c]);
-            high[c] = bt_max(high[c], g->at[k[i].vertex][c]);
+            low[c] = bt_min(low[c], graph->at[k[i].vertex][c]);
+            high[c] = bt_max(high[c], graph->at[k[i].vertex][c]);
         }
     }
     return high[1] - low[1] > high[0] - low[0];
 }
 
 // Vertices left of the split: prefix weight nearest to sum × left_parts / n_parts, and enough vertices on either side.
-static int split(const bt_graph *g, int n, const key *k, int n_parts, int left_parts)
+static int split(const bt_graph *graph, int n, const key *k, int n_parts, int left_parts)
 {
     int64_t sum = 0;
-    for (int i = 0; i < n; i++) sum += g->weight[k[i].vertex];
+    for (int i = 0; i < n; i++) sum += graph->weight[k[i].vertex];
     bool count = sum == 0; // weightless vertices are split by number
     if (count) sum = n;
     long double aim = (long double)sum * left_parts / n_parts;
     int right_parts = n_parts - left_parts, at = 0;
     int64_t left = 0;
     while (at < n - right_parts) {
-        int64_t w = count ? 1 : g->weight[k[at].vertex];
+        int64_t w = count ? 1 : graph->weight[k[at].vertex];
         if (at >= left_parts && left + 0.5L * w >= aim) break;
         left += w;
         at++;
@@ -51,24 +51,24 @@ static int split(const bt_graph *g, int n, const key *k, int n_parts, int left_p
     return at;
 }
 
-static void bisect(const bt_graph *g, int n, key *k, int n_parts, int first, int *part)
+static void bisect(const bt_graph *graph, int n, key *k, int n_parts, int first, int *part)
 {
     while (n_parts > 1) {
-        int c = longer_side(g, n, k);
-        for (int i = 0; i < n; i++) k[i].x = g->at[k[i].vertex][c];
+        int c = longer_side(graph, n, k);
+        for (int i = 0; i < n; i++) k[i].x = graph->at[k[i].vertex][c];
         qsort(k, (size_t)n, sizeof *k, by_position);
-        int left_parts = n_parts / 2, left = split(g, n, k, n_parts, left_parts);
-        bisect(g, left, k, left_parts, first, part);
+        int left_parts = n_parts / 2, left = split(graph, n, k, n_parts, left_parts);
+        bisect(graph, left, k, left_parts, first, part);
         k += left, n -= left;
         n_parts -= left_parts, first += left_parts;
     }
     for (int i = 0; i < n; i++) part[k[i].vertex] = first;
 }
 
-void bt_cut_by_bisection(const bt_graph *g, int n_parts, int *part)
+void bt_cut_by_bisection(const bt_graph *graph, int n_parts, int *part)
 {
-    key *k = bt_alloc((size_t)g->n, sizeof *k);
-    for (int i = 0; i < g->n; i++) k[i].vertex = i;
-    bisect(g, g->n, k, n_parts, 0, part);
+    key *k = bt_alloc((size_t)graph->n, sizeof *k);
+    for (int i = 0; i < graph->n; i++) k[i].vertex = i;
+    bisect(graph, graph->n, k, n_parts, 0, part);
     free(k);
 }

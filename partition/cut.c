@@ -43,35 +43,36 @@ static void owned_free(owned *o)
     free(o->at);
 }
 
-// The graph of g's vertices mapped by of [g->n] onto n vertices: weights and edges added up, loops dropped.
-static owned mapped(const bt_graph *g, int n, int *of)
+// The graph of the vertices of `graph` mapped by of [graph->n] onto n vertices: weights and edges added up, loops
+// dropped.
+static owned mapped(const bt_graph *graph, int n, int *of)
 {
     owned o = {.of = of};
-    int n_edges = g->start[g->n], n_to = 0;
+    int n_edges = graph->start[graph->n], n_to = 0;
     size_t size = (size_t)n;
     o.start = bt_alloc(size + 1, sizeof *o.start);
     o.to = bt_alloc((size_t)n_edges, sizeof *o.to);
     o.edge = bt_alloc((size_t)n_edges, sizeof *o.edge);
     o.weight = bt_alloc(size, sizeof *o.weight);
     o.at = bt_alloc(size, sizeof *o.at);
-    int *first = bt_alloc(size + 2, sizeof *first), *member = bt_alloc((size_t)g->n, sizeof *member);
+    int *first = bt_alloc(size + 2, sizeof *first), *member = bt_alloc((size_t)graph->n, sizeof *member);
     int *slot = bt_alloc(size, sizeof *slot); // place of a neighbour in the row being made, −1 not yet there
-    for (int v = 0; v < g->n; v++)
+    for (int v = 0; v < graph->n; v++)
         if (of[v] >= 0) first[of[v] + 2]++;
     for (int c = 0; c < n; c++) first[c + 2] += first[c + 1], slot[c] = -1;
-    for (int v = 0; v < g->n; v++)
+    for (int v = 0; v < graph->n; v++)
         if (of[v] >= 0) member[first[of[v] + 1]++] = v;
     for (int c = 0; c < n; c++) { // its members: first[c] ... first[c + 1]
         o.start[c] = n_to;
         for (int m = first[c]; m < first[c + 1]; m++) {
             int v = member[m];
-            o.weight[c] += g->weight[v];
-            for (int k = 0; k < 2; k++) o.at[c][k] += g->at[v][k];
-            for (int e = g->start[v]; e < g->start[v + 1]; e++) {
-                int d = of[g->to[e]];
+            o.weight[c] += graph->weight[v];
+            for (int k = 0; k < 2; k++) o.at[c][k] += graph->at[v][k];
+            for (int e = graph->start[v]; e < graph->start[v + 1]; e++) {
+                int d = of[graph->to[e]];
                 if (d < 0 || d == c) continue;
                 if (slot[d] < 0) slot[d] = n_to, o.to[n_to++] = d;
-                o.edge[slot[d]] += g->edge[e];
+                o.edge[slot[d]] += graph->edge[e];
             }
         }
         for (int k = 0; k < 2; k++) o.at[c][k] /= first[c + 1] - first[c];
@@ -86,15 +87,15 @@ static owned mapped(const bt_graph *g, int n, int *of)
 }
 
 // Numbers the vertices left when each group is one, in the order of their first member.
-static int contracted_numbers(const bt_graph *g, int *of)
+static int contracted_numbers(const bt_graph *graph, int *of)
 {
     int n = 0, top = -1;
-    for (int v = 0; g->group && v < g->n; v++)
-        if (g->group[v] > top) top = g->group[v];
+    for (int v = 0; graph->group && v < graph->n; v++)
+        if (graph->group[v] > top) top = graph->group[v];
     int *number = bt_alloc((size_t)top + 1, sizeof *number);
     for (int i = 0; i <= top; i++) number[i] = -1;
-    for (int v = 0; v < g->n; v++) {
-        int group = g->group ? g->group[v] : -1;
+    for (int v = 0; v < graph->n; v++) {
+        int group = graph->group ? graph->group[v] : -1;
         if (group < 0) of[v] = n++;
         else {
             if (number[group] < 0) number[group] = n++;
@@ -118,16 +119,16 @@ static int heaviest_first(const void *a, const void *b)
 }
 
 // Number of heavy vertices, the first ones of order; rest: weight of the others.
-static int set_apart(const bt_graph *g, int n_parts, heavy *order, int64_t *rest)
+static int set_apart(const bt_graph *graph, int n_parts, heavy *order, int64_t *rest)
 {
     *rest = 0;
-    for (int v = 0; v < g->n; v++) {
-        order[v] = (heavy){g->weight[v], v};
-        *rest += g->weight[v];
+    for (int v = 0; v < graph->n; v++) {
+        order[v] = (heavy){graph->weight[v], v};
+        *rest += graph->weight[v];
     }
-    qsort(order, (size_t)g->n, sizeof *order, heaviest_first);
+    qsort(order, (size_t)graph->n, sizeof *order, heaviest_first);
     int n = 0;
-    while (n < g->n && n_parts - n > 1 && *rest > 0 &&
+    while (n < graph->n && n_parts - n > 1 && *rest > 0 &&
            order[n].weight >= *rest / (n_parts - n) + (*rest % (n_parts - n) != 0))
         *rest -= order[n++].weight;
     return n;
@@ -141,73 +142,73 @@ typedef struct trial {
     int n_empty;
 } trial;
 
-static void judge(const bt_graph *g, int n_parts, double share, trial *t)
+static void judge(const bt_graph *graph, int n_parts, double share, trial *attempt)
 {
     int64_t *load = bt_alloc((size_t)n_parts, sizeof *load);
     int *count = bt_alloc((size_t)n_parts, sizeof *count);
-    for (int v = 0; v < g->n; v++) {
-        load[t->part[v]] += g->weight[v];
-        count[t->part[v]]++;
+    for (int v = 0; v < graph->n; v++) {
+        load[attempt->part[v]] += graph->weight[v];
+        count[attempt->part[v]]++;
     }
-    t->excess = 0;
+    attempt->excess = 0;
     for (int p = 0; p < n_parts; p++)
-        if (count[p] > 1) t->excess = bt_max(t->excess, (double)load[p] / share - 1);
+        if (count[p] > 1) attempt->excess = bt_max(attempt->excess, (double)load[p] / share - 1);
     free(load);
     free(count);
-    bt_cut_quality q = bt_cut_measure(g, n_parts, t->part, NULL);
-    t->cut = q.cut;
-    t->n_empty = q.n_empty;
+    bt_cut_quality quality = bt_cut_measure(graph, n_parts, attempt->part, NULL);
+    attempt->cut = quality.cut;
+    attempt->n_empty = quality.n_empty;
 }
 
-static const trial *better_of(const trial *t, int n, double tolerance)
+static const trial *better_of(const trial *attempt, int n, double tolerance)
 {
     double least = 1e300;
     int n_empty = INT_MAX;
     for (int i = 0; i < n; i++)
-        if (t[i].n_empty < n_empty) n_empty = t[i].n_empty;
+        if (attempt[i].n_empty < n_empty) n_empty = attempt[i].n_empty;
     for (int i = 0; i < n; i++)
-        if (t[i].n_empty == n_empty) least = bt_min(least, t[i].excess);
+        if (attempt[i].n_empty == n_empty) least = bt_min(least, attempt[i].excess);
     const trial *best = NULL, *kept = NULL;
     for (int i = 0; i < n; i++) {
         double allowed = bt_max(tolerance, CLOSE * least);
-        if (t[i].n_empty > n_empty || t[i].excess > KEEP * allowed) continue;
-        if (t[i].method == BT_CUT_KEPT) kept = &t[i];
-        if (t[i].excess <= allowed && (!best || t[i].cut < best->cut)) best = &t[i];
+        if (attempt[i].n_empty > n_empty || attempt[i].excess > KEEP * allowed) continue;
+        if (attempt[i].method == BT_CUT_KEPT) kept = &attempt[i];
+        if (attempt[i].excess <= allowed && (!best || attempt[i].cut < best->cut)) best = &attempt[i];
     }
     return kept && (double)kept->cut <= KEEP * (double)best->cut ? kept : best;
 }
 
 // The label that most of a contracted vertex's weight had before, −1 for none; then that of the neighbour it shares
 // most with. false if there were no labels before to speak of: a part had none.
-static bool labels_before(const bt_graph *g, const bt_graph *whole, const int *of, const int *before, int n_parts,
+static bool labels_before(const bt_graph *graph, const bt_graph *whole, const int *of, const int *before, int n_parts,
                           int *part)
 {
-    int64_t *most = bt_alloc((size_t)g->n, sizeof *most), *link = bt_alloc((size_t)n_parts, sizeof *link);
+    int64_t *most = bt_alloc((size_t)graph->n, sizeof *most), *link = bt_alloc((size_t)n_parts, sizeof *link);
     int *count = bt_alloc((size_t)n_parts, sizeof *count);
-    for (int c = 0; c < g->n; c++) part[c] = most[c] = -1;
+    for (int c = 0; c < graph->n; c++) part[c] = most[c] = -1;
     for (int v = 0; v < whole->n; v++) { // the heaviest member stands for its group
         bool labelled = before[v] >= 0 && before[v] < n_parts;
         if (labelled && whole->weight[v] > most[of[v]]) most[of[v]] = whole->weight[v], part[of[v]] = before[v];
     }
     for (bool changed = true; changed;) {
         changed = false;
-        for (int c = 0; c < g->n; c++) {
+        for (int c = 0; c < graph->n; c++) {
             int best = -1;
             if (part[c] >= 0) continue;
-            for (int e = g->start[c]; e < g->start[c + 1]; e++)
-                if (part[g->to[e]] >= 0) link[part[g->to[e]]] += g->edge[e];
-            for (int e = g->start[c]; e < g->start[c + 1]; e++) {
-                int p = part[g->to[e]];
+            for (int e = graph->start[c]; e < graph->start[c + 1]; e++)
+                if (part[graph->to[e]] >= 0) link[part[graph->to[e]]] += graph->edge[e];
+            for (int e = graph->start[c]; e < graph->start[c + 1]; e++) {
+                int p = part[graph->to[e]];
                 if (p >= 0 && (best < 0 || link[p] > link[best] || (link[p] == link[best] && p < best))) best = p;
             }
-            for (int e = g->start[c]; e < g->start[c + 1]; e++)
-                if (part[g->to[e]] >= 0) link[part[g->to[e]]] = 0;
+            for (int e = graph->start[c]; e < graph->start[c + 1]; e++)
+                if (part[graph->to[e]] >= 0) link[part[graph->to[e]]] = 0;
             part[c] = best;
             changed = changed || best >= 0;
         }
     }
     bool good = true;
-    for (int c = 0; c < g->n; c++) {
+    for (int c = 0; c < graph->n; c++) {
         if (part[c] < 0) good = false;
         else count[part[c]]++;
     }
@@ -219,16 +220,16 @@ static bool labels_before(const bt_graph *g, const bt_graph *whole, const int *o
 }
 
 // A cut of the light vertices by METIS or bisection, a part each for the heavy ones.
-static bool cut_anew(const bt_graph *g, const owned *light, int n_heavy, const heavy *order, int n_parts,
-                     double tolerance, trial *t)
+static bool cut_anew(const bt_graph *graph, const owned *light, int n_heavy, const heavy *order, int n_parts,
+                     double tolerance, trial *attempt)
 {
     int rest = n_parts - n_heavy, *part = bt_alloc((size_t)light->g.n, sizeof *part);
     bool good = true;
-    if (t->method == BT_CUT_BISECT) bt_cut_by_bisection(&light->g, rest, part);
+    if (attempt->method == BT_CUT_BISECT) bt_cut_by_bisection(&light->g, rest, part);
     else good = rest > 1 && light->g.n > rest && bt_cut_by_metis(&light->g, rest, tolerance, part);
-    for (int c = 0; good && c < g->n; c++)
-        if (light->of[c] >= 0) t->part[c] = part[light->of[c]];
-    for (int i = 0; good && i < n_heavy; i++) t->part[order[i].vertex] = rest + i;
+    for (int c = 0; good && c < graph->n; c++)
+        if (light->of[c] >= 0) attempt->part[c] = part[light->of[c]];
+    for (int i = 0; good && i < n_heavy; i++) attempt->part[order[i].vertex] = rest + i;
     free(part);
     return good;
 }
@@ -252,13 +253,13 @@ static int largest_first(const void *a, const void *b)
     return by_parts(a, b);
 }
 
-static void relabel(const bt_graph *g, int n_parts, const int *before, int *part)
+static void relabel(const bt_graph *graph, int n_parts, const int *before, int *part)
 {
-    overlap *o = bt_alloc((size_t)g->n, sizeof *o);
+    overlap *o = bt_alloc((size_t)graph->n, sizeof *o);
     int n = 0, n_pairs = 0, *name = bt_alloc((size_t)n_parts, sizeof *name);
     bool *taken = bt_alloc((size_t)n_parts, sizeof *taken);
-    for (int v = 0; v < g->n; v++)
-        if (before[v] >= 0 && before[v] < n_parts) o[n++] = (overlap){g->weight[v], part[v], before[v]};
+    for (int v = 0; v < graph->n; v++)
+        if (before[v] >= 0 && before[v] < n_parts) o[n++] = (overlap){graph->weight[v], part[v], before[v]};
     qsort(o, (size_t)n, sizeof *o, by_parts);
     for (int i = 0; i < n; i++) {
         if (n_pairs && by_parts(&o[n_pairs - 1], &o[i]) == 0) o[n_pairs - 1].weight += o[i].weight;
@@ -273,7 +274,7 @@ static void relabel(const bt_graph *g, int n_parts, const int *before, int *part
         while (taken[next]) next++;
         name[p] = next++;
     }
-    for (int v = 0; v < g->n; v++) part[v] = name[part[v]];
+    for (int v = 0; v < graph->n; v++) part[v] = name[part[v]];
     free(o);
     free(name);
     free(taken);
@@ -283,113 +284,113 @@ static void relabel(const bt_graph *g, int n_parts, const int *before, int *part
 static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n_parts, double tolerance,
                                     const int *before, int *part)
 {
-    const bt_graph *g = &c->g;
+    const bt_graph *graph = &c->g;
     int64_t rest;
-    heavy *order = bt_alloc((size_t)g->n, sizeof *order);
-    int n_heavy = set_apart(g, n_parts, order, &rest), n_light = 0;
-    int *of = bt_alloc((size_t)g->n, sizeof *of);
+    heavy *order = bt_alloc((size_t)graph->n, sizeof *order);
+    int n_heavy = set_apart(graph, n_parts, order, &rest), n_light = 0;
+    int *of = bt_alloc((size_t)graph->n, sizeof *of);
     for (int i = 0; i < n_heavy; i++) of[order[i].vertex] = -1;
-    for (int v = 0; v < g->n; v++)
+    for (int v = 0; v < graph->n; v++)
         if (of[v] >= 0) of[v] = n_light++;
-    owned light = mapped(g, n_light, of);
+    owned light = mapped(graph, n_light, of);
     bool weightless = rest == 0; // such vertices are divided by number
-    for (int v = 0; weightless && v < g->n; v++)
+    for (int v = 0; weightless && v < graph->n; v++)
         if (of[v] >= 0) c->weight[v] = light.weight[of[v]] = 1;
     if (weightless) rest = n_light;
 
     int rest_parts = n_parts - n_heavy, n = 0;
-    trial t[3];
-    for (int i = 0; i < 3; i++) t[i].part = bt_alloc((size_t)g->n, sizeof *t[i].part);
-    const trial *best = t;
+    trial attempt[3];
+    for (int i = 0; i < 3; i++) attempt[i].part = bt_alloc((size_t)graph->n, sizeof *attempt[i].part);
+    const trial *best = attempt;
     if (n_light <= rest_parts) { // every vertex a part of its own
-        for (int v = 0; v < g->n; v++) t[0].part[v] = v;
-        t[0].method = BT_CUT_NONE;
+        for (int v = 0; v < graph->n; v++) attempt[0].part[v] = v;
+        attempt[0].method = BT_CUT_NONE;
     } else {
         double share = (double)rest / rest_parts;
         int64_t limit = (int64_t)bt_max((double)(rest / rest_parts), share * (1 + tolerance));
         for (int method = BT_CUT_KEPT; method <= BT_CUT_BISECT; method++) {
-            trial *now = &t[n];
+            trial *now = &attempt[n];
             now->method = method;
             bool good;
-            if (method == BT_CUT_KEPT) good = labels_before(g, whole, c->of, before, n_parts, now->part);
-            else good = cut_anew(g, &light, n_heavy, order, n_parts, tolerance, now);
+            if (method == BT_CUT_KEPT) good = labels_before(graph, whole, c->of, before, n_parts, now->part);
+            else good = cut_anew(graph, &light, n_heavy, order, n_parts, tolerance, now);
             if (!good) continue;
-            bt_cut_refine(g, n_parts, (int64_t)share, limit, now->part);
-            judge(g, n_parts, share, now);
+            bt_cut_refine(graph, n_parts, (int64_t)share, limit, now->part);
+            judge(graph, n_parts, share, now);
             n++;
         }
-        best = better_of(t, n, tolerance);
+        best = better_of(attempt, n, tolerance);
     }
-    memcpy(part, best->part, (size_t)g->n * sizeof *part);
+    memcpy(part, best->part, (size_t)graph->n * sizeof *part);
     bt_cut_method method = best->method;
-    for (int i = 0; i < 3; i++) free(t[i].part);
+    for (int i = 0; i < 3; i++) free(attempt[i].part);
     owned_free(&light);
     free(order);
     return method;
 }
 
-void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q)
+void bt_cut(const bt_graph *graph, int n_parts, double tolerance, int *part, bt_cut_quality *quality)
 {
-    int *before = bt_alloc((size_t)g->n, sizeof *before);
+    int *before = bt_alloc((size_t)graph->n, sizeof *before);
     bt_cut_method method = BT_CUT_NONE;
-    for (int v = 0; v < g->n; v++) {
+    for (int v = 0; v < graph->n; v++) {
         before[v] = part[v];
         part[v] = 0;
     }
-    if (n_parts > 1 && g->n > 0) {
-        int *of = bt_alloc((size_t)g->n, sizeof *of);
-        int n = contracted_numbers(g, of);
-        owned c = mapped(g, n, of);
+    if (n_parts > 1 && graph->n > 0) {
+        int *of = bt_alloc((size_t)graph->n, sizeof *of);
+        int n = contracted_numbers(graph, of);
+        owned c = mapped(graph, n, of);
         int *label = bt_alloc((size_t)n, sizeof *label);
-        method = cut_contracted(&c, g, n_parts, tolerance, before, label);
-        for (int v = 0; v < g->n; v++) part[v] = label[of[v]];
-        if (method != BT_CUT_KEPT) relabel(g, n_parts, before, part);
+        method = cut_contracted(&c, graph, n_parts, tolerance, before, label);
+        for (int v = 0; v < graph->n; v++) part[v] = label[of[v]];
+        if (method != BT_CUT_KEPT) relabel(graph, n_parts, before, part);
         free(label);
         owned_free(&c);
     }
-    if (q) {
-        *q = bt_cut_measure(g, n_parts, part, before);
-        q->method = method;
+    if (quality) {
+        *quality = bt_cut_measure(graph, n_parts, part, before);
+        quality->method = method;
     }
     free(before);
 }
 
-bt_cut_quality bt_cut_measure(const bt_graph *g, int n_parts, const int *part, const int *before)
+bt_cut_quality bt_cut_measure(const bt_graph *graph, int n_parts, const int *part, const int *before)
 {
-    bt_cut_quality q = {.method = BT_CUT_NONE};
+    bt_cut_quality quality = {.method = BT_CUT_NONE};
     int64_t *load = bt_alloc((size_t)n_parts, sizeof *load), sum = 0, most = 0;
     bool *used = bt_alloc((size_t)n_parts, sizeof *used);
-    for (int v = 0; v < g->n; v++) {
-        load[part[v]] += g->weight[v];
-        sum += g->weight[v];
+    for (int v = 0; v < graph->n; v++) {
+        load[part[v]] += graph->weight[v];
+        sum += graph->weight[v];
         used[part[v]] = true;
-        if (before && before[v] >= 0 && before[v] != part[v]) q.moved += g->weight[v];
-        for (int e = g->start[v]; e < g->start[v + 1]; e++)
-            if (g->to[e] > v && part[g->to[e]] != part[v]) q.cut += g->edge[e];
+        if (before && before[v] >= 0 && before[v] != part[v]) quality.moved += graph->weight[v];
+        for (int e = graph->start[v]; e < graph->start[v + 1]; e++)
+            if (graph->to[e] > v && part[graph->to[e]] != part[v]) quality.cut += graph->edge[e];
     }
     for (int p = 0; p < n_parts; p++) {
         if (load[p] > most) most = load[p];
-        q.n_empty += !used[p];
+        quality.n_empty += !used[p];
     }
-    if (sum > 0) q.imbalance = (double)most * n_parts / (double)sum - 1;
+    if (sum > 0) quality.imbalance = (double)most * n_parts / (double)sum - 1;
     free(load);
     free(used);
-    return q;
+    return quality;
 }
 
-bool bt_cut_is_valid(const bt_graph *g, int n_parts, const int *part)
+bool bt_cut_is_valid(const bt_graph *graph, int n_parts, const int *part)
 {
-    for (int v = 0; v < g->n; v++)
+    for (int v = 0; v < graph->n; v++)
         if (part[v] < 0 || part[v] >= n_parts) return false;
-    int *of = bt_alloc((size_t)g->n, sizeof *of), n = contracted_numbers(g, of);
+    int *of = bt_alloc((size_t)graph->n, sizeof *of), n = contracted_numbers(graph, of);
     int *label = bt_alloc((size_t)n, sizeof *label);
     bool good = true;
     for (int c = 0; c < n; c++) label[c] = -1;
-    for (int v = 0; v < g->n; v++) {
+    for (int v = 0; v < graph->n; v++) {
         if (label[of[v]] < 0) label[of[v]] = part[v];
         else good = good && label[of[v]] == part[v];
     }
     free(of);
     free(label);
-    return good && (n < n_parts || bt_cut_measure(g, n_parts, part, NULL).n_empty == 0);
+    return good && (n < n_parts || bt_cut_measure(graph, n_parts, part, NULL).n_empty == 0);
 }

@@ -39,33 +39,33 @@ typedef struct bt_cut_quality {
 /// part: in, the labels before (outside 0 ... n_parts − 1: none); out, the labels. tolerance: imbalance that is as good
 /// as none, e.g. 0.04 (labels before are kept up to 1.25 times that). A vertex or group heavier than a part's share
 /// gets a part of its own, and the rest is balanced without it. A part is empty only if there are fewer vertices (a
-/// group counts as one) than parts. q may be NULL.
+/// group counts as one) than parts. `quality` may be NULL.
 /// Deterministic: the same graph and labels before give the same labels. Not to be called by two threads at once
 /// (METIS). SIGTERM is blocked in the calling thread while METIS runs, and its handler is as before on return. All
 /// other threads of the process must block SIGTERM: METIS's handler would crash in them. (Block it before MPI_Init and
 /// the first parallel region, whose threads inherit that, and unblock it in the main thread afterwards.)
-void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q);
+void bt_cut(const bt_graph *graph, int n_parts, double tolerance, int *part, bt_cut_quality *quality);
 
 /// Quality of labels. before: as in bt_cut, NULL = none. method is BT_CUT_NONE.
-bt_cut_quality bt_cut_measure(const bt_graph *g, int n_parts, const int *part, const int *before);
+bt_cut_quality bt_cut_measure(const bt_graph *graph, int n_parts, const int *part, const int *before);
 
 /// Every label in 0 ... n_parts − 1, groups together, and no part empty unless there are fewer vertices than parts.
-bool bt_cut_is_valid(const bt_graph *g, int n_parts, const int *part);
+bool bt_cut_is_valid(const bt_graph *graph, int n_parts, const int *part);
 
 // --- methods ---------------------------------------------------------------------------------------------------------
 
 // The steps that bt_cut is made of. They see a graph without groups: bt_cut has contracted each to one vertex.
 
 /// Cut by METIS. false: it failed, left a part empty or wrote a label out of range; part then holds nothing of use.
-/// n_parts >= 2, g->n > n_parts, weights not all zero.
-bool bt_cut_by_metis(const bt_graph *g, int n_parts, double tolerance, int *part);
+/// n_parts >= 2, graph->n > n_parts, weights not all zero.
+bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *part);
 
-/// Cut by recursive coordinate bisection. g->n >= n_parts >= 1: no part is empty.
-void bt_cut_by_bisection(const bt_graph *g, int n_parts, int *part);
+/// Cut by recursive coordinate bisection. graph->n >= n_parts >= 1: no part is empty.
+void bt_cut_by_bisection(const bt_graph *graph, int n_parts, int *part);
 
 /// Shift vertices between neighbour parts until no part of more than one vertex weighs more than limit, as far as that
 /// can be done (parts lighter than share take them); then shift those that lower the cut within the limit. No part
 /// becomes empty.
-void bt_cut_refine(const bt_graph *g, int n_parts, int64_t share, int64_t limit, int *part);
+void bt_cut_refine(const bt_graph *graph, int n_parts, int64_t share, int64_t limit, int *part);
 
 #endif

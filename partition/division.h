@@ -61,30 +61,30 @@ struct bt_domain {
 #define BT_WORK_AT_REST 2e-9
 
 /// Place of cell (x, y) in the map, −1 outside.
-int64_t bt_division_place(const bt_world *w, int32_t x, int32_t y);
+int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y);
 
 /// Would one rank alone be faster, by the modelled work of a step on all ranks, s?
-bool bt_division_is_for_one(const bt_world *w, double work);
+bool bt_division_is_for_one(const bt_world *world, double work);
 
 /// Longest path of a large movable body, m; −1 = there is none.
-double bt_division_large_path(const bt_world *w);
+double bt_division_large_path(const bt_world *world);
 
 /// Rank that owns cell (x, y) of the map; −1 outside.
-int bt_division_owner(const bt_world *w, int32_t x, int32_t y);
+int bt_division_owner(const bt_world *world, int32_t x, int32_t y);
 
 enum { BT_MAX_SHARERS = 5 };
 /// Ranks that hold the bodies of cell (x, y), each once; returns their number.
-int bt_division_sharers(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX_SHARERS]);
+int bt_division_sharers(const bt_world *world, int32_t x, int32_t y, int rank[BT_MAX_SHARERS]);
 
 /// Cell of the phase that touches the bodies of cell (x, y); false when there is none.
-bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int32_t out[2]);
+bool bt_division_toucher(const bt_world *world, int phase, int32_t x, int32_t y, int32_t out[2]);
 
-void bt_halo_free(bt_domain *d);
+void bt_halo_free(bt_domain *domain);
 
 /// Collective. Ends the run when bodies are lost or doubled.
-void bt_domain_check(bt_world *w);
+void bt_domain_check(bt_world *world);
 
 /// Collective. A map for the cells as they are now: renewed from the one before, or cut anew.
-void bt_division_map(bt_world *w, bool cut);
+void bt_division_map(bt_world *world, bool cut);
 
 #endif

@@ -19,14 +19,17 @@ enum { CHECK_STEPS = 10 };
 #define PAIR 60e-9
 #define BODY 120e-9
 
-static bool owns_cell(const bt_world *w, int32_t x, int32_t y)
+static bool owns_cell(const bt_world *world, int32_t x, int32_t y)
 {
-    return !w->domain || bt_division_owner(w, x, y) == w->domain->comm->rank;
+    return !world->domain || bt_division_owner(world, x, y) == world->domain->comm->rank;
 }
 
-static bool owns_large(const bt_world *w) { return !w->domain || w->domain->large_owner == w->domain->comm->rank; }
+static bool owns_large(const bt_world *world)
+{
+    return !world->domain || world->domain->large_owner == world->domain->comm->rank;
+}
 
-static bool is_due(const bt_world *w) { return w->domain && w->domain->due; }
+static bool is_due(const bt_world *world) { return world->domain && world->domain->due; }
 
 static const bt_exchange exchange = {
     .maxima = bt_domain_maxima,
@@ -39,161 +42,166 @@ static const bt_exchange exchange = {
     .receive = bt_domain_receive,
 };
 
-void bt_domain_create(bt_world *w, const bt_comm *comm)
+void bt_domain_create(bt_world *world, const bt_comm *comm)
 {
     if (comm->size == 1) return;
-    bt_domain *d = w->domain = bt_alloc(1, sizeof *d);
-    d->comm = comm;
-    d->due = true;
-    w->exchange = &exchange;
+    bt_domain *domain = world->domain = bt_alloc(1, sizeof *domain);
+    domain->comm = comm;
+    domain->due = true;
+    world->exchange = &exchange;
 }
 
-void bt_domain_free(bt_domain *d)
+void bt_domain_free(bt_domain *domain)
 {
-    if (!d) return;
-    bt_halo_free(d);
-    void *arrays[] = {d->owner, d->under, d->owned, d->touched, d->work, d};
+    if (!domain) return;
+    bt_halo_free(domain);
+    void *arrays[] = {domain->owner, domain->under, domain->owned, domain->touched, domain->work, domain};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
-bt_domain_stats bt_domain_get_stats(const bt_world *w)
+bt_domain_stats bt_domain_get_stats(const bt_world *world)
 {
-    bt_domain_stats s = w->domain ? w->domain->stats : (bt_domain_stats){0};
-    if (s.checks > 0) s.imbalance /= (double)s.checks;
-    if (s.divisions > 1) s.repartition_imbalance /= (double)(s.divisions - 1);
-    return s;
+    bt_domain_stats stats = world->domain ? world->domain->stats : (bt_domain_stats){0};
+    if (stats.checks > 0) stats.imbalance /= (double)stats.checks;
+    if (stats.divisions > 1) stats.repartition_imbalance /= (double)(stats.divisions - 1);
+    return stats;
 }
 
-double bt_domain_exchange_time(const bt_world *w)
+double bt_domain_exchange_time(const bt_world *world)
 {
-    if (!w->domain) return 0;
-    const double t = w->domain->exchange_s;
-    w->domain->exchange_s = 0;
+    if (!world->domain) return 0;
+    const double t = world->domain->exchange_s;
+    world->domain->exchange_s = 0;
     return t;
 }
 
-bool bt_domain_owns(const bt_world *w, bt_idx i)
+bool bt_domain_owns(const bt_world *world, bt_idx i)
 {
-    return !w->domain || !w->domain->distributed || w->domain->owned[i];
+    return !world->domain || !world->domain->distributed || world->domain->owned[i];
 }
 
-void bt_domain_follow(bt_world *w, const bt_idx *from)
+void bt_domain_follow(bt_world *world, const bt_idx *from)
 {
-    bt_domain *d = w->domain;
-    if (!d || !d->distributed) return;
-    const bt_idx n = w->bodies.n;
-    if (n > d->cap_owned) {
-        d->cap_owned = n;
-        d->touched = bt_realloc(d->touched, (size_t)n, 1);
+    bt_domain *domain = world->domain;
+    if (!domain || !domain->distributed) return;
+    const bt_idx n = world->bodies.n;
+    if (n > domain->cap_owned) {
+        domain->cap_owned = n;
+        domain->touched = bt_realloc(domain->touched, (size_t)n, 1);
     }
-    uint8_t *owned = bt_alloc((size_t)d->cap_owned, sizeof *owned);
-    for (bt_idx i = 0; i < n; i++) owned[i] = d->owned[from[i]];
-    free(d->owned);
-    d->owned = owned;
+    uint8_t *owned = bt_alloc((size_t)domain->cap_owned, sizeof *owned);
+    for (bt_idx i = 0; i < n; i++) owned[i] = domain->owned[from[i]];
+    free(domain->owned);
+    domain->owned = owned;
 }
 
 // --- sums ------------------------------------------------------------------------------------------------------------
 
-void bt_domain_maxima(const bt_world *w, double *x, int n)
+void bt_domain_maxima(const bt_world *world, double *x, int n)
 {
-    if (!w->domain) return;
+    if (!world->domain) return;
     const double t0 = bt_clock();
-    bt_comm_reduce(w->domain->comm, NULL, 0, x, n, NULL, 0);
-    w->domain->exchange_s += bt_clock() - t0;
+    bt_comm_reduce(world->domain->comm, NULL, 0, x, n, NULL, 0);
+    world->domain->exchange_s += bt_clock() - t0;
 }
 
-void bt_domain_reduce(const bt_world *w, bt_totals *t)
+void bt_domain_reduce(const bt_world *world, bt_totals *totals)
 {
-    if (!w->domain) return;
+    if (!world->domain) return;
     const double t0 = bt_clock();
-    bt_comm_reduce(w->domain->comm, t->sum, t->n_sums, &t->most, 1, NULL, 0);
-    w->domain->exchange_s += bt_clock() - t0;
+    bt_comm_reduce(world->domain->comm, totals->sum, totals->n_sums, &totals->most, 1, NULL, 0);
+    world->domain->exchange_s += bt_clock() - t0;
 }
 
-double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *rows, int64_t *total)
+double *bt_domain_gather(const bt_world *world, int64_t n, int width, const double *rows, int64_t *total)
 {
     const double t0 = bt_clock();
-    double *all = bt_comm_gather(w->domain->comm, n, width, rows, total);
-    w->domain->exchange_s += bt_clock() - t0;
+    double *all = bt_comm_gather(world->domain->comm, n, width, rows, total);
+    world->domain->exchange_s += bt_clock() - t0;
     return all;
 }
 
-uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x)
+uint64_t bt_domain_sum_words(const bt_world *world, uint64_t x)
 {
-    if (!w->domain) return x;
-    bt_sum s = {.v = (bt_int128)x};
-    bt_comm_reduce(w->domain->comm, &s, 1, NULL, 0, NULL, 0);
-    return (uint64_t)s.v;
+    if (!world->domain) return x;
+    bt_sum sum = {.v = (bt_int128)x};
+    bt_comm_reduce(world->domain->comm, &sum, 1, NULL, 0, NULL, 0);
+    return (uint64_t)sum.v;
 }
 
 // --- one rank for all ------------------------------------------------------------------------------------------------
 
-bool bt_domain_is_idle(const bt_world *w) { return w->domain && w->domain->undivided && w->domain->comm->rank != 0; }
-
-void bt_domain_solve(bt_world *w, void (*solve)(bt_world *w), bt_vel *shift)
+bool bt_domain_is_idle(const bt_world *world)
 {
-    bt_domain *d = w->domain;
-    if (!d || !d->undivided) {
-        solve(w);
+    return world->domain && world->domain->undivided && world->domain->comm->rank != 0;
+}
+
+void bt_domain_solve(bt_world *world, void (*solve)(bt_world *world), bt_vel *shift)
+{
+    bt_domain *domain = world->domain;
+    if (!domain || !domain->undivided) {
+        solve(world);
     } else {
-        if (d->comm->rank == 0) {
-            const bt_exchange *others = w->exchange;
-            w->domain = NULL, w->exchange = NULL;
-            solve(w);
-            w->domain = d, w->exchange = others;
+        if (domain->comm->rank == 0) {
+            const bt_exchange *others = world->exchange;
+            world->domain = NULL, world->exchange = NULL;
+            solve(world);
+            world->domain = domain, world->exchange = others;
         }
         const double t0 = bt_clock();
-        const bt_step_stats mine = w->stats;
-        MPI_Bcast(&w->stats, sizeof w->stats, MPI_BYTE, 0, d->comm->mpi);
-        w->stats.phases = mine.phases, w->stats.shared = mine.shared, w->stats.in_team = mine.in_team;
-        d->exchange_s += bt_clock() - t0;
+        const bt_step_stats mine = world->stats;
+        MPI_Bcast(&world->stats, sizeof world->stats, MPI_BYTE, 0, domain->comm->mpi);
+        world->stats.phases = mine.phases, world->stats.shared = mine.shared, world->stats.in_team = mine.in_team;
+        domain->exchange_s += bt_clock() - t0;
     }
-    bt_domain_settle(w, shift);
+    bt_domain_settle(world, shift);
 }
 
 // --- balance ---------------------------------------------------------------------------------------------------------
 
-void bt_domain_note(bt_world *w)
+void bt_domain_note(bt_world *world)
 {
-    bt_domain *d = w->domain;
-    if (!d) return;
-    const bt_cells *t = w->cells;
+    bt_domain *domain = world->domain;
+    if (!domain) return;
+    const bt_cells *cells = world->cells;
     int64_t large = 0; // the large bodies' own work is done where they are
-    while (large < (int64_t)d->n_x * d->n_y - 1 && !d->under[large]) large++;
-    for (bt_idx k = 0; k < t->n; k++) {
-        bt_cell *cell = &t->cell[k];
+    while (large < (int64_t)domain->n_x * domain->n_y - 1 && !domain->under[large]) large++;
+    for (bt_idx k = 0; k < cells->n; k++) {
+        bt_cell *cell = &cells->cell[k];
         if (!cell->own) continue;
-        const bool last = k == t->n - 1;
-        d->work[last ? large : bt_division_place(w, cell->x, cell->y)] +=
+        const bool last = k == cells->n - 1;
+        domain->work[last ? large : bt_division_place(world, cell->x, cell->y)] +=
             cell->n_contacts * CONTACT_STEP + (double)cell->work.updates * CONTACT_SWEEP + cell->search.n_pairs * PAIR +
-            (cell->end - cell->first) * (last || bt_cells_moves(t, k) ? BODY : BT_WORK_AT_REST);
+            (cell->end - cell->first) * (last || bt_cells_moves(cells, k) ? BODY : BT_WORK_AT_REST);
         cell->work.updates = 0;
     }
-    d->drift += w->par.dt *
-                ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));
-    const double path = bt_division_large_path(w);
-    const bool far = path >= 0 && path - d->large_path + d->drift > 2 * w->par.size;
-    d->sweeps += w->stats.sweeps + w->stats.position_sweeps;
-    d->stats.undivided += d->undivided;
-    const bool first = d->undivided && d->stats.undivided == 1;
-    if (++d->steps >= CHECK_STEPS || first) {
+    domain->drift += world->par.dt *
+                     ((world->par.period_x > 0 ? fabs(world->par.water_u) : 0) +
+                      (world->par.period_y > 0 ? fabs(world->par.water_v) : 0));
+    const double path = bt_division_large_path(world);
+    const bool far = path >= 0 && path - domain->large_path + domain->drift > 2 * world->par.size;
+    domain->sweeps += world->stats.sweeps + world->stats.position_sweeps;
+    domain->stats.undivided += domain->undivided;
+    const bool first = domain->undivided && domain->stats.undivided == 1;
+    if (++domain->steps >= CHECK_STEPS || first) {
         bt_sum total = {0};
         double mine = 0;
-        for (int64_t p = 0; p < (int64_t)d->n_x * d->n_y; p++) mine += d->work[p];
+        for (int64_t p = 0; p < (int64_t)domain->n_x * domain->n_y; p++) mine += domain->work[p];
         bt_sum_add(&total, mine * 0x1p40);
-        bt_comm_reduce(d->comm, &total, 1, &mine, 1, NULL, 0);
-        const double mean = bt_sum_value(&total) * 0x1p-40 / d->comm->size, imbalance = mean > 0 ? mine / mean - 1 : 0;
-        const bool for_one = bt_division_is_for_one(w, mean * d->comm->size / (double)d->steps);
-        if (!d->undivided && (d->stats.divisions > 1 || imbalance <= IMBALANCE)) {
-            d->stats.checks++;
-            d->stats.imbalance += imbalance;
-            d->stats.worst_imbalance = bt_max(d->stats.worst_imbalance, imbalance);
+        bt_comm_reduce(domain->comm, &total, 1, &mine, 1, NULL, 0);
+        const double mean = bt_sum_value(&total) * 0x1p-40 / domain->comm->size,
+                     imbalance = mean > 0 ? mine / mean - 1 : 0;
+        const bool for_one = bt_division_is_for_one(world, mean * domain->comm->size / (double)domain->steps);
+        if (!domain->undivided && (domain->stats.divisions > 1 || imbalance <= IMBALANCE)) {
+            domain->stats.checks++;
+            domain->stats.imbalance += imbalance;
+            domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
         }
-        d->due = for_one ? !d->undivided : d->undivided || imbalance > IMBALANCE;
-        if (!d->due) {
-            d->steps = d->sweeps = 0;
-            memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
+        domain->due = for_one ? !domain->undivided : domain->undivided || imbalance > IMBALANCE;
+        if (!domain->due) {
+            domain->steps = domain->sweeps = 0;
+            memset(domain->work, 0, (size_t)domain->n_x * (size_t)domain->n_y * sizeof *domain->work);
         }
     }
-    if (far) d->due = true;
+    if (far) domain->due = true;
 }

@@ -62,23 +62,23 @@ static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t *weight, idx_t *ed
     return status;
 }
 
-bool bt_cut_by_metis(const bt_graph *g, int n_parts, double tolerance, int *part)
+bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *part)
 {
     _Static_assert(sizeof(idx_t) == sizeof(int), "METIS with 64-bit indices: copy start, to and part");
-    int n = g->n, n_edges = g->start[n];
+    int n = graph->n, n_edges = graph->start[n];
     if (n > SUM_MAX / 4 || n_edges > SUM_MAX / 4) return false;
     int64_t sum_weight = 0, sum_edge = 0;
-    for (int i = 0; i < n; i++) sum_weight += g->weight[i];
-    for (int e = 0; e < n_edges; e++) sum_edge += g->edge[e];
+    for (int i = 0; i < n; i++) sum_weight += graph->weight[i];
+    for (int e = 0; e < n_edges; e++) sum_edge += graph->edge[e];
 
     idx_t *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc((size_t)n_edges, sizeof *to);
     idx_t *weight = bt_alloc((size_t)n, sizeof *weight), *edge = bt_alloc((size_t)n_edges, sizeof *edge);
     int64_t divisor = divisor_of(sum_weight, n), edge_divisor = divisor_of(sum_edge, n_edges);
-    for (int i = 0; i <= n; i++) start[i] = g->start[i];
-    for (int i = 0; i < n; i++) weight[i] = scaled(g->weight[i], divisor);
+    for (int i = 0; i <= n; i++) start[i] = graph->start[i];
+    for (int i = 0; i < n; i++) weight[i] = scaled(graph->weight[i], divisor);
     for (int e = 0; e < n_edges; e++) {
-        to[e] = g->to[e];
-        edge[e] = g->edge[e] ? scaled(g->edge[e], edge_divisor) : 1; // METIS wants edges > 0
+        to[e] = graph->to[e];
+        edge[e] = graph->edge[e] ? scaled(graph->edge[e], edge_divisor) : 1; // METIS wants edges > 0
     }
     int status = call_metis(n, start, to, weight, edge, n_parts, tolerance, part);
     free(start);

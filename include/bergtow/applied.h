@@ -43,7 +43,7 @@ typedef struct bt_applied {
 
 /// Fills the loads; 0 = done, anything else ends the run with BT_ERR_NUMERIC. Under MPI it is called on every rank, and
 /// a body that several ranks hold must have the same row on each.
-typedef int bt_applied_force(const bt_applied *a, void *user);
+typedef int bt_applied_force(const bt_applied *applied, void *user);
 
 /// Add a force, or give the one of this name another function; NULL = it does nothing from now on. A new name comes
 /// before the case of the run is read; on all ranks alike, from one thread. A world has the forces that were there when

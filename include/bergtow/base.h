@@ -45,13 +45,13 @@ typedef struct bt_note {
 } bt_note;
 
 /// Append a message (printf-style). Aborts only when out of memory.
-void bt_errors_add(bt_errors *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 /// The same with a list of arguments.
-void bt_errors_add_list(bt_errors *e, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
+void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
 /// Print every message on stderr, one a line, prefixed "bergtow: ".
-void bt_errors_print(const bt_errors *e);
+void bt_errors_print(const bt_errors *err);
 /// Release the messages; the list is empty then.
-void bt_errors_free(bt_errors *e);
+void bt_errors_free(bt_errors *err);
 /// All messages of `from` behind those of `to`; from is empty then.
 void bt_errors_move(bt_errors *to, bt_errors *from);
 
@@ -72,10 +72,10 @@ typedef struct bt_text {
     size_t size;
     void *locale;
 } bt_text;
-/// Open t->out, to write to. Until bt_text_end numbers have a decimal point in this thread, whatever its locale.
-void bt_text_begin(bt_text *t);
+/// Open text->out, to write to. Until bt_text_end numbers have a decimal point in this thread, whatever its locale.
+void bt_text_begin(bt_text *text);
 /// Close it. Returns the text, which the caller frees.
-char *bt_text_end(bt_text *t);
+char *bt_text_end(bt_text *text);
 
 /// Copy of a text; the caller frees it.
 char *bt_text_copy(const char *text);

@@ -131,21 +131,21 @@ typedef struct bt_bodies {
 } bt_bodies;
 
 /// Number of vertices of the outline of body i.
-static inline int bt_body_corners(const bt_bodies *b, bt_idx i) { return b->mark[b->offset[i]].count; }
+static inline int bt_body_corners(const bt_bodies *bodies, bt_idx i) { return bodies->mark[bodies->offset[i]].count; }
 
 /// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline
 /// itself, if that is convex.
-static inline int bt_part_first(const bt_bodies *b, bt_idx i)
+static inline int bt_part_first(const bt_bodies *bodies, bt_idx i)
 {
-    const int n = bt_body_corners(b, i);
-    return b->offset[i] + n < b->offset[i + 1] ? n : 0;
+    const int n = bt_body_corners(bodies, i);
+    return bodies->offset[i] + n < bodies->offset[i + 1] ? n : 0;
 }
 
 /// The one after it, −1 = none.
-static inline int bt_part_next(const bt_bodies *b, bt_idx i, int part)
+static inline int bt_part_next(const bt_bodies *bodies, bt_idx i, int part)
 {
-    const int next = part + b->mark[b->offset[i] + part].count;
-    return b->offset[i] + next < b->offset[i + 1] ? next : -1;
+    const int next = part + bodies->mark[bodies->offset[i] + part].count;
+    return bodies->offset[i] + next < bodies->offset[i + 1] ? next : -1;
 }
 
 #ifdef __cplusplus

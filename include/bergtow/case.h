@@ -280,79 +280,79 @@ typedef struct bt_case {
 
 /// Read and check a case file, with those that it is based on (its key `base`); every error of the files is appended to
 /// err with file, line, key and remedy.
-/// overrides: [n] texts "key=value" that replace the file's values. *c is overwritten, not released before; after an
-/// error, too, it is to be released with bt_case_free. Errors: BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
+/// overrides: [n] texts "key=value" that replace the file's values. *input is overwritten, not released before; after
+/// an error, too, it is to be released with bt_case_free. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_case_read(bt_case *input, const char *path, const char *const *overrides, int n, bt_errors *err);
 
 /// The same, with the place at which each override stands: [n] texts "FILE:LINE: " that messages name in place of
 /// "--set ".
-bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place,
+bt_status bt_case_read_placed(bt_case *input, const char *path, const char *const *overrides, const char *const *place,
                               int n, bt_errors *err);
 
 /// The same from a text, which path names in messages; files that the text names lie beside path.
-bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, const char *const *overrides,
+bt_status bt_case_read_text(bt_case *input, const char *path, const char *text, const char *const *overrides,
                             const char *const *place, int n, bt_errors *err);
 
 /// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file
 /// is read.
-bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current,
+bt_status bt_case_read_kept(bt_case *input, const char *path, const char *text, const bt_table *current,
                             const bt_table *wind, bt_errors *err);
 
-/// All defaults, for tests and programs that build a case in memory. *c is overwritten, not released before.
-void bt_case_defaults(bt_case *c);
+/// All defaults, for tests and programs that build a case in memory. *input is overwritten, not released before.
+void bt_case_defaults(bt_case *input);
 
 /// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
-bt_status bt_case_finish(bt_case *c, bt_errors *err);
+bt_status bt_case_finish(bt_case *input, bt_errors *err);
 
 /// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
-char *bt_case_resolved(const bt_case *c);
+char *bt_case_resolved(const bt_case *input);
 /// One JSON object {"section.key": value}, in SI units, null where a key has no value. Caller frees.
-char *bt_case_resolved_json(const bt_case *c);
+char *bt_case_resolved_json(const bt_case *input);
 #define BT_CASE_RESOLVED_HEAD                                                                                          \
     "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n"
 
 /// The same below comment lines of one's own. Caller frees.
-char *bt_case_text(const bt_case *c, const char *head);
+char *bt_case_text(const bt_case *input, const char *head);
 
 /// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/case/froude.c):
 /// the twin moves alike in times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for
 /// keys that name files of numbers with a dimension.
-bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err);
+bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err);
 
 /// The twin as a case file, below comments that say what was scaled how, and what is not similar. Caller frees.
 char *bt_case_scaled_text(const bt_case *twin, double ratio);
 
 /// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count, 0
 /// without body and for an outline that is refused.
-int bt_case_waterline(const bt_case *c, double *v);
+int bt_case_waterline(const bt_case *input, double *v);
 
 /// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count.
-int bt_case_floe_outline(const bt_floe_def *f, double *v);
+int bt_case_floe_outline(const bt_floe_def *floe, double *v);
 
 /// Mass of the towed body without added mass, kg.
-double bt_case_body_mass(const bt_case *c);
+double bt_case_body_mass(const bt_case *input);
 
 /// Is space periodic between two such boundaries? A moving window is, along x (window.h).
 static inline bool bt_bound_wraps(bt_bound b) { return b == BT_BOUND_PERIODIC || b == BT_BOUND_MOVING; }
 
 /// +1 when the tow goes towards +x, −1 towards −x: where the moving window goes.
-double bt_case_tow_sign(const bt_case *c);
+double bt_case_tow_sign(const bt_case *input);
 
 /// A velocity at time zero of a case as a number: 0 where it is left to free drift.
 static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }
 
 /// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
-int64_t bt_case_steps(const bt_case *c);
+int64_t bt_case_steps(const bt_case *input);
 
 /// The window of the statistics begins there or later: output.window_start, or the end of the ramp, and where that is
 /// short for a body on its line, two periods later, but halfway to the end of the run at most, s.
-double bt_case_earliest_window(const bt_case *c);
+double bt_case_earliest_window(const bt_case *input);
 
 /// Reference speed of the solver tolerance, m/s (> 0).
-double bt_case_reference_speed(const bt_case *c);
+double bt_case_reference_speed(const bt_case *input);
 
-/// Release what a case holds; c itself is the caller's.
-void bt_case_free(bt_case *c);
+/// Release what a case holds; `input` itself is the caller's.
+void bt_case_free(bt_case *input);
 
 /// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream (FILE *).
 void bt_case_list_keys(void *stream);

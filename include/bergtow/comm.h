@@ -52,29 +52,29 @@ int bt_comm_end(int code);
 /// Ends all ranks now, from any one, without waiting for the others. Flushes stdout and stderr first.
 void bt_comm_abort(int code) __attribute__((noreturn));
 
-/// Collective. The ranks of c that name the same group, as ranks of their own. Release with
+/// Collective. The ranks of `comm` that name the same group, as ranks of their own. Release with
 /// bt_comm_split_end.
-void bt_comm_split(const bt_comm *c, int group, bt_comm *part);
+void bt_comm_split(const bt_comm *comm, int group, bt_comm *part);
 /// Collective over the group. The end of what bt_comm_split has made.
 void bt_comm_split_end(bt_comm *part);
 
 /// Collective. Returns the worst status of all ranks, BT_OK where all are done. From bad to worse: done, signal, usage,
 /// case, numeric, input/output: a file that cannot be written decides how the run may end, and what the user has to do
 /// first.
-bt_status bt_comm_agree(const bt_comm *c, bt_status status);
+bt_status bt_comm_agree(const bt_comm *comm, bt_status status);
 
 /// Collective. All ranks' messages to rank 0, each text once, in the order of the ranks; the others' lists become
 /// empty.
-void bt_comm_errors(const bt_comm *c, bt_errors *err);
+void bt_comm_errors(const bt_comm *comm, bt_errors *err);
 
 /// Collective. Copy bytes from rank 0 to all; any size.
-void bt_comm_bcast(const bt_comm *c, void *data, size_t bytes);
+void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes);
 
 /// Collective. True if it is on any rank.
-bool bt_comm_any(const bt_comm *c, bool value);
+bool bt_comm_any(const bt_comm *comm, bool value);
 
 /// Collective. Returns when all ranks have called it; meanwhile the cores are free for the ranks that still work.
-void bt_comm_rest(const bt_comm *c);
+void bt_comm_rest(const bt_comm *comm);
 
 /// Until n requests are done. One after the other: gcc takes MPI_STATUSES_IGNORE, the address 1 in MPICH, for an array
 /// of no bytes that MPI_Waitall writes to.
@@ -86,16 +86,16 @@ static inline void bt_comm_wait(int n, MPI_Request *request)
 /// Collective. Sums, largest values and bitwise ors of all ranks in one message. Sums are exact and `bad` is handed on;
 /// a NaN is the largest value. The result is the same on all ranks, in any distribution of the terms. NULL where n is
 /// 0.
-void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors);
+void bt_comm_reduce(const bt_comm *comm, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors);
 
 /// Collective. Sum over the ranks before this one; *total (may be NULL): over all.
-int64_t bt_comm_before(const bt_comm *c, int64_t value, int64_t *total);
+int64_t bt_comm_before(const bt_comm *comm, int64_t value, int64_t *total);
 
-/// First of the n things that stand in the block of a rank when they are distributed in equal blocks; bt_comm_first(c,
-/// c->size, n) = n.
-static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n)
+/// First of the n things that stand in the block of a rank when they are distributed in equal blocks;
+/// bt_comm_first(comm, comm->size, n) = n.
+static inline int64_t bt_comm_first(const bt_comm *comm, int rank, int64_t n)
 {
-    return (int64_t)((__extension__(__int128) n) * rank / c->size);
+    return (int64_t)((__extension__(__int128) n) * rank / comm->size);
 }
 
 /// Collective. Rows of bodies from wherever they are to the order of their ids. This rank has n rows: gid [n] and
@@ -103,12 +103,12 @@ static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n)
 /// first[k]][width].
 /// first: [size + 1], ascending, the same on all ranks; first[0] = 0. Every id below first[size] must come exactly
 /// once. Errors (the same status on all ranks): BT_ERR_NUMERIC, naming ids that are missing, doubled, or outside.
-bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
+bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
                               const double *rows, double *block, bt_errors *err);
 
 /// Collective. Rows of doubles [n][width] from all ranks to rank 0, in the order of the ranks: [*total][width] there,
 /// to be freed; NULL and *total = 0 elsewhere.
-double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total);
+double *bt_comm_gather(const bt_comm *comm, int64_t n, int width, const double *rows, int64_t *total);
 
 #ifdef __cplusplus
 }

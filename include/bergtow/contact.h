@@ -59,18 +59,18 @@ typedef struct bt_contact_law {
     const bt_contact_number *numbers; ///< [n_numbers]
     int n_numbers;
     /// own[] from other keys of the case; own[0..n_keys) are there. NULL = that is all
-    void (*setup)(const bt_case *c, double own[BT_MAX_CONTACT_OWN]);
+    void (*setup)(const bt_case *input, double own[BT_MAX_CONTACT_OWN]);
     /// Does the law bound anything at all in a world with these numbers?
     bool (*on)(const double *own);
     /// To this pair? Must not depend on where they are. NULL = to all
-    bool (*applies)(const bt_world *w, bt_idx a, bt_idx b, const double *own);
+    bool (*applies)(const bt_world *world, bt_idx a, bt_idx b, const double *own);
     /// load[i]: the most that point i bears in this step, N, INFINITY before; given[i]: by how much what
     /// stood at point i has receded, m, 0 before: the bodies meet when they overlap by that
-    void (*bound)(const bt_law_contact *t, double load[2], double given[2]);
-    /// After the solve, for each contact in cells at work: set t->value for the next step from load and grown, and add
-    /// to the numbers that are no state. Returns true when the pair has something to remember; that is kept until the
-    /// outlines part by a tenth of the mean floe size. NULL = never
-    bool (*remember)(bt_law_contact *t, double *number);
+    void (*bound)(const bt_law_contact *contact, double load[2], double given[2]);
+    /// After the solve, for each contact in cells at work: set contact->value for the next step from load and grown,
+    /// and add to the numbers that are no state. Returns true when the pair has something to remember; that is kept
+    /// until the outlines part by a tenth of the mean floe size. NULL = never
+    bool (*remember)(bt_law_contact *contact, double *number);
     /// What one pair that remembers adds to the numbers that are a state. NULL = nothing
     void (*count)(const double value[4], const double *own, double *number);
 } bt_contact_law;

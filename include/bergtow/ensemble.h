@@ -80,7 +80,8 @@ typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_memb
 /// study, a file that it names has changed, its members would be the same run, the study asks for more ranks than there
 /// are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (the call resumes, or others are at work on the rest);
 /// the worst status of a failed member when all others are done.
-bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
+bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
+                          bt_errors *err);
 
 /// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of
 /// failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be

@@ -126,7 +126,7 @@ typedef struct bt_estimate_def {
 /// summary, with its curve over the concentration, in `bergtow estimate`, ensembles, pictures and reports. How to:
 /// docs/how-to-add-an-estimate.md.
 /// Errors: BT_ERR_USAGE, with the reason in err.
-bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err);
+bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err);
 
 /// How many estimates there are: the program's own, then those registered.
 int bt_n_estimates(void);
@@ -146,13 +146,13 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in);
 /// The conditions of a case: ice as asked for by its keys, P* and P_s divided by the length scale. Without towed body,
 /// or tow, the speeds are NaN; else as ordered, the ice going with the water. The case has been checked
 /// (bt_case_finish).
-void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in);
+void bt_estimate_conditions(const bt_case *input, bt_estimate_input *in);
 
 /// The same with ice that drifts at ice[2], m/s; NaN: with the water.
-void bt_estimate_ordered(const bt_case *c, const double ice[2], bt_estimate_input *in);
+void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_input *in);
 
 /// Area-weighted means of a field: thickness and radius of the circle of a floe's area, m. 0 without floes.
-void bt_estimate_field(const bt_field *f, double *thickness, double *radius);
+void bt_estimate_field(const bt_field *field, double *thickness, double *radius);
 
 #ifdef __cplusplus
 }

@@ -33,15 +33,15 @@ typedef struct bt_events {
 } bt_events;
 
 /// Append an event: the end of its step, s, its kind, and what the kind says of subject and value.
-void bt_events_add(bt_events *e, double time, bt_event_kind kind, int64_t subject, double value);
+void bt_events_add(bt_events *events, double time, bt_event_kind kind, int64_t subject, double value);
 /// Release the events; the list is empty then.
-void bt_events_free(bt_events *e);
+void bt_events_free(bt_events *events);
 
 /// "line_broken", ...: BT_EVENT_KINDS names.
 extern const char *const bt_event_names[];
 
 /// One event as a sentence without its time: "branch 1 of the tow line broke at 2.04e+05 N".
-void bt_event_describe(const bt_event *e, char out[160]);
+void bt_event_describe(const bt_event *event, char out[160]);
 
 #ifdef __cplusplus
 }

@@ -90,19 +90,19 @@ typedef struct bt_load {
 } bt_load;
 
 /// Drag in a stream. Without room for it the load is no number, and the run ends in this step.
-static inline void bt_load_stream(bt_load *l, double u, double v, double skin, double form)
+static inline void bt_load_stream(bt_load *load, double u, double v, double skin, double form)
 {
     const bt_stream stream = {u, v, skin, form};
-    if (l->n_streams < BT_MAX_STREAMS) l->stream[l->n_streams++] = stream;
-    else l->fx = NAN;
+    if (load->n_streams < BT_MAX_STREAMS) load->stream[load->n_streams++] = stream;
+    else load->fx = NAN;
 }
 
 /// A damper g at the centroid that draws the body towards the velocity (u, v).
-static inline void bt_load_damper(bt_load *l, double g, double u, double v)
+static inline void bt_load_damper(bt_load *load, double g, double u, double v)
 {
-    l->g += g;
-    l->jx += g * u;
-    l->jy += g * v;
+    load->g += g;
+    load->jx += g * u;
+    load->jy += g * v;
 }
 
 /// A body as a law sees it: one of the world, or undisturbed ice (step/window.h), a mean floe that stands nowhere:
@@ -126,18 +126,18 @@ typedef struct bt_force_body {
 } bt_force_body;
 
 /// of the circle about the outline, m
-static inline double bt_force_radius(const bt_force_body *b) { return b->all->radius[b->i]; }
+static inline double bt_force_radius(const bt_force_body *body) { return body->all->radius[body->i]; }
 /// of its outline, m²
-static inline double bt_force_area(const bt_force_body *b) { return b->all->area[b->i]; }
+static inline double bt_force_area(const bt_force_body *body) { return body->all->area[body->i]; }
 /// of ice, m; 0 = no ice
-static inline double bt_force_thickness(const bt_force_body *b) { return b->all->thickness[b->i]; }
+static inline double bt_force_thickness(const bt_force_body *body) { return body->all->thickness[body->i]; }
 
 /// Place at the start of the step, m, m, rad; of the towed body x and y are not wrapped.
-static inline bt_pose bt_force_pose(const bt_force_body *b)
+static inline bt_pose bt_force_pose(const bt_force_body *body)
 {
-    bt_pose p = b->all->pose[b->i];
-    if (b->towed && !isnan(b->towed_at[0])) p.x = b->towed_at[0], p.y = b->towed_at[1];
-    return p;
+    bt_pose pose = body->all->pose[body->i];
+    if (body->towed && !isnan(body->towed_at[0])) pose.x = body->towed_at[0], pose.y = body->towed_at[1];
+    return pose;
 }
 
 /// A force law. What it does follows from its numbers, the time and the body; what is to survive a checkpoint cannot be
@@ -153,19 +153,19 @@ typedef struct bt_force_law {
     const bt_law_key *keys;
     int n_keys;
     /// own[] from other keys of the case; own[0..n_keys) are there. NULL = that is all
-    void (*setup)(const bt_case *c, double own[BT_MAX_FORCE_OWN]);
+    void (*setup)(const bt_case *input, double own[BT_MAX_FORCE_OWN]);
     /// May a floe rest that drifts with the water: does the law neither move it nor change from step to step? Asked
     /// once a step. NULL = never, which is right for every law, and costs the time that floes at rest save. Not asked
     /// of towed_only.
-    bool (*rests)(const bt_params *p, const double *own);
-    /// Add to *l what the law does to body b in this step. Called for every body in every step, by several threads at
-    /// once: it must change nothing but *l. Required.
-    void (*add)(const bt_force_body *b, bt_load *l);
+    bool (*rests)(const bt_params *par, const double *own);
+    /// Add to *load what the law does to the body in this step. Called for every body in every step, by several threads
+    /// at once: it must change nothing but *load. Required.
+    void (*add)(const bt_force_body *body, bt_load *load);
     /// Once a step, by one thread, when all bodies have their places: for what a law needs of all of them together. It
     /// may set own[]; when its `rests` then turns to no, floes at rest are woken. NULL = done, otherwise why it failed:
     /// the run ends after this step. NULL in place of the function = nothing to do. Of registered laws only, not of
     /// those in src/force/laws.h; so is `context`.
-    const char *(*begin)(const bt_world *w, double own[BT_MAX_FORCE_OWN], void *context);
+    const char *(*begin)(const bt_world *world, double own[BT_MAX_FORCE_OWN], void *context);
     void *context;             ///< handed to `begin`, and to `add` in the body
 } bt_force_law;
 
@@ -215,14 +215,14 @@ typedef struct bt_forces {
 
 /// The impulses on body i in the step just solved, before it has moved, as in bt_forces; of a kinematic body the forces
 /// at its prescribed velocity. law: [BT_MAX_FORCE_LAWS]; series: [BT_MAX_FORCE_SERIES].
-void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse *series);
+void bt_forces_impulses(const bt_world *world, bt_idx i, bt_impulse *law, bt_impulse *series);
 
 /// All that acts on body i at velocity u.
-void bt_forces_load(const bt_world *w, bt_idx i, const bt_vel *u, bt_load *l);
+void bt_forces_load(const bt_world *world, bt_idx i, const bt_vel *u, bt_load *load);
 
 /// Drag of one body from the moments of its outline, multiplied out: the products of bt_drag (body.h). draft, sail: m;
 /// densities: kg/m³; coefficients of form and skin drag: 1 (bt_drag_coefs).
-bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,
+bt_drag bt_forces_drag(const bt_moments *moments, double draft, double sail, double water_density, double air_density,
                        double water_form, double water_skin, double air_form, double air_skin);
 
 #ifdef __cplusplus

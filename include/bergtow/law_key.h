@@ -30,9 +30,9 @@ typedef struct bt_law_key {
 /// of laws included.
 bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err);
 
-/// own [n]: value of the k-th in SI units. The keys have been added (bt_keys_add) before c was read; anything else is
-/// undefined.
-void bt_keys_get(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own);
+/// own [n]: value of the k-th in SI units. The keys have been added (bt_keys_add) before `input` was read; anything
+/// else is undefined.
+void bt_keys_get(const bt_case *input, const char *section, const bt_law_key *keys, int n, double *own);
 
 #ifdef __cplusplus
 }

@@ -40,7 +40,7 @@ bool bt_outline_convex(int n, const double *v);
 /// Cut a sound outline into convex parts: ears (those of the best shape first), then every diagonal taken out again
 /// whose removal leaves a convex polygon [Hertel & Mehlhorn 1983, LNCS 158: at most four times the least number of
 /// parts]. False when rounding leaves no ear.
-bool bt_outline_split(int n, const double *v, bt_parts *p);
+bool bt_outline_split(int n, const double *v, bt_parts *parts);
 
 /// North and east of (lon0, lat0) in metres of a place (lon, lat), all in radians, on the WGS84 ellipsoid. Azimuthal
 /// equidistant for a small area: the direction is that of the place seen from the origin (e, n: its chord's components

@@ -60,10 +60,10 @@ typedef struct bt_quantity {
     // one of the next two
     /// From what every rank holds: the towed body, the tow, the numbers of the step. After the step; on every rank,
     /// with the same result.
-    double (*of_world)(const bt_world *w, const void *context);
+    double (*of_world)(const bt_world *world, const void *context);
     /// The share of one floe that can move: of fixed floes, walls and the towed body nothing is asked. The sum over all
     /// is exact: the same bits on any number of ranks and threads.
-    double (*of_floe)(const bt_world *w, bt_idx floe, const void *context);
+    double (*of_floe)(const bt_world *world, bt_idx floe, const void *context);
     const void *context;     ///< of the functions
     size_t offset;           ///< of its place in bt_sample; set for a registered one
 } bt_quantity;
@@ -71,7 +71,7 @@ typedef struct bt_quantity {
 /// Add a quantity; it is recorded in runs that begin later. It is copied; its texts and context must outlive every run.
 /// Errors: BT_ERR_USAGE, with the reason in err: a name that is taken or none, no unit, no sentence, no function, no
 /// room.
-bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err);
+bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err);
 
 /// How many series there are: the program's own, then those registered.
 int bt_n_series(void);

@@ -40,16 +40,16 @@ typedef struct bt_run_options {
 /// BT_ERR_CASE, BT_ERR_IO, BT_ERR_NUMERIC, BT_ERR_SIGNAL (a signal at any rank, the stop file, max_wall, see
 /// src/run/halt.h: what was computed is on disk, complete, marked as stopped, and can be taken up again). The case is
 /// the same on all ranks.
-bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err);
+bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err);
 
-/// Collective. Go on with the run in o->dir from its last checkpoint (src/output/checkpoint.h), or from its case if it
-/// was killed before the first. A run that is finished is left as it is: BT_OK, with a line on stdout unless quiet.
-/// Errors as bt_run, and BT_ERR_CASE for a checkpoint that is refused.
-bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err);
+/// Collective. Go on with the run in options->dir from its last checkpoint (src/output/checkpoint.h), or from its case
+/// if it was killed before the first. A run that is finished is left as it is: BT_OK, with a line on stdout unless
+/// quiet. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is refused.
+bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *options, bt_errors *err);
 
 /// Collective. OpenMP threads of this rank of comm: as asked (0 = not), else run.threads of the case, else
 /// OMP_NUM_THREADS, else the cores that it was given; those that other ranks were given, too, are shared among them.
-int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked);
+int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked);
 
 #ifdef __cplusplus
 }

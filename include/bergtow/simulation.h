@@ -57,53 +57,53 @@ typedef struct bt_simulation_options {
     const char *from;         ///< bt_simulation_resume: this checkpoint instead of the last one in dir; or NULL
 } bt_simulation_options;
 
-/// Read the case, make or read its ice, open the folder. *s is NULL after an error: BT_ERR_CASE, BT_ERR_IO,
+/// Read the case, make or read its ice, open the folder. *sim is NULL after an error: BT_ERR_CASE, BT_ERR_IO,
 /// BT_ERR_USAGE.
-bt_status bt_simulation_create(bt_simulation **s, const bt_simulation_options *o);
+bt_status bt_simulation_create(bt_simulation **sim, const bt_simulation_options *options);
 
 /// Go on with a run in its folder (dir; `bergtow run`, `bergtow ensemble` or a program made it) from its last
 /// checkpoint, or from its case where it was killed before the first. What the program adds (laws, applied forces) has
 /// to be there as it was. path, text, set and replace are left out; the rest is as for a new simulation. Errors:
 /// BT_ERR_USAGE for a run that is finished, BT_ERR_IO, BT_ERR_CASE for a checkpoint that is refused.
-bt_status bt_simulation_resume(bt_simulation **s, const bt_simulation_options *o);
+bt_status bt_simulation_resume(bt_simulation **sim, const bt_simulation_options *options);
 
 /// n steps, or as many as are left. Errors: BT_ERR_NUMERIC (a guard, or a force that failed), BT_ERR_IO,
 /// BT_ERR_SIGNAL: asked to stop, as by the file `stop` in the folder; end the simulation then.
-bt_status bt_simulation_step(bt_simulation *s, int64_t n);
+bt_status bt_simulation_step(bt_simulation *sim, int64_t n);
 
-/// The end: summary and last checkpoint, where there is a folder, of the steps that were made; frees s. Errors as for
-/// a step, and BT_ERR_SIGNAL for a simulation that was asked to stop and whose files are complete.
-bt_status bt_simulation_end(bt_simulation *s);
+/// The end: summary and last checkpoint, where there is a folder, of the steps that were made; frees `sim`. Errors as
+/// for a step, and BT_ERR_SIGNAL for a simulation that was asked to stop and whose files are complete.
+bt_status bt_simulation_end(bt_simulation *sim);
 
-/// Free s without summary and checkpoint; what the folder holds by now stays. NULL is ignored, and so is a simulation
-/// whose step is under way.
-void bt_simulation_drop(bt_simulation *s);
+/// Free `sim` without summary and checkpoint; what the folder holds by now stays. NULL is ignored, and so is a
+/// simulation whose step is under way.
+void bt_simulation_drop(bt_simulation *sim);
 
 /// A frame of the bodies as they are now, beside those of output.frame_interval; nothing where this state has one.
 /// Errors: BT_ERR_USAGE without a folder, BT_ERR_IO.
-bt_status bt_simulation_frame(bt_simulation *s);
+bt_status bt_simulation_frame(bt_simulation *sim);
 
-int64_t bt_simulation_steps(const bt_simulation *s);      ///< steps done
-int64_t bt_simulation_steps_left(const bt_simulation *s); ///< to the end; 0 after an error
-double bt_simulation_time(const bt_simulation *s);        ///< at the end of the last step, s
-double bt_simulation_dt(const bt_simulation *s);          ///< Δt, s
+int64_t bt_simulation_steps(const bt_simulation *sim);      ///< steps done
+int64_t bt_simulation_steps_left(const bt_simulation *sim); ///< to the end; 0 after an error
+double bt_simulation_time(const bt_simulation *sim);        ///< at the end of the last step, s
+double bt_simulation_dt(const bt_simulation *sim);          ///< Δt, s
 
 /// The line of progress that the command prints: share, time, steps a second, time left, mean ice resistance so far.
 /// Release with bt_release.
-char *bt_simulation_progress(const bt_simulation *s);
+char *bt_simulation_progress(const bt_simulation *sim);
 
 /// Hash of the state, as state_hash of summary.json.
-uint64_t bt_simulation_hash(const bt_simulation *s);
+uint64_t bt_simulation_hash(const bt_simulation *sim);
 
 /// Checkpoint and result as they are now, from which `bergtow resume` goes on. Errors: BT_ERR_USAGE without a folder,
 /// BT_ERR_IO.
-bt_status bt_simulation_checkpoint(bt_simulation *s);
+bt_status bt_simulation_checkpoint(bt_simulation *sim);
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 // Ids: floes of the field, floes given by hand, the towed body, walls.
 
-int64_t bt_simulation_bodies(const bt_simulation *s); ///< their number
-int64_t bt_simulation_towed(const bt_simulation *s);  ///< id, −1 = none
+int64_t bt_simulation_bodies(const bt_simulation *sim); ///< their number
+int64_t bt_simulation_towed(const bt_simulation *sim);  ///< id, −1 = none
 
 /// What bt_simulation_read gives, and the numbers of a body.
 typedef enum {
@@ -121,27 +121,27 @@ typedef enum {
 extern const int bt_body_widths[BT_BODY_KINDS]; ///< [kind] numbers a body, as in the list above
 
 /// One kind of numbers of all bodies, out: [bodies][bt_body_widths[kind]]. Errors: BT_ERR_USAGE.
-bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, double *out);
+bt_status bt_simulation_read(const bt_simulation *sim, bt_body_numbers kind, double *out);
 
 /// Vertices of a body's outline at its present pose, in the frame of the domain, anticlockwise; not wrapped, so they
 /// may lie beyond a periodic end. Up to `room` points into xy, [room][2] m. Returns how many there are; 0 where another
 /// rank holds the body, or there is none of this id.
-int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, int64_t room);
+int64_t bt_simulation_outline(const bt_simulation *sim, int64_t id, double *xy, int64_t room);
 
 /// Give a body another velocity, m/s, rad/s. Errors: BT_ERR_USAGE for no such body, one whose velocity is prescribed or
 /// that never moves, NaN or infinity.
-bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate);
+bt_status bt_simulation_set_velocity(bt_simulation *sim, int64_t id, double x, double y, double rate);
 
 /// Put a body elsewhere, m, m, rad; its contacts are over. Errors: BT_ERR_USAGE as above, for a body that is towed (its
 /// line or course would break), outside the domain, or where it would overlap another body.
-bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw);
+bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, double y, double yaw);
 
 // --- numbers and contacts --------------------------------------------------------------------------------------------
 
 /// A number of the last step by the name of its series (bergtow --list-quantities): "ice_resistance", "drag_force",
 /// "line_tension", those that were added. NaN before the first step, and where it does not apply. Under MPI those of
 /// collisions are on rank 0. Errors: BT_ERR_USAGE for an unknown name.
-bt_status bt_simulation_quantity(const bt_simulation *s, const char *name, double *value);
+bt_status bt_simulation_quantity(const bt_simulation *sim, const char *name, double *value);
 
 /// Columns of a contact: ids of the bodies; number of points, 1 or 2 (0: floes over each other, whose impulse along x
 /// is NORMAL_1, along y TANGENTIAL); the points, m, carried along with body A since the start of the step; unit normal
@@ -153,7 +153,7 @@ enum {
 
 /// Contacts of the last step that this rank solves: up to `room` rows into out, [room][BT_CONTACT_COLUMNS]. Returns how
 /// many there are: those that bear nothing are contacts that might have come about.
-int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room);
+int64_t bt_simulation_contacts(const bt_simulation *sim, double *out, int64_t room);
 
 // --- cases and texts -------------------------------------------------------------------------------------------------
 
@@ -163,11 +163,11 @@ const char *bt_last_error(void);
 /// Read and check a case alone (path, text, set): every key with its value in SI units, as a case file (resolved) and
 /// as one JSON object {"section.key": value} (values; angles in radians, null where a key has no value). Release both
 /// with bt_release. Errors: BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved, char **values);
+bt_status bt_case_check_text(const bt_simulation_options *options, char **resolved, char **values);
 
 /// The case of a simulation, as `resolved` of bt_case_check_text; of a resumed one, that of its checkpoint. Release
 /// with bt_release.
-char *bt_simulation_case(const bt_simulation *s);
+char *bt_simulation_case(const bt_simulation *sim);
 
 /// What a file holds, by its keys: "case", "study", or "" of any other and of one that cannot be read.
 const char *bt_file_holds(const char *path);

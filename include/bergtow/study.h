@@ -104,41 +104,41 @@ typedef struct bt_member {
 
 /// Read and check a study file; every error of the file is appended with file, line, key and remedy. Errors:
 /// BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err);
+bt_status bt_study_read(bt_study *study, const char *path, bt_errors *err);
 
 /// Values in place of those that the study or its base says, [n] "key=value", for all members. It is another study
 /// then. Errors: BT_ERR_CASE, also for a key that the study varies.
-bt_status bt_study_override(bt_study *s, const char *const *set, int n, bt_errors *err);
+bt_status bt_study_override(bt_study *study, const char *const *set, int n, bt_errors *err);
 
 /// Release what a study holds.
-void bt_study_free(bt_study *s);
+void bt_study_free(bt_study *study);
 
 /// The distribution of a parameter in words, "" for one without; the caller frees it.
-char *bt_study_distribution(const bt_study_parameter *p);
+char *bt_study_distribution(const bt_study_parameter *parameter);
 
 /// Are there ranks enough for a member? Errors: BT_ERR_CASE.
-bt_status bt_study_fits(const bt_study *s, int ranks, bt_errors *err);
+bt_status bt_study_fits(const bt_study *study, int ranks, bt_errors *err);
 
 /// Members of a study: its conditions times its repeats.
-static inline int64_t bt_study_n_members(const bt_study *s) { return s->n_conditions * s->repeats; }
+static inline int64_t bt_study_n_members(const bt_study *study) { return study->n_conditions * study->repeats; }
 
 /// Member m of 0 ... n − 1: repeats of condition 0 first, then those of condition 1. Release with bt_member_free.
-void bt_study_member(const bt_study *s, int64_t m, bt_member *out);
+void bt_study_member(const bt_study *study, int64_t m, bt_member *out);
 /// Release what a member holds.
-void bt_member_free(bt_member *m);
+void bt_member_free(bt_member *member);
 
 /// The case of a member: the base with its overrides, and named by the title of the study, its condition and its field
 /// unless the study sets run.title; messages name where in the study these stand. Errors:
 /// BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err);
+bt_status bt_member_case(const bt_study *study, const bt_member *member, bt_case *input, bt_errors *err);
 
 /// The base with `set` alone. Errors: BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err);
+bt_status bt_study_base_case(const bt_study *study, bt_case *input, bt_errors *err);
 
 /// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base
 /// case resolved. Two studies with the same text have the same members. Caller frees. NULL with a message when the base
 /// cannot be read.
-char *bt_study_resolved(const bt_study *s, bt_errors *err);
+char *bt_study_resolved(const bt_study *study, bt_errors *err);
 /// Are two such texts the same but for their comments, the meanings of keys in the words of a version of the program?
 bool bt_study_resolved_alike(const char *a, const char *b);
 

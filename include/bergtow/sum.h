@@ -26,10 +26,10 @@ typedef struct bt_sum {
 } bt_sum;
 
 /// Add a term; one of 2⁶² and more, or a NaN, makes the sum NaN. An empty sum is {0}.
-static inline void bt_sum_add(bt_sum *s, double x)
+static inline void bt_sum_add(bt_sum *sum, double x)
 {
     if (!(fabs(x) < 0x1p62)) {
-        s->bad = true;
+        sum->bad = true;
         return;
     }
     // The magnitude in three parts, each exact and below 2⁶³, where a conversion is one instruction: x 2⁶⁴, cut.
@@ -37,18 +37,18 @@ static inline void bt_sum_add(bt_sum *s, double x)
     const int64_t upper = (int64_t)high, lower = (int64_t)((high - (double)upper) * 0x1p32);
     const bt_uint128 v = (bt_uint128)(int64_t)size << 64 | (bt_uint128)(uint64_t)upper << 32 | (uint64_t)lower;
     // Modulo 2¹²⁸: a sum that passes beyond 2⁶³ on the way to a total below is right, in every order.
-    s->v = (bt_int128)((bt_uint128)s->v + (x < 0 ? -v : v));
+    sum->v = (bt_int128)((bt_uint128)sum->v + (x < 0 ? -v : v));
 }
 
 /// Add another sum.
-static inline void bt_sum_join(bt_sum *s, const bt_sum *more)
+static inline void bt_sum_join(bt_sum *sum, const bt_sum *more)
 {
-    s->v = (bt_int128)((bt_uint128)s->v + (bt_uint128)more->v);
-    s->bad = s->bad || more->bad;
+    sum->v = (bt_int128)((bt_uint128)sum->v + (bt_uint128)more->v);
+    sum->bad = sum->bad || more->bad;
 }
 
 /// The sum as a double, rounded once; NaN where a term was bad.
-static inline double bt_sum_value(const bt_sum *s) { return s->bad ? (double)NAN : (double)s->v * 0x1p-64; }
+static inline double bt_sum_value(const bt_sum *sum) { return sum->bad ? (double)NAN : (double)sum->v * 0x1p-64; }
 
 #ifdef __cplusplus
 }

@@ -97,23 +97,26 @@ typedef struct bt_world {
 } bt_world;
 
 /// An empty world; release with bt_world_free. The constants of the step are copied.
-bt_world *bt_world_create(const bt_params *p);
+bt_world *bt_world_create(const bt_params *par);
 /// Release a world and all that it holds. NULL is ignored.
-void bt_world_free(bt_world *w);
+void bt_world_free(bt_world *world);
 
 /// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition
 /// is copied. Asserted, not checked: 3 to BT_MAX_VERTICES vertices, of an outline that bt_shape_fault (with parts:
 /// bt_outline_fault) accepts; mass and inertia > 0 of a dynamic body; a world that is not yet distributed to ranks.
-bt_gid bt_world_add(bt_world *w, const bt_body_def *d);
+bt_gid bt_world_add(bt_world *world, const bt_body_def *def);
 
 /// Where body gid is stored on this rank now, −1 = not here.
-static inline bt_idx bt_world_index(const bt_world *w, bt_gid gid) { return w->bodies.index_of[gid]; }
+static inline bt_idx bt_world_index(const bt_world *world, bt_gid gid) { return world->bodies.index_of[gid]; }
 
 /// Index of the towed body, −1 = none. Every rank holds it.
-static inline bt_idx bt_world_towed(const bt_world *w) { return w->towed < 0 ? -1 : w->bodies.index_of[w->towed]; }
+static inline bt_idx bt_world_towed(const bt_world *world)
+{
+    return world->towed < 0 ? -1 : world->bodies.index_of[world->towed];
+}
 
 /// Collective. One step Δt: forces, detection, solve, projection, advance; the order stands in src/step/step.c.
-void bt_world_step(bt_world *w);
+void bt_world_step(bt_world *world);
 
 /// Bodies in each other at the present poses.
 typedef struct bt_overlaps {
@@ -124,11 +127,11 @@ typedef struct bt_overlaps {
 
 /// Collective. Overlaps that this rank finds at the present poses; pairs deeper than allowed, m, are counted. Labels
 /// and storage may be renewed: indices of bodies change then.
-bt_overlaps bt_world_overlaps(bt_world *w, double allowed);
+bt_overlaps bt_world_overlaps(bt_world *world, double allowed);
 
 /// Collective. 64-bit hash of the state: poses and velocities by gid, memory of contact laws, step, window, drift of
 /// the water, tow. Equal for equal states, however stored or distributed.
-uint64_t bt_world_hash(const bt_world *w);
+uint64_t bt_world_hash(const bt_world *world);
 
 #ifdef __cplusplus
 }

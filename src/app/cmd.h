@@ -49,10 +49,10 @@ char *bt_cmd_join(int argc, char **argv);
 /// and not the command's own (ours) only with --force. Errors: BT_ERR_IO.
 bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, bool force, bt_errors *err);
 
-/// Collective over c. Every rank reads the file; a pipe gives what it holds to one of them. Errors: BT_ERR_USAGE.
-bt_status bt_cmd_each_may_read(const bt_comm *c, const char *path, bt_errors *err);
+/// Collective over `comm`. Every rank reads the file; a pipe gives what it holds to one of them. Errors: BT_ERR_USAGE.
+bt_status bt_cmd_each_may_read(const bt_comm *comm, const char *path, bt_errors *err);
 
-/// Collective over c. Print all ranks' messages once, release them, and return the worst status as exit code.
-int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err);
+/// Collective over `comm`. Print all ranks' messages once, release them, and return the worst status as exit code.
+int bt_cmd_end(const bt_comm *comm, bt_status status, bt_errors *err);
 
 #endif

@@ -29,26 +29,26 @@ typedef struct bt_check_step {
 /// room. f: the field that was read, or none; n: of the ice before the lead is opened, and how it is for the run: *run.
 /// lead: of a field that was read. Errors: BT_ERR_CASE, BT_ERR_IO.
 struct bt_comm;
-bt_status bt_check_ready(const bt_case *c, const struct bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run,
-                         bt_lead_stats *lead, bt_errors *err);
+bt_status bt_check_ready(const bt_case *input, const struct bt_comm *comm, bt_field *field, bt_check_ice *ice,
+                         bt_check_ice *run, bt_lead_stats *lead, bt_errors *err);
 /// What a run would go through and a user should know before: appended to the list, a sentence each.
-void bt_check_warn(const bt_case *c, const bt_field *f, const bt_check_ice *n, bt_errors *warnings);
+void bt_check_warn(const bt_case *input, const bt_field *field, const bt_check_ice *ice, bt_errors *warnings);
 /// Of a time step in the printed list.
 static inline const char *bt_check_verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
-bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n);
+bt_check_step bt_check_step_of(const bt_case *input, const bt_check_ice *ice);
 /// Loads that split the mean floe, as a square of its area (split/law.h), N.
 typedef struct bt_check_split { double three_point, opening; } bt_check_split;
-bt_check_split bt_check_split_of(const bt_case *c, const bt_check_ice *n);
+bt_check_split bt_check_split_of(const bt_case *input, const bt_check_ice *ice);
 /// Rough estimate of a run, s of one core.
-double bt_check_seconds(const bt_case *c, const bt_check_ice *n);
+double bt_check_seconds(const bt_case *input, const bt_check_ice *n);
 
 /// Values that nobody gave and that follow from others, in lines, and as the object `by_default` (SI).
-void bt_check_print_defaults(const bt_case *c);
+void bt_check_print_defaults(const bt_case *input);
 struct bt_json;
 
 /// Print the case's numbers as one JSON object: `case`, `title`, `warnings` ({code, text, values}), `domain`, `ice`
 /// (before the lead is opened), `run`, `by_default`, `cost`; units in the names, null for what does not apply.
-void bt_check_print_json(const char *path, const bt_case *c, const struct bt_comm *comm, const bt_check_ice *n,
+void bt_check_print_json(const char *path, const bt_case *input, const struct bt_comm *comm, const bt_check_ice *ice,
                          const bt_check_ice *run, const bt_errors *warnings);
 
 /// Check a study and the case of the first member of each condition; print what follows when all are valid, on so many

@@ -53,100 +53,101 @@ static bool is_same(const fault *a, const char *text, const char *code)
     return a->code && code ? !strcmp(a->code, code) : !strcmp(a->text, text);
 }
 
-static void take_faults(faults *f, int64_t condition, bt_errors *err)
+static void take_faults(faults *found, int64_t condition, bt_errors *err)
 {
     for (size_t i = 0; i < err->n; i++) {
         size_t k = 0;
-        while (k < f->n && !is_same(&f->list[k], err->text[i], err->note[i].code)) k++;
-        if (k == f->n) {
-            f->list = bt_realloc(f->list, f->n + 1, sizeof *f->list);
-            f->list[f->n++] = (fault){bt_text_copy(err->text[i]), err->note[i].code, condition, -1, 0};
+        while (k < found->n && !is_same(&found->list[k], err->text[i], err->note[i].code)) k++;
+        if (k == found->n) {
+            found->list = bt_realloc(found->list, found->n + 1, sizeof *found->list);
+            found->list[found->n++] = (fault){bt_text_copy(err->text[i]), err->note[i].code, condition, -1, 0};
         }
-        f->list[k].count += f->list[k].last != condition;
-        f->list[k].last = condition;
+        found->list[k].count += found->list[k].last != condition;
+        found->list[k].last = condition;
     }
     bt_errors_free(err);
 }
 
-static void tell_faults(faults *f, const bt_study *s, bt_errors *err)
+static void tell_faults(faults *found, const bt_study *study, bt_errors *err)
 {
-    for (size_t k = 0; k < f->n; k++) {
+    for (size_t k = 0; k < found->n; k++) {
         bt_text text;
         bt_text_begin(&text);
         FILE *out = text.out;
-        bt_member m;
-        bt_study_member(s, f->list[k].first * s->repeats, &m);
-        fprintf(out, "condition %" PRId64, f->list[k].first + 1);
-        for (int p = 0; p < s->n_parameters; p++)
-            fprintf(out, "%s %.40s %.40s", p ? "," : ":", s->parameter[p].name, m.value[p]);
-        if (f->list[k].count > 1) fprintf(out, "; and %" PRId64 " more", f->list[k].count - 1);
+        bt_member member;
+        bt_study_member(study, found->list[k].first * study->repeats, &member);
+        fprintf(out, "condition %" PRId64, found->list[k].first + 1);
+        for (int p = 0; p < study->n_parameters; p++)
+            fprintf(out, "%s %.40s %.40s", p ? "," : ":", study->parameter[p].name, member.value[p]);
+        if (found->list[k].count > 1) fprintf(out, "; and %" PRId64 " more", found->list[k].count - 1);
         char *where = bt_text_end(&text);
-        bt_errors_add(err, "%s (%s)", f->list[k].text, where);
-        bt_member_free(&m);
+        bt_errors_add(err, "%s (%s)", found->list[k].text, where);
+        bt_member_free(&member);
         free(where);
-        free(f->list[k].text);
+        free(found->list[k].text);
     }
-    free(f->list);
+    free(found->list);
 }
 
 static bt_status worse(bt_status a, bt_status b) { return a > b ? a : b; }
 
 /// Case and ice of a condition, as `check` has them of a case.
-static bt_status check_condition(const bt_study *s, int64_t condition, numbers *x, bt_errors *warnings, bt_errors *err)
+static bt_status check_condition(const bt_study *study, int64_t condition, numbers *sums, bt_errors *warnings,
+                                 bt_errors *err)
 {
-    bt_member m;
-    bt_case c;
-    bt_field f;
-    bt_field_init(&f);
-    bt_study_member(s, condition * s->repeats, &m);
-    const bt_comm ranks = {.mpi = MPI_COMM_NULL, .size = (int)s->ranks, .ranks_here = (int)s->ranks};
-    bt_check_ice n, run;
+    bt_member member;
+    bt_case input;
+    bt_field field;
+    bt_field_init(&field);
+    bt_study_member(study, condition * study->repeats, &member);
+    const bt_comm ranks = {.mpi = MPI_COMM_NULL, .size = (int)study->ranks, .ranks_here = (int)study->ranks};
+    bt_check_ice ice, run;
     bt_lead_stats lead = {0};
-    bt_status status = bt_member_case(s, &m, &c, err);
-    if (status == BT_OK) status = bt_check_ready(&c, &ranks, &f, &n, &run, &lead, err);
+    bt_status status = bt_member_case(study, &member, &input, err);
+    if (status == BT_OK) status = bt_check_ready(&input, &ranks, &field, &ice, &run, &lead, err);
     if (status == BT_OK) {
-        const bt_check_step step = bt_check_step_of(&c, &n);
-        const bt_cost_disk disk = bt_cost_disk_of(&c, run.count, run.corners, ranks.size);
-        bt_check_warn(&c, &f, &n, warnings);
-        *x = (numbers){n.count,
-                       (double)bt_case_steps(&c),
-                       bt_check_seconds(&c, &n),
-                       bt_cost_memory(&c, n.count, n.parts, ranks.size, ranks.size),
-                       bt_cost_member(&c, &disk),
-                       step.contact && step.floes,
-                       warnings->n > 0,
-                       !bt_case_ice_is_random(&c)};
+        const bt_check_step step = bt_check_step_of(&input, &ice);
+        const bt_cost_disk disk = bt_cost_disk_of(&input, run.count, run.corners, ranks.size);
+        bt_check_warn(&input, &field, &ice, warnings);
+        *sums = (numbers){ice.count,
+                          (double)bt_case_steps(&input),
+                          bt_check_seconds(&input, &ice),
+                          bt_cost_memory(&input, ice.count, ice.parts, ranks.size, ranks.size),
+                          bt_cost_member(&input, &disk),
+                          step.contact && step.floes,
+                          warnings->n > 0,
+                          !bt_case_ice_is_random(&input)};
     }
-    bt_field_free(&f);
-    bt_case_free(&c);
-    bt_member_free(&m);
+    bt_field_free(&field);
+    bt_case_free(&input);
+    bt_member_free(&member);
     return status;
 }
 
-/// x: [n_conditions].
-static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *warnings, bt_errors *err)
+/// sums: [n_conditions].
+static bt_status check_conditions(const bt_study *study, numbers *sums, bt_errors *warnings, bt_errors *err)
 {
-    bt_case c;
-    bt_status status = bt_study_base_case(s, &c, err); // what is wrong without any condition
-    bt_case_free(&c);
+    bt_case input;
+    bt_status status = bt_study_base_case(study, &input, err); // what is wrong without any condition
+    bt_case_free(&input);
     if (status != BT_OK) {
         bt_errors_add(err, "%s: base: %s with `set` is no valid case, as any condition needs it; mend that first",
-                      s->path, s->base_name);
+                      study->path, study->base_name);
         return status;
     }
     faults f = {0}, w = {0};
     int64_t k = 0;
-    for (; k < s->n_conditions && f.n < BT_MOST_COMPLAINTS; k++) {
+    for (; k < study->n_conditions && f.n < BT_MOST_COMPLAINTS; k++) {
         bt_errors here = {0}, warned = {0};
-        status = worse(status, check_condition(s, k, &x[k], &warned, &here));
+        status = worse(status, check_condition(study, k, &sums[k], &warned, &here));
         take_faults(&f, k, &here);
         take_faults(&w, k, &warned);
     }
-    tell_faults(&f, s, err);
-    tell_faults(&w, s, warnings);
-    if (status != BT_OK && k < s->n_conditions)
+    tell_faults(&f, study, err);
+    tell_faults(&w, study, warnings);
+    if (status != BT_OK && k < study->n_conditions)
         bt_errors_add(err, "%s: conditions from %" PRId64 " on are not looked at after %d errors; mend those first",
-                      s->path, k + 1, BT_MOST_COMPLAINTS);
+                      study->path, k + 1, BT_MOST_COMPLAINTS);
     return status;
 }
 
@@ -172,83 +173,83 @@ static void print_sets(const char *label, char *const *set, int n)
     printf("\n");
 }
 
-static void print_parameter(const bt_study *s, const bt_study_parameter *p)
+static void print_parameter(const bt_study *study, const bt_study_parameter *parameter)
 {
-    printf("%-20s ", p->name);
-    if (p->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+    printf("%-20s ", parameter->name);
+    if (parameter->continuous && study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
         // with its unit: these are SI numbers, and a bare one of an angle would be read in degrees
-        const bt_key *key = p->key >= 0 ? &bt_case_keys[p->key] : NULL;
+        const bt_key *key = parameter->key >= 0 ? &bt_case_keys[parameter->key] : NULL;
         const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
-        char *distribution = bt_study_distribution(p);
-        printf("%s%s%s%s%s\n", distribution, *unit ? " " : "", unit, p->source ? "; source: " : "",
-               p->source ? p->source : "");
+        char *distribution = bt_study_distribution(parameter);
+        printf("%s%s%s%s%s\n", distribution, *unit ? " " : "", unit, parameter->source ? "; source: " : "",
+               parameter->source ? parameter->source : "");
         free(distribution);
         return;
     }
-    const int shown = p->n > MOST_LISTED ? MOST_LISTED - 2 : p->n;
-    for (int i = 0; i < shown; i++) printf("%s%s", i ? ", " : "", p->value[i]);
-    if (shown < p->n) printf(", ... %s (%d values)", p->value[p->n - 1], p->n);
+    const int shown = parameter->n > MOST_LISTED ? MOST_LISTED - 2 : parameter->n;
+    for (int i = 0; i < shown; i++) printf("%s%s", i ? ", " : "", parameter->value[i]);
+    if (shown < parameter->n) printf(", ... %s (%d values)", parameter->value[parameter->n - 1], parameter->n);
     printf("\n");
 }
 
-static void print_varied(const bt_study *s)
+static void print_varied(const bt_study *study)
 {
-    for (int i = 0; i < s->n_parameters; i++) print_parameter(s, &s->parameter[i]);
+    for (int i = 0; i < study->n_parameters; i++) print_parameter(study, &study->parameter[i]);
     char label[CELL + 8];
-    for (int i = 0; i < s->n_variants; i++) {
-        snprintf(label, sizeof label, "  %.46s", s->variant[i].name);
-        print_sets(label, s->variant[i].set, s->variant[i].n_set);
+    for (int i = 0; i < study->n_variants; i++) {
+        snprintf(label, sizeof label, "  %.46s", study->variant[i].name);
+        print_sets(label, study->variant[i].set, study->variant[i].n_set);
     }
-    for (int i = 0; i < s->n_with; i++) {
-        snprintf(label, sizeof label, "  with %.42s", s->with[i].name);
-        print_sets(label, s->with[i].set, s->with[i].n_set);
+    for (int i = 0; i < study->n_with; i++) {
+        snprintf(label, sizeof label, "  with %.42s", study->with[i].name);
+        print_sets(label, study->with[i].set, study->with[i].n_set);
     }
 }
 
 /// Texts of a row of the table, the head for condition −1.
-static int row_of(const bt_study *s, const numbers *x, int64_t condition, char cell[][CELL])
+static int row_of(const bt_study *study, const numbers *sums, int64_t condition, char cell[][CELL])
 {
     int n = 0;
-    bt_member m = {0};
+    bt_member member = {0};
     if (condition >= 0) {
-        bt_study_member(s, condition * s->repeats, &m);
+        bt_study_member(study, condition * study->repeats, &member);
         snprintf(cell[n++], CELL, "%" PRId64, condition + 1);
-        for (int p = 0; p < s->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", m.value[p]);
-        snprintf(cell[n++], CELL, "%.0f", x[condition].floes);
-        snprintf(cell[n++], CELL, "%.0f", x[condition].steps);
-        duration(x[condition].seconds, cell[n++]);
-        snprintf(cell[n++], CELL, "%s", bt_check_verdict(x[condition].step_good));
-        bt_member_free(&m);
+        for (int p = 0; p < study->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", member.value[p]);
+        snprintf(cell[n++], CELL, "%.0f", sums[condition].floes);
+        snprintf(cell[n++], CELL, "%.0f", sums[condition].steps);
+        duration(sums[condition].seconds, cell[n++]);
+        snprintf(cell[n++], CELL, "%s", bt_check_verdict(sums[condition].step_good));
+        bt_member_free(&member);
         return n;
     }
     snprintf(cell[n++], CELL, "condition");
-    for (int p = 0; p < s->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", s->parameter[p].name);
+    for (int p = 0; p < study->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", study->parameter[p].name);
     for (int k = 0; k < 4; k++)
         snprintf(cell[n++], CELL, "%s", (const char *const[]){"floes", "steps", "one run", "time step"}[k]);
     return n;
 }
 
-static void print_table(const bt_study *s, const numbers *x)
+static void print_table(const bt_study *study, const numbers *sums)
 {
     char cell[BT_MAX_PARAMETERS + 5][CELL];
     int width[BT_MAX_PARAMETERS + 5] = {0};
     for (int pass = 0; pass < 2; pass++)
-        for (int64_t k = -1; k < s->n_conditions; k++) {
-            const int n = row_of(s, x, k, cell);
+        for (int64_t k = -1; k < study->n_conditions; k++) {
+            const int n = row_of(study, sums, k, cell);
             for (int i = 0; i < n && pass == 0; i++) width[i] = (int)bt_max(width[i], (double)strlen(cell[i]));
             for (int i = 0; i < n && pass == 1; i++) printf("%*s%s", width[i], cell[i], i + 1 < n ? "  " : "\n");
         }
 }
 
-static void print_range(const bt_study *s, const numbers *x)
+static void print_range(const bt_study *study, const numbers *sums)
 {
-    numbers lo = x[0], hi = x[0];
+    numbers lo = sums[0], hi = sums[0];
     int64_t large = 0;
-    for (int64_t k = 0; k < s->n_conditions; k++) {
-        lo.floes = bt_min(lo.floes, x[k].floes), hi.floes = bt_max(hi.floes, x[k].floes);
-        lo.steps = bt_min(lo.steps, x[k].steps), hi.steps = bt_max(hi.steps, x[k].steps);
-        lo.seconds = bt_min(lo.seconds, x[k].seconds), hi.seconds = bt_max(hi.seconds, x[k].seconds);
-        large += !x[k].step_good;
+    for (int64_t k = 0; k < study->n_conditions; k++) {
+        lo.floes = bt_min(lo.floes, sums[k].floes), hi.floes = bt_max(hi.floes, sums[k].floes);
+        lo.steps = bt_min(lo.steps, sums[k].steps), hi.steps = bt_max(hi.steps, sums[k].steps);
+        lo.seconds = bt_min(lo.seconds, sums[k].seconds), hi.seconds = bt_max(hi.seconds, sums[k].seconds);
+        large += !sums[k].step_good;
     }
     char a[CELL], b[CELL];
     printf("floes                %.0f to %.0f\n", lo.floes, hi.floes);
@@ -263,16 +264,16 @@ static void print_range(const bt_study *s, const numbers *x)
 }
 
 /// How many members run at a time, and what all of it takes then. ranks: that this call was started on, or 1.
-static void print_work(const bt_study *s, double memory, double disk, double seconds, int ranks)
+static void print_work(const bt_study *study, double memory, double disk, double seconds, int ranks)
 {
     char text[CELL];
-    const int64_t groups = ranks / s->ranks;
+    const int64_t groups = ranks / study->ranks;
     if (groups < 1) printf("ranks                %" PRId64 " a member: start with mpirun -n %" PRId64 " or more\n",
-                           s->ranks, s->ranks);
+                           study->ranks, study->ranks);
     else if (ranks > 1)
         printf("ranks                %d: %" PRId64 " member%s at a time, %" PRId64 " rank%s each%s\n", ranks, groups,
-               groups > 1 ? "s" : "", s->ranks, s->ranks > 1 ? "s" : "",
-               ranks % s->ranks ? "; some ranks are left over" : "");
+               groups > 1 ? "s" : "", study->ranks, study->ranks > 1 ? "s" : "",
+               ranks % study->ranks ? "; some ranks are left over" : "");
     printf("memory               about %.3g MB for one member", memory / 1e6);
     if (groups > 1) printf(", %.3g MB for %" PRId64 " at a time", memory / 1e6 * (double)groups, groups);
     printf("\ndisk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9),
@@ -280,62 +281,62 @@ static void print_work(const bt_study *s, double memory, double disk, double sec
     printf("wall time            rough estimate %s on one core for all members\n", duration(seconds, text));
     if (groups >= 1 && ranks > 1)
         printf("                     %s on %" PRId64 " ranks, each with a core\n",
-               duration(seconds / (double)(groups * s->ranks), text), groups * s->ranks);
+               duration(seconds / (double)(groups * study->ranks), text), groups * study->ranks);
 }
 
-static void print_study(const bt_study *s, const numbers *x, const bt_errors *warnings, int ranks)
+static void print_study(const bt_study *study, const numbers *sums, const bt_errors *warnings, int ranks)
 {
     double seconds = 0, memory = 0, disk = 0;
     int64_t warned = 0, fixed = 0;
-    for (int64_t k = 0; k < s->n_conditions; k++) {
-        fixed += x[k].fixed && s->repeats > 1;
-        seconds += x[k].seconds * (double)s->repeats;
-        disk += x[k].disk * (double)s->repeats;
-        warned += x[k].warned;
-        memory = bt_max(memory, x[k].memory);
+    for (int64_t k = 0; k < study->n_conditions; k++) {
+        fixed += sums[k].fixed && study->repeats > 1;
+        seconds += sums[k].seconds * (double)study->repeats;
+        disk += sums[k].disk * (double)study->repeats;
+        warned += sums[k].warned;
+        memory = bt_max(memory, sums[k].memory);
     }
     char verdict_of_all[96] = "valid";
     if (warned)
         snprintf(verdict_of_all, sizeof verdict_of_all, "valid, with warnings in %" PRId64 " of %" PRId64 " conditions",
-                 warned, s->n_conditions);
-    printf("%s: %s\n", s->path, verdict_of_all);
-    if (s->title) printf("title                %s\n", s->title);
-    printf("base                 %s\n", s->base);
-    print_sets("set", s->set, s->n_set);
-    print_varied(s);
-    printf("members              %" PRId64 " conditions x %" PRId64 " fields = %" PRId64 "%s%s", s->n_conditions,
-           s->repeats, bt_study_n_members(s), s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? ", a Latin hypercube" : "",
-           s->common_fields ? ", the same fields in all conditions" : "");
-    if (s->ranks > 1) printf(", %" PRId64 " ranks each", s->ranks);
+                 warned, study->n_conditions);
+    printf("%s: %s\n", study->path, verdict_of_all);
+    if (study->title) printf("title                %s\n", study->title);
+    printf("base                 %s\n", study->base);
+    print_sets("set", study->set, study->n_set);
+    print_varied(study);
+    printf("members              %" PRId64 " conditions x %" PRId64 " fields = %" PRId64 "%s%s", study->n_conditions,
+           study->repeats, bt_study_n_members(study), study->sampling == BT_SAMPLING_LATIN_HYPERCUBE
+           ? ", a Latin hypercube" : "", study->common_fields ? ", the same fields in all conditions" : "");
+    if (study->ranks > 1) printf(", %" PRId64 " ranks each", study->ranks);
     printf("\n");
     if (fixed)
         printf("                     in %" PRId64 " conditions the ice does not depend on the seed, as it is read, or "
                "there is none: the fields of each are one run\n",
                fixed);
-    if (s->n_conditions <= MOST_ROWS) print_table(s, x);
-    else print_range(s, x);
-    print_work(s, memory, disk, seconds, ranks);
+    if (study->n_conditions <= MOST_ROWS) print_table(study, sums);
+    else print_range(study, sums);
+    print_work(study, memory, disk, seconds, ranks);
     for (size_t i = 0; i < warnings->n; i++) printf("warning              %s\n", warnings->text[i]);
-    if (warned) printf("%s: %s\n", s->path, verdict_of_all);
+    if (warned) printf("%s: %s\n", study->path, verdict_of_all);
 }
 
 bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err)
 {
-    bt_study s;
-    bt_status status = bt_study_read(&s, file->path, err);
-    if (status == BT_OK) status = bt_study_override(&s, file->set, file->n_set, err);
-    if (status == BT_OK && ranks > 1) status = bt_study_fits(&s, ranks, err);
+    bt_study study;
+    bt_status status = bt_study_read(&study, file->path, err);
+    if (status == BT_OK) status = bt_study_override(&study, file->set, file->n_set, err);
+    if (status == BT_OK && ranks > 1) status = bt_study_fits(&study, ranks, err);
     const size_t before = err->n;
-    if (status == BT_OK) bt_study_check_ice(&s, err);
+    if (status == BT_OK) bt_study_check_ice(&study, err);
     if (err->n > before) status = BT_ERR_CASE;
     if (status == BT_OK) {
-        numbers *x = bt_alloc((size_t)s.n_conditions, sizeof *x);
+        numbers *sums = bt_alloc((size_t)study.n_conditions, sizeof *sums);
         bt_errors warnings = {0};
-        status = check_conditions(&s, x, &warnings, err);
-        if (status == BT_OK) print_study(&s, x, &warnings, ranks);
+        status = check_conditions(&study, sums, &warnings, err);
+        if (status == BT_OK) print_study(&study, sums, &warnings, ranks);
         bt_errors_free(&warnings);
-        free(x);
+        free(sums);
     }
-    bt_study_free(&s);
+    bt_study_free(&study);
     return status;
 }

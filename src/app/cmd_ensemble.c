@@ -48,16 +48,16 @@ static bool jobs_is_one(void)
 /// done without.
 static void jobs_start(void *of, int n, int threads)
 {
-    bt_jobs *j = of;
-    char **words = bt_alloc((size_t)j->argc + 5, sizeof *words);
+    bt_jobs *jobs = of;
+    char **words = bt_alloc((size_t)jobs->argc + 5, sizeof *words);
     int k = 0;
     words[k++] = "bergtow";
     words[k++] = "ensemble";
-    snprintf(j->threads, sizeof j->threads, "%d", threads);
+    snprintf(jobs->threads, sizeof jobs->threads, "%d", threads);
     words[k++] = "--threads"; // before the user's words, among which -- may end the options
-    words[k++] = j->threads;
+    words[k++] = jobs->threads;
     words[k++] = "--no-wait";
-    for (int i = 1; i < j->argc; i++) words[k++] = j->argv[i];
+    for (int i = 1; i < jobs->argc; i++) words[k++] = jobs->argv[i];
     words[k] = NULL;
 
     char parent[24];
@@ -69,7 +69,7 @@ static void jobs_start(void *of, int n, int threads)
     for (int i = 0; i < n && i < BT_MAX_JOBS; i++) {
         pid_t pid;
         const int error = posix_spawn(&pid, "/proc/self/exe", NULL, NULL, words, environ);
-        j->pid[j->n++] = error == 0 ? pid : 0;
+        jobs->pid[jobs->n++] = error == 0 ? pid : 0;
         if (error != 0)
             fprintf(stderr,
                     "bergtow: warning: job %d of %d could not be started: %s; the others take its members; to have as "
@@ -84,20 +84,20 @@ static void jobs_start(void *of, int n, int threads)
 
 static void jobs_end(void *of, bool stop)
 {
-    bt_jobs *j = of;
-    for (int i = 0; i < j->n && stop; i++)
-        if (j->pid[i] > 0) kill((pid_t)j->pid[i], SIGTERM);
-    for (int i = 0; i < j->n; i++) {
+    bt_jobs *jobs = of;
+    for (int i = 0; i < jobs->n && stop; i++)
+        if (jobs->pid[i] > 0) kill((pid_t)jobs->pid[i], SIGTERM);
+    for (int i = 0; i < jobs->n; i++) {
         int how = 0;
-        while (j->pid[i] > 0 && waitpid((pid_t)j->pid[i], &how, 0) < 0 && errno == EINTR) continue;
+        while (jobs->pid[i] > 0 && waitpid((pid_t)jobs->pid[i], &how, 0) < 0 && errno == EINTR) continue;
         // all else it has said itself
         if (!stop && WIFSIGNALED(how))
             fprintf(stderr,
                     "bergtow: warning: job %d of %d was ended by signal %d (%s); the others took its members over; "
                     "where memory is short, ask for fewer jobs with --jobs\n",
-                    i + 2, j->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
+                    i + 2, jobs->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
     }
-    j->n = 0;
+    jobs->n = 0;
 }
 
 // --- the command -----------------------------------------------------------------------------------------------------
@@ -111,20 +111,20 @@ enum { KEY_RETRY = 256, KEY_LEAVE, KEY_STEPS, KEY_WALL };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    options *o = state->input;
+    options *opt = state->input;
     switch (key) {
-    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file; return 0;
     case 'o':
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
-        o->run.dir = arg;
+        opt->run.dir = arg;
         return 0;
-    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
-    case 'j': o->run.jobs = (int)bt_cmd_number(state, "--jobs", arg, 1, BT_MAX_JOBS); return 0;
-    case 'q': o->run.quiet = true; return 0;
-    case KEY_RETRY: o->run.retry = true; return 0;
-    case KEY_LEAVE: o->run.leave = true; return 0;
-    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
-    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
+    case 't': opt->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
+    case 'j': opt->run.jobs = (int)bt_cmd_number(state, "--jobs", arg, 1, BT_MAX_JOBS); return 0;
+    case 'q': opt->run.quiet = true; return 0;
+    case KEY_RETRY: opt->run.retry = true; return 0;
+    case KEY_LEAVE: opt->run.leave = true; return 0;
+    case KEY_STEPS: opt->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: opt->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
@@ -164,25 +164,25 @@ static const struct argp ensemble_argp = {
 
 int bt_cmd_ensemble(int argc, char **argv)
 {
-    options o = {.file = {.study = true}};
+    options opt = {.file = {.study = true}};
     char *command_line = bt_cmd_join(argc, argv);
-    o.run.command_line = command_line;
-    bt_cmd_parse(&ensemble_argp, argc, argv, &o);
+    opt.run.command_line = command_line;
+    bt_cmd_parse(&ensemble_argp, argc, argv, &opt);
     const bt_comm *comm = bt_comm_world();
-    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
-    if (folder) o.run.dir = folder;
+    char *folder = opt.run.dir ? NULL : bt_cmd_default_folder(opt.file.path);
+    if (folder) opt.run.dir = folder;
     bt_jobs jobs = {.argc = argc, .argv = argv};
-    o.run.helpers = &(bt_ensemble_helpers){.start = jobs_start, .end = jobs_end, .of = &jobs};
-    o.run.job = jobs_is_one();
-    if (o.run.job) o.run.retry = false; // the call that started it has forgotten the failures, and records new ones
-    bt_study s = {0};
+    opt.run.helpers = &(bt_ensemble_helpers){.start = jobs_start, .end = jobs_end, .of = &jobs};
+    opt.run.job = jobs_is_one();
+    if (opt.run.job) opt.run.retry = false; // the call that started it has forgotten the failures, and records new ones
+    bt_study study = {0};
     bt_errors err = {0};
-    bt_status status = bt_cmd_each_may_read(comm, o.file.path, &err);
-    if (status == BT_OK) status = bt_comm_agree(comm, bt_study_read(&s, o.file.path, &err));
-    if (status == BT_OK) status = bt_comm_agree(comm, bt_study_override(&s, o.file.set, o.file.n_set, &err));
-    if (status == BT_OK) status = bt_ensemble_run(comm, &s, &o.run, &err);
-    bt_study_free(&s);
-    free(o.file.set);
+    bt_status status = bt_cmd_each_may_read(comm, opt.file.path, &err);
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_study_read(&study, opt.file.path, &err));
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_study_override(&study, opt.file.set, opt.file.n_set, &err));
+    if (status == BT_OK) status = bt_ensemble_run(comm, &study, &opt.run, &err);
+    bt_study_free(&study);
+    free(opt.file.set);
     free(folder);
     free(command_line);
     return bt_cmd_end(comm, status, &err);

@@ -22,13 +22,13 @@ enum { KEY_FORCE = 256 };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    options *o = state->input;
+    options *opt = state->input;
     switch (key) {
-    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
-    case 'o': o->output = arg; return 0;
-    case KEY_FORCE: o->force = true; return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file; return 0;
+    case 'o': opt->output = arg; return 0;
+    case KEY_FORCE: opt->force = true; return 0;
     case ARGP_KEY_END:
-        if (!o->output || !*o->output)
+        if (!opt->output || !*opt->output)
             argp_error(state, "no output file given; name one with -o FIELD.h5, FIELD.geojson or COAST.yml");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -60,56 +60,57 @@ static bool ends_in(const char *path, const char *one, const char *other)
 
 int bt_cmd_field(int argc, char **argv)
 {
-    options o = {0};
-    bt_cmd_parse(&field_argp, argc, argv, &o);
-    bt_case c;
-    bt_field f;
+    options opt = {0};
+    bt_cmd_parse(&field_argp, argc, argv, &opt);
+    bt_case input;
+    bt_field field;
     bt_errors err = {0};
-    bt_field_init(&f);
-    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    bt_field_init(&field);
+    bt_status status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
     // A field that is read and written in the same form is the file there is.
-    const bool outlines = ends_in(o.output, ".geojson", ".json"), fixed = ends_in(o.output, ".yml", ".yaml");
-    if (status == BT_OK && c.ice.field && !outlines && !fixed) {
+    const bool outlines = ends_in(opt.output, ".geojson", ".json"), fixed = ends_in(opt.output, ".yml", ".yaml");
+    if (status == BT_OK && input.ice.field && !outlines && !fixed) {
         bt_errors_add(&err,
                       "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines "
                       "with -o FIELD.geojson",
-                      o.file.path, c.ice.field);
+                      opt.file.path, input.ice.field);
         status = BT_ERR_CASE;
     }
     const bool ours =
-        outlines ? bt_field_outlines_ours(o.output)
-        : fixed  ? bt_field_fixed_ours(o.output)
-                 : bt_checksum_there(o.output, BT_CHECKSUM_FIELD);
-    if (status == BT_OK) status = bt_cmd_may_write(o.output, o.file.path, ours, o.force, &err);
+        outlines ? bt_field_outlines_ours(opt.output)
+        : fixed  ? bt_field_fixed_ours(opt.output)
+                 : bt_checksum_there(opt.output, BT_CHECKSUM_FIELD);
+    if (status == BT_OK) status = bt_cmd_may_write(opt.output, opt.file.path, ours, opt.force, &err);
     double start = bt_clock();
-    if (status == BT_OK) status = bt_cost_fits(&c, bt_case_floes_made(&c), &bt_comm_alone, bt_cost_machine(), &err);
-    if (status == BT_OK) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK)
-        status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err)
-                 : fixed  ? bt_field_write_fixed(&f, &c, o.output, &err)
-                          : bt_field_write(&f, &c, o.output, &err);
+        status = bt_cost_fits(&input, bt_case_floes_made(&input), &bt_comm_alone, bt_cost_machine(), &err);
+    if (status == BT_OK) status = bt_field_load(&input, &field, &err);
+    if (status == BT_OK)
+        status = outlines ? bt_field_write_outlines(&field, &input, opt.output, &err)
+                 : fixed  ? bt_field_write_fixed(&field, &input, opt.output, &err)
+                          : bt_field_write(&field, &input, opt.output, &err);
     bt_errors warnings = {0};
     if (status == BT_OK) {
         const double took = bt_clock() - start;
-        if (c.lead.mode != BT_LEAD_NONE)
+        if (input.lead.mode != BT_LEAD_NONE)
             bt_errors_add(&warnings,
                           "lead.mode: %s: the file holds the ice as it is before the lead, which a run of the case "
                           "that reads the file opens in it",
-                          c.lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed");
-        c.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: its sizes are as they were drawn
-        const bt_field_sizes sizes = bt_field_sizes_of(&c, &f);
-        printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", o.output, f.n,
-               f.concentration, f.ice_area, sizes.mean, bt_case_reads_field(&c) ? "read" : "made", took);
-        if (f.strip > 0)
+                          input.lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed");
+        input.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: its sizes are as they were drawn
+        const bt_field_sizes sizes = bt_field_sizes_of(&input, &field);
+        printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", opt.output, field.n,
+               field.concentration, field.ice_area, sizes.mean, bt_case_reads_field(&input) ? "read" : "made", took);
+        if (field.strip > 0)
             printf("  cut from a larger extent: floes within %.4g m of the cut, or across it, are those of this region "
-                   "alone\n", f.strip);
-        bt_outline_warn(&f.outlines, &c, &warnings);
-        bt_field_size_warn(&c, &sizes, &warnings);
+                   "alone\n", field.strip);
+        bt_outline_warn(&field.outlines, &input, &warnings);
+        bt_field_size_warn(&input, &sizes, &warnings);
     }
     for (size_t i = 0; i < warnings.n; i++) printf("  warning: %s\n", warnings.text[i]);
     bt_errors_free(&warnings);
-    bt_field_free(&f);
-    bt_case_free(&c);
-    free(o.file.set);
+    bt_field_free(&field);
+    bt_case_free(&input);
+    free(opt.file.set);
     return bt_cmd_end(&bt_comm_alone, status, &err);
 }

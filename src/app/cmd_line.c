@@ -76,22 +76,22 @@ void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)
 
 static error_t parse_case(int key, char *arg, struct argp_state *state)
 {
-    bt_cmd_case *c = state->input;
+    bt_cmd_case *file = state->input;
     switch (key) {
     case 's':
-        c->set = bt_realloc(c->set, (size_t)c->n_set + 1, sizeof *c->set);
-        c->set[c->n_set++] = arg;
+        file->set = bt_realloc(file->set, (size_t)file->n_set + 1, sizeof *file->set);
+        file->set[file->n_set++] = arg;
         return 0;
     case ARGP_KEY_ARG:
-        if (c->path)
+        if (file->path)
             argp_error(state, "%s: one %s at a time; options with a value are written --option value", arg,
-                       c->study ? "study" : "case");
-        c->path = arg;
+                       file->study ? "study" : "case");
+        file->path = arg;
         return 0;
     case ARGP_KEY_END:
-        if (!c->path)
-            argp_error(state, "no %s file given; name one, as in cases/%s", c->study ? "study" : "case",
-                       c->study ? "studies/basin.yml" : "basin/basin-80.yml");
+        if (!file->path)
+            argp_error(state, "no %s file given; name one, as in cases/%s", file->study ? "study" : "case",
+                       file->study ? "studies/basin.yml" : "basin/basin-80.yml");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -166,17 +166,17 @@ bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, b
     return BT_ERR_IO;
 }
 
-bt_status bt_cmd_each_may_read(const bt_comm *c, const char *path, bt_errors *err)
+bt_status bt_cmd_each_may_read(const bt_comm *comm, const char *path, bt_errors *err)
 {
     struct stat s;
-    const bool pipe = c->size > 1 && stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
+    const bool pipe = comm->size > 1 && stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
     if (pipe)
         bt_errors_add(err, "%s: is no file, and each of the %d ranks would read it; write it to a file first", path,
-                      c->size);
-    return bt_comm_agree(c, pipe ? BT_ERR_USAGE : BT_OK);
+                      comm->size);
+    return bt_comm_agree(comm, pipe ? BT_ERR_USAGE : BT_OK);
 }
 
-int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
+int bt_cmd_end(const bt_comm *comm, bt_status status, bt_errors *err)
 {
     const bool lost = fflush(stdout) != 0 || ferror(stdout);
     if (lost)
@@ -184,8 +184,8 @@ int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
                       "standard output: cannot be written; give it a place with space, or a reader that stays to "
                       "the end, or use the files of the result");
     if (lost && status == BT_OK) status = BT_ERR_IO;
-    status = bt_comm_agree(c, status);
-    bt_comm_errors(c, err);
+    status = bt_comm_agree(comm, status);
+    bt_comm_errors(comm, err);
     bt_errors_print(err);
     bt_errors_free(err);
     return status;

@@ -28,15 +28,15 @@ static bool is_folder(const char *path)
 }
 
 // A file is taken as the checkpoint of the folder that it is in.
-static void take_place(options *o, char *arg)
+static void take_place(options *opt, char *arg)
 {
     struct stat st;
     if (stat(arg, &st) != 0 || S_ISDIR(st.st_mode)) {
-        o->dir = bt_text_copy(arg);
+        opt->dir = bt_text_copy(arg);
         return;
     }
-    o->file = arg;
-    o->dir = bt_file_folder(arg);
+    opt->file = arg;
+    opt->dir = bt_file_folder(arg);
 }
 
 static void refuse_case(const struct argp_state *state, const char *path)
@@ -49,19 +49,20 @@ static void refuse_case(const struct argp_state *state, const char *path)
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    options *o = state->input;
+    options *opt = state->input;
     switch (key) {
-    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
-    case 'q': o->run.quiet = true; return 0;
-    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
-    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
+    case 't': opt->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
+    case 'q': opt->run.quiet = true; return 0;
+    case KEY_STEPS: opt->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: opt->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
     case ARGP_KEY_ARG:
-        if (o->dir) argp_error(state, "%s: one folder at a time; options with a value are written --option value", arg);
-        take_place(o, arg);
-        if (o->file) refuse_case(state, arg);
+        if (opt->dir)
+            argp_error(state, "%s: one folder at a time; options with a value are written --option value", arg);
+        take_place(opt, arg);
+        if (opt->file) refuse_case(state, arg);
         return 0;
     case ARGP_KEY_END:
-        if (!o->dir) argp_error(state, "no folder given; name the result folder of a run, as in out/basin-80");
+        if (!opt->dir) argp_error(state, "no folder given; name the result folder of a run, as in out/basin-80");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -86,17 +87,17 @@ static const struct argp resume_argp = {.options = resume_options,
 
 int bt_cmd_resume(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1, .aloud = true, .began = bt_launcher_began()}};
+    options opt = {.run = {.dump_step = -1, .aloud = true, .began = bt_launcher_began()}};
     char *command_line = bt_cmd_join(argc, argv);
-    bt_cmd_parse(&resume_argp, argc, argv, &o);
+    bt_cmd_parse(&resume_argp, argc, argv, &opt);
     const bt_comm *comm = bt_comm_world();
-    o.run.dir = o.dir;
-    o.run.from = o.file;
-    o.run.command_line = command_line;
-    if (comm->rank != 0) o.run.quiet = true;
+    opt.run.dir = opt.dir;
+    opt.run.from = opt.file;
+    opt.run.command_line = command_line;
+    if (comm->rank != 0) opt.run.quiet = true;
     bt_errors err = {0};
-    const bt_status status = bt_run_resume(comm, &o.run, &err);
-    free(o.dir);
+    const bt_status status = bt_run_resume(comm, &opt.run, &err);
+    free(opt.dir);
     free(command_line);
     return bt_cmd_end(comm, status, &err);
 }

@@ -36,19 +36,19 @@ static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    options *o = state->input;
+    options *opt = state->input;
     switch (key) {
-    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file; return 0;
     case 'o':
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
-        o->run.dir = arg;
+        opt->run.dir = arg;
         return 0;
-    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
-    case 'q': o->run.quiet = true; return 0;
-    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
-    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
-    case KEY_DUMP: parse_dump(state, arg, &o->run); return 0;
-    case KEY_FORCE: o->force = true; return 0;
+    case 't': opt->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
+    case 'q': opt->run.quiet = true; return 0;
+    case KEY_STEPS: opt->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: opt->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
+    case KEY_DUMP: parse_dump(state, arg, &opt->run); return 0;
+    case KEY_FORCE: opt->force = true; return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
@@ -75,9 +75,9 @@ static const struct argp run_argp = {.options = run_options,
                                      .doc = "Tow the body of a case through its ice and write a result folder."};
 
 /// A step that this call does not make has no contacts to write.
-static bt_status check_dump(const bt_run_options *run, const bt_case *c, bt_errors *err)
+static bt_status check_dump(const bt_run_options *run, const bt_case *input, bt_errors *err)
 {
-    const int64_t all = bt_case_steps(c), last = run->max_steps > 0 && run->max_steps < all ? run->max_steps : all;
+    const int64_t all = bt_case_steps(input), last = run->max_steps > 0 && run->max_steps < all ? run->max_steps : all;
     if (run->dump_step <= last) return BT_OK;
     bt_errors_add(err, "--dump-contacts: step %" PRId64 " is not made: the last one is %" PRId64, run->dump_step, last);
     return BT_ERR_USAGE;
@@ -85,28 +85,29 @@ static bt_status check_dump(const bt_run_options *run, const bt_case *c, bt_erro
 
 int bt_cmd_run(int argc, char **argv)
 {
-    options o = {.run = {.dump_step = -1, .aloud = true, .began = bt_launcher_began()}};
+    options opt = {.run = {.dump_step = -1, .aloud = true, .began = bt_launcher_began()}};
     char *command_line = bt_cmd_join(argc, argv);
-    o.run.command_line = command_line;
-    bt_cmd_parse(&run_argp, argc, argv, &o);
+    opt.run.command_line = command_line;
+    bt_cmd_parse(&run_argp, argc, argv, &opt);
     const bt_comm *comm = bt_comm_world();
-    if (comm->rank != 0) o.run.quiet = true;
-    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
-    if (folder) o.run.dir = folder;
+    if (comm->rank != 0) opt.run.quiet = true;
+    char *folder = opt.run.dir ? NULL : bt_cmd_default_folder(opt.file.path);
+    if (folder) opt.run.dir = folder;
 
-    bt_case c = {0};
+    bt_case input = {0};
     bt_errors err = {0};
-    bt_status status = bt_cmd_each_may_read(comm, o.file.path, &err);
-    if (status == BT_OK) status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK) status = check_dump(&o.run, &c, &err);
+    bt_status status = bt_cmd_each_may_read(comm, opt.file.path, &err);
+    if (status == BT_OK) status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
+    if (status == BT_OK) status = check_dump(&opt.run, &input, &err);
     if (status == BT_OK && comm->rank == 0)
-        status = bt_folder_may_take(o.run.dir, o.force, "give another folder with -o, or --force to replace it", &err);
-    if (status == BT_OK && comm->rank == 0 && o.run.dump_path)
-        status = bt_cmd_may_write(o.run.dump_path, o.file.path, false, o.force, &err);
+        status = bt_folder_may_take(opt.run.dir, opt.force, "give another folder with -o, or --force to replace it",
+                                    &err);
+    if (status == BT_OK && comm->rank == 0 && opt.run.dump_path)
+        status = bt_cmd_may_write(opt.run.dump_path, opt.file.path, false, opt.force, &err);
     status = bt_comm_agree(comm, status);
-    if (status == BT_OK) status = bt_run(comm, &c, &o.run, &err);
-    bt_case_free(&c);
-    free(o.file.set);
+    if (status == BT_OK) status = bt_run(comm, &input, &opt.run, &err);
+    bt_case_free(&input);
+    free(opt.file.set);
     free(folder);
     free(command_line);
     return bt_cmd_end(comm, status, &err);

@@ -71,19 +71,19 @@ void *bt_point_begin(void)
 
 void bt_point_end(void *before) { uselocale(before); }
 
-void bt_text_begin(bt_text *t)
+void bt_text_begin(bt_text *text)
 {
-    *t = (bt_text){.locale = bt_point_begin()};
-    t->out = open_memstream(&t->text, &t->size);
-    if (!t->out) out_of_memory(1, BUFSIZ);
+    *text = (bt_text){.locale = bt_point_begin()};
+    text->out = open_memstream(&text->text, &text->size);
+    if (!text->out) out_of_memory(1, BUFSIZ);
 }
 
-char *bt_text_end(bt_text *t)
+char *bt_text_end(bt_text *text)
 {
-    bt_point_end(t->locale);
-    const bool lost = ferror(t->out) != 0;
-    if (fclose(t->out) != 0 || lost) out_of_memory(1, t->size);
-    return t->text;
+    bt_point_end(text->locale);
+    const bool lost = ferror(text->out) != 0;
+    if (fclose(text->out) != 0 || lost) out_of_memory(1, text->size);
+    return text->text;
 }
 
 char *bt_text_copy(const char *text)
@@ -111,33 +111,33 @@ char *bt_text_of(const char *fmt, ...)
     return text;
 }
 
-void bt_errors_add(bt_errors *e, const char *fmt, ...)
+void bt_errors_add(bt_errors *err, const char *fmt, ...)
 {
     va_list ap;
     va_start(ap, fmt);
-    bt_errors_add_list(e, fmt, ap);
+    bt_errors_add_list(err, fmt, ap);
     va_end(ap);
 }
 
-void bt_errors_add_list(bt_errors *e, const char *fmt, va_list args)
+void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
 {
-    if (e->n == e->cap) {
-        e->cap = e->cap ? 2 * e->cap : 8;
-        e->text = bt_realloc(e->text, e->cap, sizeof *e->text);
-        e->note = bt_realloc(e->note, e->cap, sizeof *e->note);
+    if (err->n == err->cap) {
+        err->cap = err->cap ? 2 * err->cap : 8;
+        err->text = bt_realloc(err->text, err->cap, sizeof *err->text);
+        err->note = bt_realloc(err->note, err->cap, sizeof *err->note);
     }
     char *text = text_of(fmt, args);
     // Texts of an input stand in messages: what would steer a terminal, or make two lines of one, is shown as a
     // question mark.
     for (char *s = text; *s; s++)
         if ((unsigned char)*s < 0x20 || *s == 0x7F) *s = '?';
-    e->note[e->n] = (bt_note){0};
-    e->text[e->n++] = text;
+    err->note[err->n] = (bt_note){0};
+    err->text[err->n++] = text;
 }
 
-void bt_errors_print(const bt_errors *e)
+void bt_errors_print(const bt_errors *err)
 {
-    for (size_t i = 0; i < e->n; i++) fprintf(stderr, "bergtow: %s\n", e->text[i]);
+    for (size_t i = 0; i < err->n; i++) fprintf(stderr, "bergtow: %s\n", err->text[i]);
 }
 
 void bt_errors_move(bt_errors *to, bt_errors *from)
@@ -150,15 +150,15 @@ void bt_errors_move(bt_errors *to, bt_errors *from)
     bt_errors_free(from);
 }
 
-void bt_errors_free(bt_errors *e)
+void bt_errors_free(bt_errors *err)
 {
-    for (size_t i = 0; i < e->n; i++) {
-        free(e->text[i]);
-        free(e->note[i].values);
+    for (size_t i = 0; i < err->n; i++) {
+        free(err->text[i]);
+        free(err->note[i].values);
     }
-    free(e->text);
-    free(e->note);
-    *e = (bt_errors){0};
+    free(err->text);
+    free(err->note);
+    *err = (bt_errors){0};
 }
 
 double bt_clock(void)

@@ -114,20 +114,20 @@ static void on_leaving(void)
 static void watch_exits(void) { atexit(on_leaving); }
 #endif
 
-static void count_here(bt_comm *c)
+static void count_here(bt_comm *comm)
 {
     MPI_Comm node;
-    MPI_Comm_split_type(c->mpi, MPI_COMM_TYPE_SHARED, c->rank, MPI_INFO_NULL, &node);
-    MPI_Comm_size(node, &c->ranks_here);
+    MPI_Comm_split_type(comm->mpi, MPI_COMM_TYPE_SHARED, comm->rank, MPI_INFO_NULL, &node);
+    MPI_Comm_size(node, &comm->ranks_here);
     MPI_Comm_free(&node);
 }
 
-void bt_comm_split(const bt_comm *c, int group, bt_comm *part)
+void bt_comm_split(const bt_comm *comm, int group, bt_comm *part)
 {
     *part = bt_comm_alone;
-    part->divides = c->divides;
-    if (c->size == 1) return;
-    MPI_Comm_split(c->mpi, group, c->rank, &part->mpi); // inherits the error handler
+    part->divides = comm->divides;
+    if (comm->size == 1) return;
+    MPI_Comm_split(comm->mpi, group, comm->rank, &part->mpi); // inherits the error handler
     MPI_Comm_rank(part->mpi, &part->rank);
     MPI_Comm_size(part->mpi, &part->size);
     count_here(part);
@@ -249,44 +249,44 @@ _Noreturn void bt_comm_abort(int code)
     _Exit(code);
 }
 
-bt_status bt_comm_agree(const bt_comm *c, bt_status status)
+bt_status bt_comm_agree(const bt_comm *comm, bt_status status)
 {
-    if (c->size == 1) return status;
+    if (comm->size == 1) return status;
     static const bt_status order[] = {BT_OK, BT_ERR_SIGNAL, BT_ERR_USAGE, BT_ERR_CASE, BT_ERR_NUMERIC, BT_ERR_IO};
     enum { N = sizeof order / sizeof *order };
     int at = N - 1, worst;
     for (int i = 0; i < N; i++)
         if (order[i] == status) at = i;
-    MPI_Allreduce(&at, &worst, 1, MPI_INT, MPI_MAX, c->mpi);
+    MPI_Allreduce(&at, &worst, 1, MPI_INT, MPI_MAX, comm->mpi);
     return order[worst];
 }
 
-static bool has(const bt_errors *e, const char *text)
+static bool has(const bt_errors *err, const char *text)
 {
-    for (size_t i = 0; i < e->n; i++)
-        if (!strcmp(e->text[i], text)) return true;
+    for (size_t i = 0; i < err->n; i++)
+        if (!strcmp(err->text[i], text)) return true;
     return false;
 }
 
-void bt_comm_errors(const bt_comm *c, bt_errors *err)
+void bt_comm_errors(const bt_comm *comm, bt_errors *err)
 {
-    if (c->size == 1) return;
+    if (comm->size == 1) return;
     int n = 0, *counts = NULL, *starts = NULL, all = 0;
     for (size_t i = 0; i < err->n; i++) n += (int)strlen(err->text[i]) + 1;
     char *mine = bt_alloc((size_t)n, 1), *texts = NULL, *end = mine;
     for (size_t i = 0; i < err->n; i++) end = stpcpy(end, err->text[i]) + 1;
     bt_errors_free(err);
-    if (c->rank == 0) counts = bt_alloc(2 * (size_t)c->size, sizeof *counts);
-    MPI_Gather(&n, 1, MPI_INT, counts, 1, MPI_INT, 0, c->mpi);
-    if (c->rank == 0) {
-        starts = counts + c->size;
-        for (int k = 0; k < c->size; k++) {
+    if (comm->rank == 0) counts = bt_alloc(2 * (size_t)comm->size, sizeof *counts);
+    MPI_Gather(&n, 1, MPI_INT, counts, 1, MPI_INT, 0, comm->mpi);
+    if (comm->rank == 0) {
+        starts = counts + comm->size;
+        for (int k = 0; k < comm->size; k++) {
             starts[k] = all;
             all += counts[k];
         }
         texts = bt_alloc((size_t)all, 1);
     }
-    MPI_Gatherv(mine, n, MPI_CHAR, texts, counts, starts, MPI_CHAR, 0, c->mpi);
+    MPI_Gatherv(mine, n, MPI_CHAR, texts, counts, starts, MPI_CHAR, 0, comm->mpi);
     for (int at = 0; at < all; at += (int)strlen(texts + at) + 1)
         if (!has(err, texts + at)) bt_errors_add(err, "%s", texts + at);
     free(mine);
@@ -294,38 +294,38 @@ void bt_comm_errors(const bt_comm *c, bt_errors *err)
     free(counts);
 }
 
-void bt_comm_bcast(const bt_comm *c, void *data, size_t bytes)
+void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes)
 {
-    if (c->size == 1) return;
+    if (comm->size == 1) return;
     const size_t most = (size_t)1 << 30; // MPI counts are of 31 bits
     for (size_t at = 0; at < bytes; at += most)
-        MPI_Bcast((char *)data + at, (int)(bytes - at < most ? bytes - at : most), MPI_BYTE, 0, c->mpi);
+        MPI_Bcast((char *)data + at, (int)(bytes - at < most ? bytes - at : most), MPI_BYTE, 0, comm->mpi);
 }
 
-bool bt_comm_any(const bt_comm *c, bool value)
+bool bt_comm_any(const bt_comm *comm, bool value)
 {
-    if (c->size == 1) return value;
+    if (comm->size == 1) return value;
     int mine = value, any;
-    MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, c->mpi);
+    MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, comm->mpi);
     return any;
 }
 
-void bt_comm_rest(const bt_comm *c)
+void bt_comm_rest(const bt_comm *comm)
 {
-    if (c->size == 1) return;
+    if (comm->size == 1) return;
     // Blocking MPI calls poll, with the whole core. Looked for every 10 ms at last, and often at first: most waits are
     // short.
     MPI_Request all;
     int there = 0;
-    MPI_Ibarrier(c->mpi, &all);
+    MPI_Ibarrier(comm->mpi, &all);
     for (long pause = 20000; MPI_Test(&all, &there, MPI_STATUS_IGNORE), !there;
          pause = pause < 5000000 ? 2 * pause : 10000000)
         nanosleep(&(struct timespec){.tv_nsec = pause}, NULL);
 }
 
-void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors)
+void bt_comm_reduce(const bt_comm *comm, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors)
 {
-    if (c->size == 1) return;
+    if (comm->size == 1) return;
     enum { FEW = 64 };
     item few[FEW], *items = few;
     const int n = n_sums + n_max + n_ors;
@@ -335,7 +335,7 @@ void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, 
     for (int i = 0; i < n_sums; i++) *p++ = (item){SUM, (uint64_t)sums[i].v, (uint64_t)(sums[i].v >> 64), sums[i].bad};
     for (int i = 0; i < n_max; i++) *p++ = (item){MAX, as_word(maxima[i]), 0, 0};
     for (int i = 0; i < n_ors; i++) *p++ = (item){OR, ors[i], 0, 0};
-    MPI_Allreduce(MPI_IN_PLACE, items, n, item_type, item_op, c->mpi);
+    MPI_Allreduce(MPI_IN_PLACE, items, n, item_type, item_op, comm->mpi);
     p = items;
     for (int i = 0; i < n_sums; i++, p++)
         sums[i] =
@@ -345,13 +345,13 @@ void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, 
     if (items != few) free(items);
 }
 
-int64_t bt_comm_before(const bt_comm *c, int64_t value, int64_t *total)
+int64_t bt_comm_before(const bt_comm *comm, int64_t value, int64_t *total)
 {
     int64_t before = 0, all = value;
-    if (c->size > 1) {
-        MPI_Exscan(&value, &before, 1, MPI_INT64_T, MPI_SUM, c->mpi);
-        if (c->rank == 0) before = 0; // undefined by MPI
-        MPI_Allreduce(&value, &all, 1, MPI_INT64_T, MPI_SUM, c->mpi);
+    if (comm->size > 1) {
+        MPI_Exscan(&value, &before, 1, MPI_INT64_T, MPI_SUM, comm->mpi);
+        if (comm->rank == 0) before = 0; // undefined by MPI
+        MPI_Allreduce(&value, &all, 1, MPI_INT64_T, MPI_SUM, comm->mpi);
     }
     if (total) *total = all;
     return before;
@@ -423,11 +423,11 @@ static int running_sum(int size, const int *counts, int *starts)
     return all;
 }
 
-bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
+bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
                               const double *rows, double *block, bt_errors *err)
 {
-    const int size = c->size;
-    const int64_t from = first[c->rank], count = first[c->rank + 1] - from;
+    const int size = comm->size;
+    const int64_t from = first[comm->rank], count = first[comm->rank + 1] - from;
     if (size == 1) return put_in_order(from, count, n, gid, width, rows, block, err);
 
     int *numbers = bt_alloc(5 * (size_t)size, sizeof *numbers);
@@ -435,7 +435,7 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
         *next = numbers + 4 * size;
     for (bt_idx i = 0; i < n; i++) send[rank_of(first, size, gid[i])]++;
     running_sum(size, send, send_at);
-    MPI_Alltoall(send, 1, MPI_INT, take, 1, MPI_INT, c->mpi);
+    MPI_Alltoall(send, 1, MPI_INT, take, 1, MPI_INT, comm->mpi);
     const int n_take = running_sum(size, take, take_at);
 
     bt_gid *gid_out = bt_alloc((size_t)n, sizeof *gid_out), *gid_in = bt_alloc((size_t)n_take, sizeof *gid_in);
@@ -450,8 +450,8 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
     MPI_Type_contiguous(width, MPI_DOUBLE, &row);
     MPI_Type_commit(&row);
     double *in = bt_alloc((size_t)n_take, (size_t)width * sizeof *in);
-    MPI_Alltoallv(gid_out, send, send_at, MPI_INT64_T, gid_in, take, take_at, MPI_INT64_T, c->mpi);
-    MPI_Alltoallv(out, send, send_at, row, in, take, take_at, row, c->mpi);
+    MPI_Alltoallv(gid_out, send, send_at, MPI_INT64_T, gid_in, take, take_at, MPI_INT64_T, comm->mpi);
+    MPI_Alltoallv(out, send, send_at, row, in, take, take_at, row, comm->mpi);
     MPI_Type_free(&row);
     free(out);
     free(gid_out);
@@ -459,14 +459,14 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
     free(in);
     free(gid_in);
     free(numbers);
-    return bt_comm_agree(c, status);
+    return bt_comm_agree(comm, status);
 }
 
-double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total)
+double *bt_comm_gather(const bt_comm *comm, int64_t n, int width, const double *rows, int64_t *total)
 {
     const size_t bytes = (size_t)width * sizeof *rows;
     double *all = NULL;
-    if (c->size == 1) {
+    if (comm->size == 1) {
         *total = n;
         all = bt_alloc((size_t)n, bytes);
         if (n > 0) memcpy(all, rows, (size_t)n * bytes);
@@ -474,17 +474,17 @@ double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *row
     }
     int mine = (int)n, *counts = NULL, *starts = NULL;
     *total = 0;
-    if (c->rank == 0) counts = bt_alloc(2 * (size_t)c->size, sizeof *counts);
-    MPI_Gather(&mine, 1, MPI_INT, counts, 1, MPI_INT, 0, c->mpi);
-    if (c->rank == 0) {
-        starts = counts + c->size;
-        *total = running_sum(c->size, counts, starts);
+    if (comm->rank == 0) counts = bt_alloc(2 * (size_t)comm->size, sizeof *counts);
+    MPI_Gather(&mine, 1, MPI_INT, counts, 1, MPI_INT, 0, comm->mpi);
+    if (comm->rank == 0) {
+        starts = counts + comm->size;
+        *total = running_sum(comm->size, counts, starts);
         all = bt_alloc((size_t)*total, bytes);
     }
     MPI_Datatype row;
     MPI_Type_contiguous(width, MPI_DOUBLE, &row);
     MPI_Type_commit(&row);
-    MPI_Gatherv(rows, mine, row, all, counts, starts, row, 0, c->mpi);
+    MPI_Gatherv(rows, mine, row, all, counts, starts, row, 0, comm->mpi);
     MPI_Type_free(&row);
     free(counts);
     return all;

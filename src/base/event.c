@@ -12,34 +12,35 @@ const char *const bt_event_names[BT_EVENT_KINDS] = {
     [BT_EVENT_WAYPOINT] = "waypoint",
 };
 
-void bt_events_add(bt_events *e, double time, bt_event_kind kind, int64_t subject, double value)
+void bt_events_add(bt_events *events, double time, bt_event_kind kind, int64_t subject, double value)
 {
-    if (e->n == e->cap) {
-        e->cap = e->cap ? 2 * e->cap : 16;
-        e->event = bt_realloc(e->event, (size_t)e->cap, sizeof *e->event);
+    if (events->n == events->cap) {
+        events->cap = events->cap ? 2 * events->cap : 16;
+        events->event = bt_realloc(events->event, (size_t)events->cap, sizeof *events->event);
     }
-    e->event[e->n++] = (bt_event){time, kind, subject, value};
+    events->event[events->n++] = (bt_event){time, kind, subject, value};
 }
 
-void bt_events_free(bt_events *e)
+void bt_events_free(bt_events *events)
 {
-    free(e->event);
-    *e = (bt_events){0};
+    free(events->event);
+    *events = (bt_events){0};
 }
 
-void bt_event_describe(const bt_event *e, char out[160])
+void bt_event_describe(const bt_event *event, char out[160])
 {
-    switch (e->kind) {
+    switch (event->kind) {
     case BT_EVENT_LINE_BROKEN:
-        snprintf(out, 160, "branch %" PRId64 " of the tow line broke under %.4g N", e->subject, e->value);
+        snprintf(out, 160, "branch %" PRId64 " of the tow line broke under %.4g N", event->subject, event->value);
         break;
     case BT_EVENT_ADRIFT:
-        snprintf(out, 160, "no branch of the tow line is left: the body drifts, at first at %.3g m/s", e->value);
+        snprintf(out, 160, "no branch of the tow line is left: the body drifts, at first at %.3g m/s", event->value);
         break;
     case BT_EVENT_WAYPOINT:
-        snprintf(out, 160, "way-point %" PRId64 " passed after %.5g m", e->subject, e->value);
+        snprintf(out, 160, "way-point %" PRId64 " passed after %.5g m", event->subject, event->value);
         break;
     default:
-        snprintf(out, 160, "event of kind %" PRId64 ", subject %" PRId64 ", value %.6g", e->kind, e->subject, e->value);
+        snprintf(out, 160, "event of kind %" PRId64 ", subject %" PRId64 ", value %.6g", event->kind, event->subject,
+                 event->value);
     }
 }

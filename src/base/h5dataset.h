@@ -17,18 +17,18 @@
 
 /// Units of a dataset, as UDUNITS reads them [CF 1.8, 3.1]: attribute units. Those of columns that differ, with commas
 /// between, are no unit there: attribute units_of_columns.
-void bt_h5_units(bt_h5 *h, const char *dataset, const char *units);
+void bt_h5_units(bt_h5 *h5, const char *dataset, const char *units);
 
 /// Units ("1": none, NULL: it is text, or no one unit holds for all of it) and meaning of a dataset, as attributes
 /// long_name and description beside the units. axes: the name of each dimension, with blanks between; NULL: they are
 /// not named.
-void bt_h5_describe(bt_h5 *h, const char *dataset, const char *axes, const char *units, const char *meaning);
+void bt_h5_describe(bt_h5 *h5, const char *dataset, const char *axes, const char *units, const char *meaning);
 
 /// The axes alone, where a coordinate is made after the dataset.
-void bt_h5_axes(bt_h5 *h, const char *dataset, const char *axes);
+void bt_h5_axes(bt_h5 *h5, const char *dataset, const char *axes);
 
 /// What a file as a whole is, by the conventions of the Climate and Forecast metadata (CF 1.8: groups).
-void bt_h5_describe_file(bt_h5 *h, const char *title);
+void bt_h5_describe_file(bt_h5 *h5, const char *title);
 
 // --- slabs -----------------------------------------------------------------------------------------------------------
 
@@ -48,17 +48,17 @@ typedef struct bt_slab {
 } bt_slab;
 
 /// A dataset of fixed size. packed: on one rank shuffled and deflated, where that pays. Same call on all ranks.
-bt_slab bt_slab_fixed(bt_h5 *h, const char *name, hid_t type, int64_t n, int width, bool packed);
+bt_slab bt_slab_fixed(bt_h5 *h5, const char *name, hid_t type, int64_t n, int width, bool packed);
 /// A dataset without frames yet. On one rank it is shuffled and deflated.
-bt_slab bt_slab_growing(bt_h5 *h, const char *name, hid_t type, int64_t n, int width);
+bt_slab bt_slab_growing(bt_h5 *h5, const char *name, hid_t type, int64_t n, int width);
 /// Make room for one frame after those that are there; `frame` is their number.
-void bt_slab_grow(bt_slab *s, int64_t frame);
+void bt_slab_grow(bt_slab *slab, int64_t frame);
 /// Collective. Inform all ranks where the rows of these k datasets lie (of the present frame). Returns the status of
 /// rank 0.
-bt_status bt_slab_share(const bt_comm *c, bt_slab *const *s, int k);
+bt_status bt_slab_share(const bt_comm *comm, bt_slab *const *slab, int k);
 /// Write rows first up to first + n. Not collective: each rank writes what it has.
-void bt_slab_write(bt_slab *s, int64_t first, int64_t n, const void *rows);
-void bt_slab_close(bt_slab *s);
+void bt_slab_write(bt_slab *slab, int64_t first, int64_t n, const void *rows);
+void bt_slab_close(bt_slab *slab);
 
 /// Rows one after the other by way of a buffer of at most BT_SLAB_BYTES, so that no rank holds them all at once.
 #define BT_SLAB_BYTES ((size_t)1 << 18)
@@ -70,14 +70,14 @@ typedef struct bt_rows {
     int64_t n, room;
 } bt_rows;
 
-bt_rows bt_rows_from(bt_slab *s, int64_t first, void *buffer);
-void bt_rows_end(bt_rows *r); ///< write what is in the buffer
+bt_rows bt_rows_from(bt_slab *slab, int64_t first, void *buffer);
+void bt_rows_end(bt_rows *rows); ///< write what is in the buffer
 
 /// Where the next row goes; to be filled before the next call.
-static inline void *bt_rows_next(bt_rows *r)
+static inline void *bt_rows_next(bt_rows *rows)
 {
-    if (r->n == r->room) bt_rows_end(r);
-    return r->buffer + (size_t)r->n++ * r->s->row_bytes;
+    if (rows->n == rows->room) bt_rows_end(rows);
+    return rows->buffer + (size_t)rows->n++ * rows->s->row_bytes;
 }
 
 // --- provenance ------------------------------------------------------------------------------------------------------
@@ -87,6 +87,6 @@ static inline void *bt_rows_next(bt_rows *r)
 /// The revision that this program was built from, "unknown" where the build did not know.
 const char *bt_provenance_revision(void);
 
-void bt_provenance_write(bt_h5 *h, const char *command_line);
+void bt_provenance_write(bt_h5 *h5, const char *command_line);
 
 #endif

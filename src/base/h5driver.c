@@ -72,26 +72,26 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
         if (fd >= 0) close(fd);
         return NULL;
     }
-    driver_file *f = calloc(1, sizeof *f);
-    if (!f) {
+    driver_file *file = calloc(1, sizeof *file);
+    if (!file) {
         *info->errnum = ENOMEM;
         close(fd);
         return NULL;
     }
-    f->fd = fd;
-    f->writes = flags & H5F_ACC_RDWR;
-    f->eof = f->flushed = (haddr_t)st.st_size;
-    f->device = st.st_dev;
-    f->inode = st.st_ino;
-    f->errnum = info->errnum;
-    *f->errnum = 0; // HDF5 first tries whether the file is there
-    return &f->pub;
+    file->fd = fd;
+    file->writes = flags & H5F_ACC_RDWR;
+    file->eof = file->flushed = (haddr_t)st.st_size;
+    file->device = st.st_dev;
+    file->inode = st.st_ino;
+    file->errnum = info->errnum;
+    *file->errnum = 0; // HDF5 first tries whether the file is there
+    return &file->pub;
 }
 
 /// Data to the file, unless it has failed before.
-static void put(driver_file *f, haddr_t address, size_t size, const char *p)
+static void put(driver_file *file, haddr_t address, size_t size, const char *p)
 {
-    if (!*f->errnum) *f->errnum = bt_file_put(f->fd, (off_t)address, p, size);
+    if (!*file->errnum) *file->errnum = bt_file_put(file->fd, (off_t)address, p, size);
 }
 
 static bool bit_of(const uint64_t *bits, size_t i) { return bits[i / WORD] >> i % WORD & 1; }
@@ -119,57 +119,57 @@ static void set_bits(uint64_t *bits, size_t from, size_t to, bool set)
 }
 
 /// What of a page lies between two addresses: places from *from to the one returned.
-static size_t part_of(const page *g, haddr_t address, haddr_t end, size_t *from)
+static size_t part_of(const page *waiting, haddr_t address, haddr_t end, size_t *from)
 {
-    *from = address > g->at ? (size_t)(address - g->at) : 0;
-    return g->at + PAGE < end ? PAGE : (size_t)(end - g->at);
+    *from = address > waiting->at ? (size_t)(address - waiting->at) : 0;
+    return waiting->at + PAGE < end ? PAGE : (size_t)(end - waiting->at);
 }
 
 /// The first page that ends beyond an address.
-static size_t page_from(const driver_file *f, haddr_t address)
+static size_t page_from(const driver_file *file, haddr_t address)
 {
-    size_t low = 0, high = f->n_pages;
+    size_t low = 0, high = file->n_pages;
     while (low < high) {
         const size_t mid = (low + high) / 2;
-        if (f->pages[mid]->at + PAGE <= address) low = mid + 1;
+        if (file->pages[mid]->at + PAGE <= address) low = mid + 1;
         else high = mid;
     }
     return low;
 }
 
 /// The page at an address, made if it is not there; NULL without memory.
-static page *page_at(driver_file *f, haddr_t address)
+static page *page_at(driver_file *file, haddr_t address)
 {
-    const size_t k = page_from(f, address);
-    if (k < f->n_pages && f->pages[k]->at <= address) return f->pages[k];
-    if (f->n_pages == f->cap_pages) {
-        const size_t cap = 2 * f->cap_pages + 16;
-        page **more = realloc(f->pages, cap * sizeof *more);
+    const size_t k = page_from(file, address);
+    if (k < file->n_pages && file->pages[k]->at <= address) return file->pages[k];
+    if (file->n_pages == file->cap_pages) {
+        const size_t cap = 2 * file->cap_pages + 16;
+        page **more = realloc(file->pages, cap * sizeof *more);
         if (!more) return NULL;
-        f->pages = more;
-        f->cap_pages = cap;
+        file->pages = more;
+        file->cap_pages = cap;
     }
-    page *g = calloc(1, sizeof *g);
-    if (!g) return NULL;
-    g->at = address - address % PAGE;
-    memmove(f->pages + k + 1, f->pages + k, (f->n_pages - k) * sizeof *f->pages);
-    f->pages[k] = g;
-    f->n_pages++;
-    return g;
+    page *waiting = calloc(1, sizeof *waiting);
+    if (!waiting) return NULL;
+    waiting->at = address - address % PAGE;
+    memmove(file->pages + k + 1, file->pages + k, (file->n_pages - k) * sizeof *file->pages);
+    file->pages[k] = waiting;
+    file->n_pages++;
+    return waiting;
 }
 
-static void keep_waiting(driver_file *f, bool index, haddr_t address, size_t size, const char *p)
+static void keep_waiting(driver_file *file, bool index, haddr_t address, size_t size, const char *p)
 {
     while (size > 0) {
-        page *g = page_at(f, address);
-        if (!g) {
-            if (!*f->errnum) *f->errnum = ENOMEM;
+        page *waiting = page_at(file, address);
+        if (!waiting) {
+            if (!*file->errnum) *file->errnum = ENOMEM;
             return;
         }
-        const size_t from = (size_t)(address - g->at), n = size < PAGE - from ? size : PAGE - from;
-        memcpy(g->byte + from, p, n);
-        set_bits(g->waits, from, from + n, true);
-        set_bits(g->index, from, from + n, index);
+        const size_t from = (size_t)(address - waiting->at), n = size < PAGE - from ? size : PAGE - from;
+        memcpy(waiting->byte + from, p, n);
+        set_bits(waiting->waits, from, from + n, true);
+        set_bits(waiting->index, from, from + n, index);
         address += n;
         p += n;
         size -= n;
@@ -177,56 +177,56 @@ static void keep_waiting(driver_file *f, bool index, haddr_t address, size_t siz
 }
 
 /// What waits from address to end is over: other data have taken its place, or the file ends before it.
-static void forget(driver_file *f, haddr_t address, haddr_t end)
+static void forget(driver_file *file, haddr_t address, haddr_t end)
 {
-    for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < end; k++) {
+    for (size_t k = page_from(file, address); k < file->n_pages && file->pages[k]->at < end; k++) {
         size_t from;
-        const size_t to = part_of(f->pages[k], address, end, &from);
-        set_bits(f->pages[k]->waits, from, to, false);
+        const size_t to = part_of(file->pages[k], address, end, &from);
+        set_bits(file->pages[k]->waits, from, to, false);
     }
 }
 
 /// Bytes that wait, over those that were read from the file.
-static void overlay(const driver_file *f, haddr_t address, size_t size, char *p)
+static void overlay(const driver_file *file, haddr_t address, size_t size, char *p)
 {
-    for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < address + size; k++) {
-        const page *g = f->pages[k];
+    for (size_t k = page_from(file, address); k < file->n_pages && file->pages[k]->at < address + size; k++) {
+        const page *waiting = file->pages[k];
         size_t from;
-        const size_t to = part_of(g, address, address + size, &from);
-        while ((from = first_place(g->waits, from, true)) < to) {
-            const size_t gap = first_place(g->waits, from, false), n = (gap < to ? gap : to) - from;
-            memcpy(p + (g->at + from - address), g->byte + from, n);
+        const size_t to = part_of(waiting, address, address + size, &from);
+        while ((from = first_place(waiting->waits, from, true)) < to) {
+            const size_t gap = first_place(waiting->waits, from, false), n = (gap < to ? gap : to) - from;
+            memcpy(p + (waiting->at + from - address), waiting->byte + from, n);
             from += n;
         }
     }
 }
 
 /// Write what waits from address to end, which all does, at once.
-static void put_run(driver_file *f, haddr_t address, haddr_t end)
+static void put_run(driver_file *file, haddr_t address, haddr_t end)
 {
     const size_t size = (size_t)(end - address);
     char *whole = calloc(size, 1);
     if (whole) {
-        overlay(f, address, size, whole);
-        put(f, address, size, whole);
-    } else if (!*f->errnum) {
-        *f->errnum = ENOMEM;
+        overlay(file, address, size, whole);
+        put(file, address, size, whole);
+    } else if (!*file->errnum) {
+        *file->errnum = ENOMEM;
     }
     free(whole);
 }
 
 /// The superblock says how long the file is: it comes when the file has that length, and before what leads beyond the
 /// old one.
-static void put_superblock(driver_file *f)
+static void put_superblock(driver_file *file)
 {
-    const size_t k = page_from(f, f->super);
-    if (k == f->n_pages || f->pages[k]->at > f->super) return;
-    if (!bit_of(f->pages[k]->waits, (size_t)(f->super - f->pages[k]->at))) return;
+    const size_t k = page_from(file, file->super);
+    if (k == file->n_pages || file->pages[k]->at > file->super) return;
+    if (!bit_of(file->pages[k]->waits, (size_t)(file->super - file->pages[k]->at))) return;
     struct stat st;
-    if (!*f->errnum && fstat(f->fd, &st) != 0) *f->errnum = errno;
-    if (!*f->errnum && (haddr_t)st.st_size < f->eoa) *f->errnum = bt_file_resize(f->fd, (off_t)f->eoa);
-    put_run(f, f->super, f->super_end);
-    forget(f, f->super, f->super_end);
+    if (!*file->errnum && fstat(file->fd, &st) != 0) *file->errnum = errno;
+    if (!*file->errnum && (haddr_t)st.st_size < file->eoa) *file->errnum = bt_file_resize(file->fd, (off_t)file->eoa);
+    put_run(file, file->super, file->super_end);
+    forget(file, file->super, file->super_end);
 }
 
 /// Bytes without a gap, all of an old index or none, all old or all new.
@@ -236,57 +236,59 @@ typedef struct run {
 } run;
 
 /// Where the bytes of a page that wait from i on end, or change between index and none, or old and new.
-static size_t end_of_run(const driver_file *f, const page *g, size_t i)
+static size_t end_of_run(const driver_file *file, const page *waiting, size_t i)
 {
-    const size_t gap = first_place(g->waits, i, false), other = first_place(g->index, i, !bit_of(g->index, i));
+    const size_t gap = first_place(waiting->waits, i, false),
+                 other = first_place(waiting->index, i, !bit_of(waiting->index, i));
     const size_t end = gap < other ? gap : other;
-    return g->at + i < f->flushed && f->flushed < g->at + end ? (size_t)(f->flushed - g->at) : end;
+    return waiting->at + i < file->flushed && file->flushed < waiting->at + end
+           ? (size_t)(file->flushed - waiting->at) : end;
 }
 
 /// All that waits, by address. NULL without memory, or when nothing waits.
-static run *runs_of(driver_file *f, size_t *n)
+static run *runs_of(driver_file *file, size_t *n)
 {
     run *all = NULL;
     size_t cap = *n = 0;
-    for (size_t k = 0; k < f->n_pages; k++) {
-        const page *g = f->pages[k];
-        for (size_t i = 0, end; (i = first_place(g->waits, i, true)) < PAGE; i = end) {
-            end = end_of_run(f, g, i);
-            const bool index = g->at + i < f->flushed && bit_of(g->index, i);
+    for (size_t k = 0; k < file->n_pages; k++) {
+        const page *waiting = file->pages[k];
+        for (size_t i = 0, end; (i = first_place(waiting->waits, i, true)) < PAGE; i = end) {
+            end = end_of_run(file, waiting, i);
+            const bool index = waiting->at + i < file->flushed && bit_of(waiting->index, i);
             run *last = *n > 0 ? &all[*n - 1] : NULL;
-            if (last && last->end == g->at + i && last->index == index && last->end != f->flushed) {
-                last->end = g->at + end;
+            if (last && last->end == waiting->at + i && last->index == index && last->end != file->flushed) {
+                last->end = waiting->at + end;
                 continue;
             }
             if (*n == cap) {
                 run *more = realloc(all, (cap = 2 * cap + 64) * sizeof *more);
                 if (!more) {
-                    if (!*f->errnum) *f->errnum = ENOMEM;
+                    if (!*file->errnum) *file->errnum = ENOMEM;
                     return all;
                 }
                 all = more;
             }
-            all[(*n)++] = (run){g->at + i, g->at + end, index};
+            all[(*n)++] = (run){waiting->at + i, waiting->at + end, index};
         }
     }
     return all;
 }
 
 /// Write all that waits, in the order that leaves the file whole after each write.
-static void put_waiting(driver_file *f)
+static void put_waiting(driver_file *file)
 {
-    put_superblock(f);
+    put_superblock(file);
     size_t n, first_new = 0;
-    run *all = runs_of(f, &n);
-    while (first_new < n && all[first_new].end <= f->flushed) first_new++;
-    for (size_t k = first_new; k < n; k++) put_run(f, all[k].begin, all[k].end);
+    run *all = runs_of(file, &n);
+    while (first_new < n && all[first_new].end <= file->flushed) first_new++;
+    for (size_t k = first_new; k < n; k++) put_run(file, all[k].begin, all[k].end);
     for (size_t k = 0; k < first_new; k++)
-        if (all[k].index) put_run(f, all[k].begin, all[k].end);
+        if (all[k].index) put_run(file, all[k].begin, all[k].end);
     for (size_t k = first_new; k-- > 0;)
-        if (!all[k].index) put_run(f, all[k].begin, all[k].end);
+        if (!all[k].index) put_run(file, all[k].begin, all[k].end);
     free(all);
-    while (f->n_pages > 0) free(f->pages[--f->n_pages]);
-    f->flushed = f->eof;
+    while (file->n_pages > 0) free(file->pages[--file->n_pages]);
+    file->flushed = file->eof;
 }
 
 static herr_t driver_flush(H5FD_t *file, hid_t transfer, hbool_t closing)

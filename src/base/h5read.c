@@ -52,23 +52,23 @@ bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
     return found == 0 ? BT_OK : BT_ERR_CASE;
 }
 
-void bt_h5_fail(bt_h5_reader *r, const char *why)
+void bt_h5_fail(bt_h5_reader *reader, const char *why)
 {
-    if (r->status != BT_OK) return;
-    if (*r->errnum) {
-        r->status = bt_file_fail(r->path, "read the file", *r->errnum, r->err);
+    if (reader->status != BT_OK) return;
+    if (*reader->errnum) {
+        reader->status = bt_file_fail(reader->path, "read the file", *reader->errnum, reader->err);
         return;
     }
-    r->status = BT_ERR_CASE;
-    bt_errors_add(r->err, "%s: %s", r->path, why);
+    reader->status = BT_ERR_CASE;
+    bt_errors_add(reader->err, "%s: %s", reader->path, why);
 }
 
-static void fail(bt_h5_reader *r, const char *name)
+static void fail(bt_h5_reader *reader, const char *name)
 {
     char why[300];
     snprintf(why, sizeof why, "%.100s cannot be read or has another shape than expected; use the program that wrote "
              "the file", name);
-    bt_h5_fail(r, why);
+    bt_h5_fail(reader, why);
 }
 
 hid_t bt_h5_open_file(const char *path, int *errnum)
@@ -80,55 +80,55 @@ hid_t bt_h5_open_file(const char *path, int *errnum)
     return file;
 }
 
-bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
+bt_status bt_h5_open(bt_h5_reader *reader, const char *path, const char *kind, bt_errors *err)
 {
-    *r = (bt_h5_reader){.file = -1, .path = path, .errnum = bt_alloc(1, sizeof(int)), .err = err};
-    r->status = bt_checksum_check(path, kind, NULL, err);
-    if (r->status != BT_OK) return r->status;
-    r->file = bt_h5_open_file(path, r->errnum);
+    *reader = (bt_h5_reader){.file = -1, .path = path, .errnum = bt_alloc(1, sizeof(int)), .err = err};
+    reader->status = bt_checksum_check(path, kind, NULL, err);
+    if (reader->status != BT_OK) return reader->status;
+    reader->file = bt_h5_open_file(path, reader->errnum);
     bt_errors found = {0};
-    const bool sound = r->file >= 0 && bt_h5_whole(r->file, path, &found) == BT_OK;
-    if (r->file < 0 || *r->errnum) {
-        fail(r, "as HDF5 it");
+    const bool sound = reader->file >= 0 && bt_h5_whole(reader->file, path, &found) == BT_OK;
+    if (reader->file < 0 || *reader->errnum) {
+        fail(reader, "as HDF5 it");
     } else if (!sound) {
         bt_errors_add(err, "%s", found.text[0]);
-        r->status = BT_ERR_CASE;
+        reader->status = BT_ERR_CASE;
     }
     bt_errors_free(&found);
-    return r->status;
+    return reader->status;
 }
 
-bt_status bt_h5_end(bt_h5_reader *r)
+bt_status bt_h5_end(bt_h5_reader *reader)
 {
-    if (r->file >= 0) H5Fclose(r->file);
-    r->file = -1;
-    free(r->errnum);
-    r->errnum = NULL;
-    return r->status;
+    if (reader->file >= 0) H5Fclose(reader->file);
+    reader->file = -1;
+    free(reader->errnum);
+    reader->errnum = NULL;
+    return reader->status;
 }
 
-bool bt_h5_there(const bt_h5_reader *r, const char *name)
+bool bt_h5_there(const bt_h5_reader *reader, const char *name)
 {
-    return r->status == BT_OK && H5Lexists(r->file, name, H5P_DEFAULT) > 0;
+    return reader->status == BT_OK && H5Lexists(reader->file, name, H5P_DEFAULT) > 0;
 }
 
-int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k)
+int64_t bt_h5_size(bt_h5_reader *reader, const char *name, int k)
 {
-    if (r->status != BT_OK) return 0;
+    if (reader->status != BT_OK) return 0;
     hsize_t size[H5S_MAX_RANK] = {0};
-    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
+    const hid_t d = H5Dopen2(reader->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
     const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
     if (space >= 0) H5Sclose(space);
     if (d >= 0) H5Dclose(d);
-    if (rank < 0) fail(r, name);
+    if (rank < 0) fail(reader, name);
     return k < rank ? (int64_t)size[k] : 0;
 }
 
-void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to)
+void bt_h5_read(bt_h5_reader *reader, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to)
 {
-    if (r->status != BT_OK || n == 0) return;
+    if (reader->status != BT_OK || n == 0) return;
     hsize_t size[H5S_MAX_RANK] = {0}, start[H5S_MAX_RANK] = {0};
-    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
+    const hid_t d = H5Dopen2(reader->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
     const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
     bool good = rank >= 1 && first >= 0 && n > 0 && (hsize_t)first <= size[0] && (hsize_t)n <= size[0] - (hsize_t)first;
     // By division: the product of what a file claims may not fit.
@@ -151,7 +151,7 @@ void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int
     }
     if (space >= 0) H5Sclose(space);
     if (d >= 0) H5Dclose(d);
-    if (!good) fail(r, name);
+    if (!good) fail(reader, name);
 }
 
 enum { LONGEST_TEXT = 1 << 28 }; // far beyond any case: what a file claims is not asked of the memory
@@ -172,11 +172,11 @@ static char *read_or_not(char *text, bool read)
     return NULL;
 }
 
-char *bt_h5_read_word(bt_h5_reader *r, const char *name)
+char *bt_h5_read_word(bt_h5_reader *reader, const char *name)
 {
-    if (r->status != BT_OK || H5Aexists_by_name(r->file, "/", name, H5P_DEFAULT) <= 0) return NULL;
-    const hid_t a = H5Aopen_by_name(r->file, "/", name, H5P_DEFAULT, H5P_DEFAULT), type = a < 0 ? -1 : H5Aget_type(a),
-                space = a < 0 ? -1 : H5Aget_space(a);
+    if (reader->status != BT_OK || H5Aexists_by_name(reader->file, "/", name, H5P_DEFAULT) <= 0) return NULL;
+    const hid_t a = H5Aopen_by_name(reader->file, "/", name, H5P_DEFAULT, H5P_DEFAULT),
+                type = a < 0 ? -1 : H5Aget_type(a), space = a < 0 ? -1 : H5Aget_space(a);
     char *text = room_for(type, space);
     text = read_or_not(text, text && H5Aread(a, type, text) >= 0);
     if (space >= 0) H5Sclose(space);

@@ -27,20 +27,20 @@ typedef struct bt_h5_reader {
 
 /// Check the checksum, open, and bt_h5_whole. path must stay valid. Errors: those of bt_checksum_check and bt_h5_whole.
 /// bt_h5_end follows, also after an error.
-bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
-bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
+bt_status bt_h5_open(bt_h5_reader *reader, const char *path, const char *kind, bt_errors *err);
+bt_status bt_h5_end(bt_h5_reader *reader); ///< close; the status of the whole
 
 /// Note that the file, or what is named, could not be read: with the errno of a read that failed, or `why` of the file.
-void bt_h5_fail(bt_h5_reader *r, const char *why);
+void bt_h5_fail(bt_h5_reader *reader, const char *why);
 
 /// Is there a dataset of this name in a group that there is?
-bool bt_h5_there(const bt_h5_reader *r, const char *name);
+bool bt_h5_there(const bt_h5_reader *reader, const char *name);
 /// Size of a dataset's dimension k, 0 = not so many.
-int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k);
+int64_t bt_h5_size(bt_h5_reader *reader, const char *name, int k);
 /// An attribute of the root that bt_h5_attr_word has written; the caller frees it. NULL: there is none.
-char *bt_h5_read_word(bt_h5_reader *r, const char *name);
+char *bt_h5_read_word(bt_h5_reader *reader, const char *name);
 /// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem:
 /// H5T_NATIVE_...
-void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to);
+void bt_h5_read(bt_h5_reader *reader, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to);
 
 #endif

@@ -38,22 +38,22 @@ typedef struct way { int level, strategy; } way;
 static const way STORED = {0, Z_DEFAULT_STRATEGY}, BY_BYTES = {LEVEL, Z_HUFFMAN_ONLY},
                  BY_REPEATS = {LEVEL, Z_DEFAULT_STRATEGY};
 
-void bt_deflater_free(bt_deflater *d)
+void bt_deflater_free(bt_deflater *deflater)
 {
-    if (!d) return;
-    deflateEnd(&d->whole);
-    deflateEnd(&d->trial);
-    free(d->plane);
-    free(d->out);
-    free(d);
+    if (!deflater) return;
+    deflateEnd(&deflater->whole);
+    deflateEnd(&deflater->trial);
+    free(deflater->plane);
+    free(deflater->out);
+    free(deflater);
 }
 
 static bt_deflater *create(void)
 {
-    bt_deflater *d = bt_alloc(1, sizeof *d);
-    const bool begun = deflateInit(&d->whole, LEVEL) == Z_OK && deflateInit(&d->trial, LEVEL) == Z_OK;
-    if (begun) return d;
-    bt_deflater_free(d);
+    bt_deflater *deflater = bt_alloc(1, sizeof *deflater);
+    const bool begun = deflateInit(&deflater->whole, LEVEL) == Z_OK && deflateInit(&deflater->trial, LEVEL) == Z_OK;
+    if (begun) return deflater;
+    bt_deflater_free(deflater);
     return NULL;
 }
 
@@ -89,25 +89,25 @@ static void take_plane(unsigned char *plane, const unsigned char *numbers, size_
 const void *bt_deflate(bt_deflater **of, const void *numbers, size_t n, size_t room, size_t size, size_t *length)
 {
     if (!*of && !(*of = create())) return NULL;
-    bt_deflater *d = *of;
-    z_stream *z = &d->whole;
+    bt_deflater *deflater = *of;
+    z_stream *z = &deflater->whole;
     // a change of the way ends a block, which takes some bytes
     const size_t most = deflateBound(z, (unsigned long)(room * size)) + 64 * (size + 1);
-    if (room > d->cap_plane) d->plane = bt_realloc(d->plane, d->cap_plane = room, 1);
-    if (most > d->cap_out) d->out = bt_realloc(d->out, d->cap_out = most, 1);
+    if (room > deflater->cap_plane) deflater->plane = bt_realloc(deflater->plane, deflater->cap_plane = room, 1);
+    if (most > deflater->cap_out) deflater->out = bt_realloc(deflater->out, deflater->cap_out = most, 1);
     if (deflateReset(z) != Z_OK) return NULL;
-    z->next_out = d->out, z->avail_out = (unsigned)most;
+    z->next_out = deflater->out, z->avail_out = (unsigned)most;
     for (size_t k = 0; k < size; k++) {
-        take_plane(d->plane, (const unsigned char *)numbers + k, n, room, size);
-        const way w = way_of(&d->trial, d->plane, room);
-        z->next_in = d->plane, z->avail_in = 0;
+        take_plane(deflater->plane, (const unsigned char *)numbers + k, n, room, size);
+        const way w = way_of(&deflater->trial, deflater->plane, room);
+        z->next_in = deflater->plane, z->avail_in = 0;
         if (deflateParams(z, w.level, w.strategy) != Z_OK) return NULL;
         z->avail_in = (unsigned)room;
         if (deflate(z, Z_NO_FLUSH) != Z_OK || z->avail_in > 0) return NULL;
     }
     if (deflate(z, Z_FINISH) != Z_STREAM_END) return NULL;
     *length = (size_t)z->total_out;
-    return d->out;
+    return deflater->out;
 }
 
 // --- files, groups, datasets -----------------------------------------------------------------------------------------
@@ -119,38 +119,38 @@ static herr_t innermost_text(unsigned n, const H5E_error2_t *e, void *data)
 }
 
 /// Report as "path: cannot ACTION: reason; remedy" and mark the handle as failed.
-static void fail(bt_h5 *h, const char *action)
+static void fail(bt_h5 *h5, const char *action)
 {
-    if (h->status != BT_OK) return;
-    if (*h->errnum) {
-        h->status = bt_file_fail(h->path, action, *h->errnum, h->err);
+    if (h5->status != BT_OK) return;
+    if (*h5->errnum) {
+        h5->status = bt_file_fail(h5->path, action, *h5->errnum, h5->err);
         return;
     }
     char text[200] = "unknown reason";
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, innermost_text, text);
-    h->status = BT_ERR_IO;
-    bt_errors_add(h->err, "%s: cannot %s: HDF5: %s; %s", h->path, action, text, bt_file_remedy(0));
+    h5->status = BT_ERR_IO;
+    bt_errors_add(h5->err, "%s: cannot %s: HDF5: %s; %s", h5->path, action, text, bt_file_remedy(0));
 }
 
-void bt_h5_check(bt_h5 *h, bool done)
+void bt_h5_check(bt_h5 *h5, bool done)
 {
-    if (!done || *h->errnum) fail(h, "write the file");
+    if (!done || *h5->errnum) fail(h5, "write the file");
 }
 
-static bool idle(const bt_h5 *h) { return h->status != BT_OK || h->file < 0; }
+static bool idle(const bt_h5 *h5) { return h5->status != BT_OK || h5->file < 0; }
 
-static void begin(bt_h5 *h, const char *path, bt_errors *err)
+static void begin(bt_h5 *h5, const char *path, bt_errors *err)
 {
-    *h = (bt_h5){.file = -1, .raw = -1, .path = bt_text_copy(path), .errnum = bt_alloc(1, sizeof(int)), .err = err};
+    *h5 = (bt_h5){.file = -1, .raw = -1, .path = bt_text_copy(path), .errnum = bt_alloc(1, sizeof(int)), .err = err};
 }
 
-bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
+bt_status bt_h5_create(bt_h5 *h5, const char *path, bt_errors *err)
 {
-    begin(h, path, err);
-    if ((h->status = bt_file_may_take(path, err)) != BT_OK) return bt_h5_close(h);
+    begin(h5, path, err);
+    if ((h5->status = bt_file_may_take(path, err)) != BT_OK) return bt_h5_close(h5);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    bool set = bt_h5driver_select(access, h->errnum) >= 0;
+    bool set = bt_h5driver_select(access, h5->errnum) >= 0;
     // Metadata stay in memory between flushes, so that a reader, or an interrupted run, finds the state of the last
     // flush. The cache has room for far more than changes between two flushes, so what leaves it is old and unchanged;
     // and a bound, since a flush looks at all of it: without one 3,000 frames of 142 floes took 7 s to write and 10,000
@@ -168,77 +168,77 @@ bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
     // A link under this name is replaced, as a rename would, and not followed.
     struct stat st;
     if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) unlink(path);
-    if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
-    if (h->file < 0) fail(h, "create the file");
+    if (set) h5->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
+    if (h5->file < 0) fail(h5, "create the file");
     H5Pclose(access);
-    if (h->status != BT_OK) bt_h5_close(h);
-    return h->status;
+    if (h5->status != BT_OK) bt_h5_close(h5);
+    return h5->status;
 }
 
-bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err)
+bt_status bt_h5_create_shared(bt_h5 *h5, const bt_comm *comm, const char *path, bt_errors *err)
 {
-    if (c->rank == 0) bt_h5_create(h, path, err);
-    else begin(h, path, err);
-    if (c->size == 1) return h->status;
-    bt_status status = bt_comm_agree(c, h->status);
+    if (comm->rank == 0) bt_h5_create(h5, path, err);
+    else begin(h5, path, err);
+    if (comm->size == 1) return h5->status;
+    bt_status status = bt_comm_agree(comm, h5->status);
     if (status == BT_OK) {
-        h->raw = bt_file_descriptor(path, O_WRONLY);
-        if (h->raw < 0) {
-            *h->errnum = errno;
-            fail(h, "open the file");
+        h5->raw = bt_file_descriptor(path, O_WRONLY);
+        if (h5->raw < 0) {
+            *h5->errnum = errno;
+            fail(h5, "open the file");
         }
-        status = bt_comm_agree(c, h->status);
+        status = bt_comm_agree(comm, h5->status);
     }
     if (status != BT_OK) {
-        bt_h5_give_up(h, status);
-        bt_h5_close(h);
+        bt_h5_give_up(h5, status);
+        bt_h5_close(h5);
     }
     return status;
 }
 
-void bt_h5_give_up(bt_h5 *h, bt_status status)
+void bt_h5_give_up(bt_h5 *h5, bt_status status)
 {
-    if (h->status == BT_OK) h->status = status;
-    if (h->errnum && !*h->errnum) *h->errnum = EIO; // the driver is silent from here on
+    if (h5->status == BT_OK) h5->status = status;
+    if (h5->errnum && !*h5->errnum) *h5->errnum = EIO; // the driver is silent from here on
 }
 
-void bt_h5_flush(bt_h5 *h)
+void bt_h5_flush(bt_h5 *h5)
 {
-    if (idle(h)) return;
-    bt_h5_check(h, H5Fflush(h->file, H5F_SCOPE_LOCAL) >= 0);
+    if (idle(h5)) return;
+    bt_h5_check(h5, H5Fflush(h5->file, H5F_SCOPE_LOCAL) >= 0);
 }
 
-void bt_h5_sync_raw(bt_h5 *h)
+void bt_h5_sync_raw(bt_h5 *h5)
 {
-    if (h->raw < 0 || h->status != BT_OK) return;
-    *h->errnum = bt_file_sync(h->raw);
-    bt_h5_check(h, true);
+    if (h5->raw < 0 || h5->status != BT_OK) return;
+    *h5->errnum = bt_file_sync(h5->raw);
+    bt_h5_check(h5, true);
 }
 
-bt_status bt_h5_close(bt_h5 *h)
+bt_status bt_h5_close(bt_h5 *h5)
 {
-    if (h->file >= 0) {
-        bt_h5_flush(h);
-        bt_h5_check(h, H5Fclose(h->file) >= 0);
+    if (h5->file >= 0) {
+        bt_h5_flush(h5);
+        bt_h5_check(h5, H5Fclose(h5->file) >= 0);
     }
-    if (h->raw >= 0) {
-        const int closed = bt_file_close(h->raw);
-        if (!*h->errnum) *h->errnum = closed;
-        bt_h5_check(h, true);
+    if (h5->raw >= 0) {
+        const int closed = bt_file_close(h5->raw);
+        if (!*h5->errnum) *h5->errnum = closed;
+        bt_h5_check(h5, true);
     }
-    free(h->path);
-    free(h->errnum);
-    bt_deflater_free(h->deflater);
-    const bt_status status = h->status;
-    *h = (bt_h5){.file = -1, .raw = -1, .status = status};
+    free(h5->path);
+    free(h5->errnum);
+    bt_deflater_free(h5->deflater);
+    const bt_status status = h5->status;
+    *h5 = (bt_h5){.file = -1, .raw = -1, .status = status};
     return status;
 }
 
-void bt_h5_group(bt_h5 *h, const char *name)
+void bt_h5_group(bt_h5 *h5, const char *name)
 {
-    if (idle(h)) return;
-    const hid_t g = H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    bt_h5_check(h, g >= 0 && H5Gclose(g) >= 0);
+    if (idle(h5)) return;
+    const hid_t g = H5Gcreate2(h5->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    bt_h5_check(h5, g >= 0 && H5Gclose(g) >= 0);
 }
 
 /// Creation properties under which two runs of one case give the same file contents.
@@ -257,29 +257,29 @@ static void set_filters(hid_t create)
 }
 
 /// Takes over (closes) the creation properties and the space.
-static void write_in_space(bt_h5 *h, const char *name, hid_t create, hid_t type, hid_t space, const void *data)
+static void write_in_space(bt_h5 *h5, const char *name, hid_t create, hid_t type, hid_t space, const void *data)
 {
-    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+    const hid_t d = H5Dcreate2(h5->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
     const bool filled = data && H5Sget_simple_extent_npoints(space) > 0;
-    bt_h5_check(h, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
-    if (d >= 0) bt_h5_check(h, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
+    bt_h5_check(h5, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
+    if (d >= 0) bt_h5_check(h5, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
     H5Sclose(space);
     H5Pclose(create);
 }
 
-void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
+void bt_h5_write(bt_h5 *h5, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
 {
-    if (idle(h)) return;
-    write_in_space(h, name, quiet_creation(), mem, H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL), data);
+    if (idle(h5)) return;
+    write_in_space(h5, name, quiet_creation(), mem, H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL), data);
 }
 
 /// Creation properties of a dataset into which other ranks write: room at once, and none of it filled.
-static hid_t layout(const bt_h5 *h, int rank, const hsize_t *chunk, bool packed)
+static hid_t layout(const bt_h5 *h5, int rank, const hsize_t *chunk, bool packed)
 {
     const hid_t p = quiet_creation();
     if (chunk) H5Pset_chunk(p, rank, chunk);
     if (packed) set_filters(p);
-    if (bt_h5_shared(h)) {
+    if (bt_h5_shared(h5)) {
         H5Pset_alloc_time(p, H5D_ALLOC_TIME_EARLY);
         H5Pset_fill_time(p, H5D_FILL_TIME_NEVER);
     }
@@ -295,14 +295,14 @@ static hid_t opened(bool packed)
     return p;
 }
 
-hid_t bt_h5_dataset(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk)
+hid_t bt_h5_dataset(bt_h5 *h5, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk)
 {
-    if (idle(h)) return -1;
+    if (idle(h5)) return -1;
     const hid_t space = H5Screate_simple(rank, dims, NULL);
-    const hid_t create = layout(h, rank, chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0),
+    const hid_t create = layout(h5, rank, chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0),
                 access = opened(chunk > 0);
-    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
-    bt_h5_check(h, d >= 0);
+    const hid_t d = H5Dcreate2(h5->file, name, type, space, H5P_DEFAULT, create, access);
+    bt_h5_check(h5, d >= 0);
     if (access != H5P_DEFAULT) H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
@@ -317,63 +317,63 @@ static hid_t text_type(size_t size)
     return t;
 }
 
-void bt_h5_write_text(bt_h5 *h, const char *name, const char *text)
+void bt_h5_write_text(bt_h5 *h5, const char *name, const char *text)
 {
-    if (idle(h)) return;
+    if (idle(h5)) return;
     const hid_t type = text_type(strlen(text) + 1);
-    write_in_space(h, name, quiet_creation(), type, H5Screate(H5S_SCALAR), text);
+    write_in_space(h5, name, quiet_creation(), type, H5Screate(H5S_SCALAR), text);
     H5Tclose(type);
 }
 
-void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names)
+void bt_h5_write_names(bt_h5 *h5, const char *name, hsize_t n, const char *const *names)
 {
-    if (idle(h)) return;
+    if (idle(h5)) return;
     const hid_t type = text_type(H5T_VARIABLE);
-    write_in_space(h, name, quiet_creation(), type, H5Screate_simple(1, &n, NULL), names);
+    write_in_space(h5, name, quiet_creation(), type, H5Screate_simple(1, &n, NULL), names);
     H5Tclose(type);
 }
 
-static void attr(bt_h5 *h, const char *object, const char *name, hid_t type, const void *value)
+static void attr(bt_h5 *h5, const char *object, const char *name, hid_t type, const void *value)
 {
-    if (idle(h)) return;
-    const hid_t space = H5Screate(H5S_SCALAR), o = H5Oopen(h->file, object, H5P_DEFAULT);
+    if (idle(h5)) return;
+    const hid_t space = H5Screate(H5S_SCALAR), o = H5Oopen(h5->file, object, H5P_DEFAULT);
     if (o >= 0 && H5Aexists(o, name) > 0) H5Adelete(o, name);
     const hid_t a = o < 0 ? -1 : H5Acreate2(o, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
-    bt_h5_check(h, a >= 0 && H5Awrite(a, type, value) >= 0);
+    bt_h5_check(h5, a >= 0 && H5Awrite(a, type, value) >= 0);
     if (a >= 0) H5Aclose(a);
     if (o >= 0) H5Oclose(o);
     H5Sclose(space);
 }
 
 // Variable length: a fixed-length attribute can be neither empty nor longer than 64 kB.
-void bt_h5_attr_text(bt_h5 *h, const char *object, const char *name, const char *text)
+void bt_h5_attr_text(bt_h5 *h5, const char *object, const char *name, const char *text)
 {
     const hid_t type = text_type(H5T_VARIABLE);
-    attr(h, object, name, type, &text);
+    attr(h5, object, name, type, &text);
     H5Tclose(type);
 }
 
-void bt_h5_attr_word(bt_h5 *h, const char *object, const char *name, const char *text)
+void bt_h5_attr_word(bt_h5 *h5, const char *object, const char *name, const char *text)
 {
     const hid_t type = text_type(strlen(text) + 1);
-    attr(h, object, name, type, text);
+    attr(h5, object, name, type, text);
     H5Tclose(type);
 }
 
-void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t value)
+void bt_h5_attr_int(bt_h5 *h5, const char *object, const char *name, int64_t value)
 {
-    attr(h, object, name, H5T_NATIVE_INT64, &value);
+    attr(h5, object, name, H5T_NATIVE_INT64, &value);
 }
 
-void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value)
+void bt_h5_attr_double(bt_h5 *h5, const char *object, const char *name, double value)
 {
-    attr(h, object, name, H5T_NATIVE_DOUBLE, &value);
+    attr(h5, object, name, H5T_NATIVE_DOUBLE, &value);
 }
 
-hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk,
+hid_t bt_h5_growing(bt_h5 *h5, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk,
                     bool packed)
 {
-    if (idle(h)) return -1;
+    if (idle(h5)) return -1;
     hsize_t now[3] = {0}, most[3] = {H5S_UNLIMITED}, piece[3] = {chunk[0]};
     for (int k = 1; k < rank; k++) {
         now[k] = dims[k - 1];
@@ -381,10 +381,10 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
         most[k] = now[k] ? now[k] : 1;
         piece[k] = k == 1 ? chunk[1] : most[k];
     }
-    const hid_t space = H5Screate_simple(rank, now, most), create = layout(h, rank, piece, packed),
+    const hid_t space = H5Screate_simple(rank, now, most), create = layout(h5, rank, piece, packed),
                 access = opened(packed);
-    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, access);
-    bt_h5_check(h, d >= 0);
+    const hid_t d = H5Dcreate2(h5->file, name, type, space, H5P_DEFAULT, create, access);
+    bt_h5_check(h5, d >= 0);
     if (access != H5P_DEFAULT) H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
@@ -399,53 +399,53 @@ static int extent(hid_t dataset, hsize_t size[3])
     return rank;
 }
 
-void bt_h5_extend(bt_h5 *h, hid_t dataset, hsize_t length)
+void bt_h5_extend(bt_h5 *h5, hid_t dataset, hsize_t length)
 {
-    if (idle(h)) return;
+    if (idle(h5)) return;
     hsize_t size[3] = {0};
     const int rank = extent(dataset, size);
     size[0] = length;
-    bt_h5_check(h, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
+    bt_h5_check(h5, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
 }
 
 /// A block of a dataset, from start, of the given size.
-static void write_block(bt_h5 *h, hid_t dataset, hid_t mem, int rank, const hsize_t *start, const hsize_t *size,
+static void write_block(bt_h5 *h5, hid_t dataset, hid_t mem, int rank, const hsize_t *start, const hsize_t *size,
                         const void *data)
 {
     const hid_t space = H5Dget_space(dataset), here = H5Screate_simple(rank, size, NULL);
     const bool filled = H5Sget_simple_extent_npoints(here) > 0;
-    bt_h5_check(h, H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
-                 (!filled || H5Dwrite(dataset, mem, here, space, H5P_DEFAULT, data) >= 0));
+    bt_h5_check(h5, H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
+                  (!filled || H5Dwrite(dataset, mem, here, space, H5P_DEFAULT, data) >= 0));
     H5Sclose(here);
     H5Sclose(space);
 }
 
-void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, const void *data)
+void bt_h5_append(bt_h5 *h5, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, const void *data)
 {
-    if (idle(h) || n == 0) return;
-    bt_h5_extend(h, dataset, at + n);
-    if (h->status != BT_OK) return;
+    if (idle(h5) || n == 0) return;
+    bt_h5_extend(h5, dataset, at + n);
+    if (h5->status != BT_OK) return;
     hsize_t size[3] = {0};
     const int rank = extent(dataset, size);
     size[0] = n;
-    write_block(h, dataset, mem, rank, (hsize_t[3]){at}, size, data);
+    write_block(h5, dataset, mem, rank, (hsize_t[3]){at}, size, data);
 }
 
-void bt_h5_read_back(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t first, hsize_t n, void *data)
+void bt_h5_read_back(bt_h5 *h5, hid_t dataset, hid_t mem, hsize_t first, hsize_t n, void *data)
 {
-    if (idle(h) || n == 0) return;
+    if (idle(h5) || n == 0) return;
     const hid_t space = H5Dget_space(dataset), here = H5Screate_simple(1, &n, NULL);
     const bool done = H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, NULL, &n, NULL) >= 0 &&
                       H5Dread(dataset, mem, here, space, H5P_DEFAULT, data) >= 0;
-    if (!done || *h->errnum) fail(h, "read the file back");
+    if (!done || *h5->errnum) fail(h5, "read the file back");
     H5Sclose(here);
     H5Sclose(space);
 }
 
-void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n,
+void bt_h5_write_rows(bt_h5 *h5, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n,
                       const void *rows)
 {
-    if (idle(h) || n == 0) return;
+    if (idle(h5) || n == 0) return;
     hsize_t size[3] = {0}, start[3] = {0};
     const int rank = extent(dataset, size);
     if (frames) {
@@ -454,26 +454,26 @@ void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t f
     }
     start[frames] = first;
     size[frames] = n;
-    write_block(h, dataset, mem, rank, start, size, rows);
+    write_block(h5, dataset, mem, rank, start, size, rows);
 }
 
-void bt_h5_write_chunk(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsize_t first, size_t n, size_t room,
+void bt_h5_write_chunk(bt_h5 *h5, hid_t dataset, bool frames, hsize_t frame, hsize_t first, size_t n, size_t room,
                        size_t row_bytes, const void *rows)
 {
-    if (idle(h) || n == 0) return;
+    if (idle(h5) || n == 0) return;
     const hid_t type = H5Dget_type(dataset);
     const size_t size = H5Tget_size(type), wide = row_bytes / size;
     H5Tclose(type);
     hsize_t at[3] = {frame};
     at[frames] = first;
     size_t length = 0;
-    const void *chunk = bt_deflate(&h->deflater, rows, n * wide, room * wide, size, &length);
-    bt_h5_check(h, chunk && H5Dwrite_chunk(dataset, H5P_DEFAULT, 0, at, length, chunk) >= 0);
+    const void *chunk = bt_deflate(&h5->deflater, rows, n * wide, room * wide, size, &length);
+    bt_h5_check(h5, chunk && H5Dwrite_chunk(dataset, H5P_DEFAULT, 0, at, length, chunk) >= 0);
 }
 
-uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsize_t row)
+uint64_t bt_h5_address(bt_h5 *h5, hid_t dataset, bool frames, hsize_t frame, hsize_t row)
 {
-    if (idle(h)) return 0;
+    if (idle(h5)) return 0;
     haddr_t address = HADDR_UNDEF;
     if (!frames) {
         address = H5Dget_offset(dataset);
@@ -483,13 +483,13 @@ uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
         if (H5Dget_chunk_info_by_coord(dataset, (hsize_t[3]){frame, row}, &mask, &address, &size) < 0)
             address = HADDR_UNDEF;
     }
-    bt_h5_check(h, address != HADDR_UNDEF);
+    bt_h5_check(h5, address != HADDR_UNDEF);
     return address;
 }
 
-void bt_h5_write_raw(bt_h5 *h, uint64_t address, size_t bytes, const void *data)
+void bt_h5_write_raw(bt_h5 *h5, uint64_t address, size_t bytes, const void *data)
 {
-    if (h->status != BT_OK) return;
-    *h->errnum = bt_file_put(h->raw, (off_t)address, data, bytes);
-    bt_h5_check(h, true);
+    if (h5->status != BT_OK) return;
+    *h5->errnum = bt_file_put(h5->raw, (off_t)address, data, bytes);
+    bt_h5_check(h5, true);
 }

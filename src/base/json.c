@@ -14,18 +14,18 @@
 
 #include "base/inside.h"
 
-static void put(bt_json *j, const char *s, size_t n)
+static void put(bt_json *json, const char *s, size_t n)
 {
-    if (j->n + n + 1 > j->cap) {
-        j->cap = 2 * (j->n + n + 1) + 256;
-        j->text = bt_realloc(j->text, j->cap, 1);
+    if (json->n + n + 1 > json->cap) {
+        json->cap = 2 * (json->n + n + 1) + 256;
+        json->text = bt_realloc(json->text, json->cap, 1);
     }
-    memcpy(j->text + j->n, s, n);
-    j->n += n;
-    j->text[j->n] = '\0';
+    memcpy(json->text + json->n, s, n);
+    json->n += n;
+    json->text[json->n] = '\0';
 }
 
-static void puts_(bt_json *j, const char *s) { put(j, s, strlen(s)); }
+static void puts_(bt_json *json, const char *s) { put(json, s, strlen(s)); }
 
 /// Length of the valid UTF-8 sequence at s (RFC 3629), 0 when there is none.
 static size_t utf8_length(const unsigned char *s)
@@ -44,66 +44,66 @@ static size_t utf8_length(const unsigned char *s)
     return n;
 }
 
-static void put_string(bt_json *j, const char *value)
+static void put_string(bt_json *json, const char *value)
 {
-    puts_(j, "\"");
+    puts_(json, "\"");
     for (const unsigned char *s = (const unsigned char *)value; *s; ) {
         const size_t n = utf8_length(s);
         if (n == 0) {
-            puts_(j, "\\ufffd");
+            puts_(json, "\\ufffd");
             s++;
             continue;
         }
         if (*s == '"' || *s == '\\') {
-            put(j, (const char[]){'\\', (char)*s}, 2);
+            put(json, (const char[]){'\\', (char)*s}, 2);
         } else if (*s < 0x20 || *s == 0x7f) {
             char escape[8];
             snprintf(escape, sizeof escape, "\\u%04x", *s);
-            puts_(j, escape);
+            puts_(json, escape);
         } else {
-            put(j, (const char *)s, n);
+            put(json, (const char *)s, n);
         }
         s += n;
     }
-    puts_(j, "\"");
+    puts_(json, "\"");
 }
 
-static void indent(bt_json *j)
+static void indent(bt_json *json)
 {
-    puts_(j, "\n");
-    for (int i = 0; i < j->depth; i++) puts_(j, "  ");
+    puts_(json, "\n");
+    for (int i = 0; i < json->depth; i++) puts_(json, "  ");
 }
 
-static void member(bt_json *j, const char *key)
+static void member(bt_json *json, const char *key)
 {
-    if (j->started) puts_(j, j->flat ? ", " : ",");
-    if (j->depth && !j->flat) indent(j);
-    j->started = true;
+    if (json->started) puts_(json, json->flat ? ", " : ",");
+    if (json->depth && !json->flat) indent(json);
+    json->started = true;
     if (!key) return;
-    put_string(j, key);
-    puts_(j, ": ");
+    put_string(json, key);
+    puts_(json, ": ");
 }
 
-void bt_json_open(bt_json *j, const char *key, char bracket)
+void bt_json_open(bt_json *json, const char *key, char bracket)
 {
-    member(j, key);
-    put(j, &bracket, 1);
-    j->depth++;
-    j->started = false;
+    member(json, key);
+    put(json, &bracket, 1);
+    json->depth++;
+    json->started = false;
 }
 
-void bt_json_close(bt_json *j, char bracket)
+void bt_json_close(bt_json *json, char bracket)
 {
-    j->depth--;
-    if (j->started && !j->flat) indent(j);
-    put(j, &bracket, 1);
-    j->started = true;
-    if (j->depth == 0 && !j->flat) puts_(j, "\n");
+    json->depth--;
+    if (json->started && !json->flat) indent(json);
+    put(json, &bracket, 1);
+    json->started = true;
+    if (json->depth == 0 && !json->flat) puts_(json, "\n");
 }
 
-void bt_json_number(bt_json *j, const char *key, double value)
+void bt_json_number(bt_json *json, const char *key, double value)
 {
-    member(j, key);
+    member(json, key);
     char text[40] = "null";
     void *locale = bt_point_begin();
     for (int digits = 15; isfinite(value) && digits <= 17; digits++) {
@@ -111,43 +111,43 @@ void bt_json_number(bt_json *j, const char *key, double value)
         if (strtod(text, NULL) == value) break;
     }
     bt_point_end(locale);
-    puts_(j, text);
+    puts_(json, text);
 }
 
-void bt_json_int(bt_json *j, const char *key, int64_t value)
+void bt_json_int(bt_json *json, const char *key, int64_t value)
 {
-    member(j, key);
+    member(json, key);
     char text[24];
     snprintf(text, sizeof text, "%" PRId64, value);
-    puts_(j, text);
+    puts_(json, text);
 }
 
-void bt_json_bool(bt_json *j, const char *key, bool value)
+void bt_json_bool(bt_json *json, const char *key, bool value)
 {
-    member(j, key);
-    puts_(j, value ? "true" : "false");
+    member(json, key);
+    puts_(json, value ? "true" : "false");
 }
 
-void bt_json_numbers(bt_json *j, const char *key, int64_t n, const double *values)
+void bt_json_numbers(bt_json *json, const char *key, int64_t n, const double *values)
 {
-    member(j, key);
-    puts_(j, "[");
+    member(json, key);
+    puts_(json, "[");
     void *locale = bt_point_begin();
     for (int64_t i = 0; i < n; i++) {
         char text[40] = "null";
         if (isfinite(values[i])) snprintf(text, sizeof text, "%.7g", values[i]);
-        if (i) puts_(j, ", ");
-        puts_(j, text);
+        if (i) puts_(json, ", ");
+        puts_(json, text);
     }
     bt_point_end(locale);
-    puts_(j, "]");
+    puts_(json, "]");
 }
 
-void bt_json_string(bt_json *j, const char *key, const char *value)
+void bt_json_string(bt_json *json, const char *key, const char *value)
 {
-    member(j, key);
-    if (value) put_string(j, value);
-    else puts_(j, "null");
+    member(json, key);
+    if (value) put_string(json, value);
+    else puts_(json, "null");
 }
 
 void bt_json_raw(bt_json *j, const char *key, const char *json)
@@ -156,10 +156,10 @@ void bt_json_raw(bt_json *j, const char *key, const char *json)
     puts_(j, json);
 }
 
-void bt_json_free(bt_json *j)
+void bt_json_free(bt_json *json)
 {
-    free(j->text);
-    *j = (bt_json){0};
+    free(json->text);
+    *json = (bt_json){0};
 }
 
 // --- tables of keys --------------------------------------------------------------------------------------------------
@@ -175,19 +175,21 @@ static const char *last_part(const char *key)
     return dot ? dot + 1 : key;
 }
 
-static void write_value(bt_json *j, const bt_json_key *k, const struct bt_json_view *v, const void *source)
+static void write_value(bt_json *json, const bt_json_key *k, const struct bt_json_view *view, const void *source)
 {
     const char *key = last_part(k->key), *at = source ? (const char *)source + k->offset : NULL;
     switch (k->kind) {
-    case BT_JSON_REAL: bt_json_number(j, key, k->number ? k->number(v) : *(const double *)(const void *)at); break;
+    case BT_JSON_REAL: bt_json_number(json, key, k->number ? k->number(view)
+                                                           : *(const double *)(const void *)at); break;
     case BT_JSON_INT:
-        bt_json_int(j, key, k->number ? (int64_t)k->number(v) : *(const int64_t *)(const void *)at);
+        bt_json_int(json, key, k->number ? (int64_t)k->number(view) : *(const int64_t *)(const void *)at);
         break;
-    case BT_JSON_INT32: bt_json_int(j, key, *(const int *)(const void *)at); break;
-    case BT_JSON_BOOL: bt_json_bool(j, key, *(const bool *)at); break;
-    case BT_JSON_TEXT: bt_json_string(j, key, k->text ? k->text(v) : *(const char *const *)(const void *)at); break;
+    case BT_JSON_INT32: bt_json_int(json, key, *(const int *)(const void *)at); break;
+    case BT_JSON_BOOL: bt_json_bool(json, key, *(const bool *)at); break;
+    case BT_JSON_TEXT: bt_json_string(json, key, k->text ? k->text(view)
+                                                         : *(const char *const *)(const void *)at); break;
     case BT_JSON_WRITTEN:
-    case BT_JSON_ADDED: k->write(j, key, v, source); break;
+    case BT_JSON_ADDED: k->write(json, key, view, source); break;
     case BT_JSON_LAWS:
     case BT_JSON_SPLITS:
     case BT_JSON_SAVED:
@@ -195,30 +197,30 @@ static void write_value(bt_json *j, const bt_json_key *k, const struct bt_json_v
     }
 }
 
-void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_json_view *v,
+void bt_json_keys_write(bt_json *json, const bt_json_key *keys, int n, const struct bt_json_view *view,
                         const void *const *source)
 {
     enum { DEEPEST = 4 };
     size_t open[DEEPEST]; // lengths of the names of the objects that are open
     int depth = 0;
     for (int i = 0; i < n; i++) {
-        const bt_json_key *k = &keys[i];
-        while (depth > 0 && !inside(k->key, keys[i - 1].key, open[depth - 1])) {
-            bt_json_close(j, '}');
+        const bt_json_key *key = &keys[i];
+        while (depth > 0 && !inside(key->key, keys[i - 1].key, open[depth - 1])) {
+            bt_json_close(json, '}');
             depth--;
         }
-        const bool there = !k->when || k->when(v);
-        if (k->kind != BT_JSON_GROUP) {
-            if (there) write_value(j, k, v, source[k->from]);
+        const bool there = !key->when || key->when(view);
+        if (key->kind != BT_JSON_GROUP) {
+            if (there) write_value(json, key, view, source[key->from]);
         } else if (there) {
-            bt_json_open(j, last_part(k->key), '{');
-            open[depth++] = strlen(k->key);
+            bt_json_open(json, last_part(key->key), '{');
+            open[depth++] = strlen(key->key);
         } else {
-            bt_json_string(j, last_part(k->key), NULL);
-            while (i + 1 < n && inside(keys[i + 1].key, k->key, strlen(k->key))) i++;
+            bt_json_string(json, last_part(key->key), NULL);
+            while (i + 1 < n && inside(keys[i + 1].key, key->key, strlen(key->key))) i++;
         }
     }
-    for (; depth > 0; depth--) bt_json_close(j, '}');
+    for (; depth > 0; depth--) bt_json_close(json, '}');
 }
 
 const bt_json_key *bt_json_keys_find(const bt_json_key *keys, int n, const char *key)

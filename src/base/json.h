@@ -14,17 +14,18 @@ typedef struct bt_json {
 } bt_json;
 
 /// key: NULL inside an array and at the top. bracket: '{' or '['.
-void bt_json_open(bt_json *j, const char *key, char bracket);
-void bt_json_close(bt_json *j, char bracket); ///< '}' or ']'
-void bt_json_number(bt_json *j, const char *key, double value); ///< shortest text of the same bits; null unless finite
-void bt_json_int(bt_json *j, const char *key, int64_t value);
-void bt_json_bool(bt_json *j, const char *key, bool value);
+void bt_json_open(bt_json *json, const char *key, char bracket);
+void bt_json_close(bt_json *json, char bracket); ///< '}' or ']'
+/// shortest text of the same bits; null unless finite
+void bt_json_number(bt_json *json, const char *key, double value);
+void bt_json_int(bt_json *json, const char *key, int64_t value);
+void bt_json_bool(bt_json *json, const char *key, bool value);
 /// An array of numbers in one line, with 7 digits each: for curves.
-void bt_json_numbers(bt_json *j, const char *key, int64_t n, const double *values);
+void bt_json_numbers(bt_json *json, const char *key, int64_t n, const double *values);
 /// value: NULL gives null; bytes that are not UTF-8 become U+FFFD.
-void bt_json_string(bt_json *j, const char *key, const char *value);
+void bt_json_string(bt_json *json, const char *key, const char *value);
 void bt_json_raw(bt_json *j, const char *key, const char *json); ///< a value that is JSON already
-void bt_json_free(bt_json *j);
+void bt_json_free(bt_json *json);
 
 // --- tables of keys --------------------------------------------------------------------------------------------------
 
@@ -51,10 +52,10 @@ typedef struct bt_json_key {
     bt_json_kind kind;
     int from;                ///< index of its source
     size_t offset;
-    double (*number)(const struct bt_json_view *v);
-    const char *(*text)(const struct bt_json_view *v);
-    bool (*when)(const struct bt_json_view *v); ///< NULL = always; else a group is null, a plain key left out
-    void (*write)(bt_json *j, const char *key, const struct bt_json_view *v, const void *source);
+    double (*number)(const struct bt_json_view *view);
+    const char *(*text)(const struct bt_json_view *view);
+    bool (*when)(const struct bt_json_view *view); ///< NULL = always; else a group is null, a plain key left out
+    void (*write)(bt_json *json, const char *key, const struct bt_json_view *view, const void *source);
     bool machine;            ///< of the machine and the moment, not of the result: no number of an ensemble's member
 } bt_json_key;
 
@@ -68,7 +69,7 @@ typedef struct bt_json_key {
     .offset = offsetof(type, member)
 
 /// The rows as members of the object that is open. source: by bt_json_key.from.
-void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_json_view *v,
+void bt_json_keys_write(bt_json *json, const bt_json_key *keys, int n, const struct bt_json_view *view,
                         const void *const *source);
 
 /// The row of a key, NULL where there is none.

@@ -133,17 +133,17 @@ static int within_task(int n)
     return most > 0 && n > most ? most : n > 1 ? n : 1;
 }
 
-int bt_cores_share(const bt_comm *c)
+int bt_cores_share(const bt_comm *comm)
 {
     cpu_set_t given;
     if (!bt_cores_given(&given)) { // more cores than a set holds
         CPU_ZERO(&given);
         for (int k = 0; k < omp_get_num_procs() && k < CPU_SETSIZE; k++) CPU_SET(k, &given);
     }
-    if (c->size == 1) return within_task(CPU_COUNT(&given));
+    if (comm->size == 1) return within_task(CPU_COUNT(&given));
     MPI_Comm node;
     int rank, n;
-    MPI_Comm_split_type(c->mpi, MPI_COMM_TYPE_SHARED, c->rank, MPI_INFO_NULL, &node);
+    MPI_Comm_split_type(comm->mpi, MPI_COMM_TYPE_SHARED, comm->rank, MPI_INFO_NULL, &node);
     MPI_Comm_rank(node, &rank);
     MPI_Comm_size(node, &n);
     cpu_set_t *sets = bt_alloc((size_t)n, sizeof *sets);

@@ -36,7 +36,7 @@ void bt_launcher_forget(void);
 bool bt_cores_given(cpu_set_t *cores);
 
 /// Collective. Cores for this rank, at least 1: each that it was given counts as one part in as many as there are ranks
-/// of c that were given it, too; no more than the tasks of a Slurm step were promised.
-int bt_cores_share(const bt_comm *c);
+/// of `comm` that were given it, too; no more than the tasks of a Slurm step were promised.
+int bt_cores_share(const bt_comm *comm);
 
 #endif

@@ -8,17 +8,17 @@
 #define TERMINAL_INTERVAL 0.2
 #define CLEAR_TO_END "\x1b[K"
 
-void bt_progress_start(bt_progress *p, int64_t step)
+void bt_progress_start(bt_progress *progress, int64_t step)
 {
-    if (!p->out) p->out = stderr;
-    if (!p->clock) p->clock = bt_clock;
-    p->terminal = p->terminal || isatty(fileno(p->out));
-    p->started = p->last = p->clock();
-    p->first_step = p->step = step;
-    p->time = 0;
-    p->force_sum = 0;
-    p->n_force = 0;
-    p->drawn = false;
+    if (!progress->out) progress->out = stderr;
+    if (!progress->clock) progress->clock = bt_clock;
+    progress->terminal = progress->terminal || isatty(fileno(progress->out));
+    progress->started = progress->last = progress->clock();
+    progress->first_step = progress->step = step;
+    progress->time = 0;
+    progress->force_sum = 0;
+    progress->n_force = 0;
+    progress->drawn = false;
 }
 
 static const char *duration(char out[48], double seconds)
@@ -31,46 +31,47 @@ static const char *duration(char out[48], double seconds)
     return out;
 }
 
-void bt_progress_line(const bt_progress *p, char line[BT_PROGRESS_LINE])
+void bt_progress_line(const bt_progress *progress, char line[BT_PROGRESS_LINE])
 {
     char left[48];
-    const double rate = (double)(p->step - p->first_step) / bt_max(p->clock() - p->started, 1e-9);
-    const double percent = p->n_steps > 0 ? 100 * (double)p->step / (double)p->n_steps : 0;
-    const int n = snprintf(line, BT_PROGRESS_LINE, "%5.1f %%  t = %.6g s  %.4g steps/s  %s left", percent, p->time,
-                           rate, duration(left, (double)(p->n_steps - p->step) / rate));
-    if (p->n_force > 0)
+    const double rate =
+        (double)(progress->step - progress->first_step) / bt_max(progress->clock() - progress->started, 1e-9);
+    const double percent = progress->n_steps > 0 ? 100 * (double)progress->step / (double)progress->n_steps : 0;
+    const int n = snprintf(line, BT_PROGRESS_LINE, "%5.1f %%  t = %.6g s  %.4g steps/s  %s left", percent,
+                           progress->time, rate, duration(left, (double)(progress->n_steps - progress->step) / rate));
+    if (progress->n_force > 0)
         snprintf(line + n, BT_PROGRESS_LINE - (size_t)n, "  mean ice resistance so far %.4g N",
-                 p->force_sum / (double)p->n_force);
+                 progress->force_sum / (double)progress->n_force);
 }
 
-static void draw(bt_progress *p, double now)
+static void draw(bt_progress *progress, double now)
 {
     char line[BT_PROGRESS_LINE];
-    bt_progress_line(p, line);
-    fprintf(p->out, p->terminal ? "\r%s" CLEAR_TO_END : "%s\n", line);
-    fflush(p->out);
-    p->last = now;
-    p->drawn = true;
+    bt_progress_line(progress, line);
+    fprintf(progress->out, progress->terminal ? "\r%s" CLEAR_TO_END : "%s\n", line);
+    fflush(progress->out);
+    progress->last = now;
+    progress->drawn = true;
 }
 
-void bt_progress_step(bt_progress *p, int64_t step, double time, double ice_resistance)
+void bt_progress_step(bt_progress *progress, int64_t step, double time, double ice_resistance)
 {
-    p->step = step;
-    p->time = time;
+    progress->step = step;
+    progress->time = time;
     if (!isnan(ice_resistance)) {
-        p->force_sum += ice_resistance;
-        p->n_force++;
+        progress->force_sum += ice_resistance;
+        progress->n_force++;
     }
-    if (p->quiet) return;
-    const double now = p->clock(), interval = p->terminal ? TERMINAL_INTERVAL : p->interval;
-    if (now - p->last >= interval) draw(p, now);
+    if (progress->quiet) return;
+    const double now = progress->clock(), interval = progress->terminal ? TERMINAL_INTERVAL : progress->interval;
+    if (now - progress->last >= interval) draw(progress, now);
 }
 
-void bt_progress_end(bt_progress *p)
+void bt_progress_end(bt_progress *progress)
 {
-    if (p->drawn && p->terminal) {
-        fputs("\r" CLEAR_TO_END, p->out);
-        fflush(p->out);
+    if (progress->drawn && progress->terminal) {
+        fputs("\r" CLEAR_TO_END, progress->out);
+        fflush(progress->out);
     }
-    p->drawn = false;
+    progress->drawn = false;
 }

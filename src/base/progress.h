@@ -24,14 +24,14 @@ typedef struct bt_progress {
 } bt_progress;
 
 /// Begin at a step (not 0 when a run is resumed).
-void bt_progress_start(bt_progress *p, int64_t step);
+void bt_progress_start(bt_progress *progress, int64_t step);
 /// After a step: its number, the simulated time (s) and the ice resistance of the step (N; NaN without towed body).
 /// Costs one clock reading unless a line is due.
-void bt_progress_step(bt_progress *p, int64_t step, double time, double ice_resistance);
+void bt_progress_step(bt_progress *progress, int64_t step, double time, double ice_resistance);
 /// The line as it is now, without a line end; also of one that is quiet.
 enum { BT_PROGRESS_LINE = 200 };
-void bt_progress_line(const bt_progress *p, char line[BT_PROGRESS_LINE]);
+void bt_progress_line(const bt_progress *progress, char line[BT_PROGRESS_LINE]);
 /// Take the line off the terminal, so that the next output begins on an empty one.
-void bt_progress_end(bt_progress *p);
+void bt_progress_end(bt_progress *progress);
 
 #endif

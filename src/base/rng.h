@@ -32,46 +32,46 @@ typedef struct bt_rng {
 
 static inline bt_rng bt_rng_start(int64_t seed, bt_rng_purpose purpose, int64_t id)
 {
-    bt_rng r = {.left = 0};
-    r.key.v[0] = (uint64_t)seed;
-    r.key.v[1] = (uint64_t)purpose;
-    r.ctr.v[0] = (uint64_t)id;
-    return r;
+    bt_rng rng = {.left = 0};
+    rng.key.v[0] = (uint64_t)seed;
+    rng.key.v[1] = (uint64_t)purpose;
+    rng.ctr.v[0] = (uint64_t)id;
+    return rng;
 }
 
-static inline uint64_t bt_rng_bits(bt_rng *r)
+static inline uint64_t bt_rng_bits(bt_rng *rng)
 {
-    if (r->left == 0) {
-        r->block = philox4x64(r->ctr, r->key);
-        r->ctr.v[1]++;
-        r->left = 4;
+    if (rng->left == 0) {
+        rng->block = philox4x64(rng->ctr, rng->key);
+        rng->ctr.v[1]++;
+        rng->left = 4;
     }
-    return r->block.v[--r->left];
+    return rng->block.v[--rng->left];
 }
 
 /// Uniform in [0, 1), 53 bits.
-static inline double bt_rng_uniform(bt_rng *r) { return (double)(bt_rng_bits(r) >> 11) * 0x1p-53; }
+static inline double bt_rng_uniform(bt_rng *rng) { return (double)(bt_rng_bits(rng) >> 11) * 0x1p-53; }
 
 /// Standard normal by Box and Muller (1958); the sine twin is thrown away so that a draw costs two numbers always.
-static inline double bt_rng_normal(bt_rng *r)
+static inline double bt_rng_normal(bt_rng *rng)
 {
-    double u = 1 - bt_rng_uniform(r), v = bt_rng_uniform(r); // u in (0, 1]
+    double u = 1 - bt_rng_uniform(rng), v = bt_rng_uniform(rng); // u in (0, 1]
     return sqrt(-2 * bt_log(u)) * bt_cos(2 * BT_PI * v);
 }
 
 /// Gamma of shape k > 0 and scale 1: Marsaglia and Tsang 2000, ACM TOMS 26.
-static inline double bt_rng_gamma(bt_rng *r, double k)
+static inline double bt_rng_gamma(bt_rng *rng, double k)
 {
     if (k < 1) {
-        double g = bt_rng_gamma(r, k + 1);
-        return g * bt_pow(1 - bt_rng_uniform(r), 1 / k);
+        double g = bt_rng_gamma(rng, k + 1);
+        return g * bt_pow(1 - bt_rng_uniform(rng), 1 / k);
     }
     double d = k - 1.0 / 3, c = 1 / sqrt(9 * d);
     for (;;) {
-        double x = bt_rng_normal(r), v = 1 + c * x;
+        double x = bt_rng_normal(rng), v = 1 + c * x;
         if (v <= 0) continue;
         v = v * v * v;
-        if (bt_log(1 - bt_rng_uniform(r)) < 0.5 * x * x + d - d * v + d * bt_log(v)) return d * v;
+        if (bt_log(1 - bt_rng_uniform(rng)) < 0.5 * x * x + d - d * v + d * bt_log(v)) return d * v;
     }
 }
 

@@ -16,159 +16,161 @@ size_t bt_item_size(bt_item_type type)
     return size[type];
 }
 
-static size_t bytes_of(const bt_item *i) { return (size_t)i->n * (size_t)i->width * bt_item_size(i->type); }
+static size_t bytes_of(const bt_item *item) { return (size_t)item->n * (size_t)item->width * bt_item_size(item->type); }
 
 // --- adding ----------------------------------------------------------------------------------------------------------
 
-void *bt_snapshot_begin(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width)
+void *bt_snapshot_begin(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width)
 {
-    if (s->n == s->cap) s->item = bt_realloc(s->item, (size_t)(s->cap = s->cap ? 2 * s->cap : 64), sizeof *s->item);
-    bt_item *i = &s->item[s->n++];
-    *i = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
-    s->rows = 0;
-    if (s->sink) s->sink->begin(s);
-    else i->data = bt_alloc(bytes_of(i), 1);
-    return i->data;
+    if (snap->n == snap->cap)
+        snap->item = bt_realloc(snap->item, (size_t)(snap->cap = snap->cap ? 2 * snap->cap : 64), sizeof *snap->item);
+    bt_item *item = &snap->item[snap->n++];
+    *item = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
+    snap->rows = 0;
+    if (snap->sink) snap->sink->begin(snap);
+    else item->data = bt_alloc(bytes_of(item), 1);
+    return item->data;
 }
 
-void bt_snapshot_put(bt_snapshot *s, int64_t n, const void *rows)
+void bt_snapshot_put(bt_snapshot *snap, int64_t n, const void *rows)
 {
-    const bt_item *i = &s->item[s->n - 1];
-    const size_t row = (size_t)i->width * bt_item_size(i->type);
-    if (s->sink) s->sink->put(s, n, rows);
-    else if (n > 0) memcpy((char *)i->data + (size_t)s->rows * row, rows, (size_t)n * row);
-    s->rows += n;
+    const bt_item *item = &snap->item[snap->n - 1];
+    const size_t row = (size_t)item->width * bt_item_size(item->type);
+    if (snap->sink) snap->sink->put(snap, n, rows);
+    else if (n > 0) memcpy((char *)item->data + (size_t)snap->rows * row, rows, (size_t)n * row);
+    snap->rows += n;
 }
 
-void bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data)
+void bt_snapshot_add(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width, const void *data)
 {
-    bt_snapshot_begin(s, name, type, n, width);
-    bt_snapshot_put(s, n, data);
+    bt_snapshot_begin(snap, name, type, n, width);
+    bt_snapshot_put(snap, n, data);
 }
 
-void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text)
+void bt_snapshot_add_text(bt_snapshot *snap, const char *name, const char *text)
 {
-    bt_snapshot_add(s, name, BT_ITEM_TEXT, (int64_t)strlen(text) + 1, 1, text);
+    bt_snapshot_add(snap, name, BT_ITEM_TEXT, (int64_t)strlen(text) + 1, 1, text);
 }
-void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value)
+void bt_snapshot_add_int(bt_snapshot *snap, const char *name, int64_t value)
 {
-    bt_snapshot_add(s, name, BT_ITEM_I64, 1, 1, &value);
+    bt_snapshot_add(snap, name, BT_ITEM_I64, 1, 1, &value);
 }
-void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value)
+void bt_snapshot_add_real(bt_snapshot *snap, const char *name, double value)
 {
-    bt_snapshot_add(s, name, BT_ITEM_F64, 1, 1, &value);
+    bt_snapshot_add(snap, name, BT_ITEM_F64, 1, 1, &value);
 }
 
-void bt_snapshot_begin_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n)
+void bt_snapshot_begin_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n)
 {
     char name[128];
     snprintf(name, sizeof name, "%s/%s", group, row->name);
-    bt_snapshot_begin(s, name, row->type, n, row->width);
-    bt_item *i = &s->item[s->n - 1];
-    i->units = row->units, i->meaning = row->meaning, i->axes = row->axes;
+    bt_snapshot_begin(snap, name, row->type, n, row->width);
+    bt_item *item = &snap->item[snap->n - 1];
+    item->units = row->units, item->meaning = row->meaning, item->axes = row->axes;
 }
 
-void bt_snapshot_add_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, const void *data)
+void bt_snapshot_add_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n, const void *data)
 {
-    bt_snapshot_begin_row(s, group, row, n);
-    bt_snapshot_put(s, n, data);
+    bt_snapshot_begin_row(snap, group, row, n);
+    bt_snapshot_put(snap, n, data);
 }
 
-void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base)
+void bt_snapshot_add_rows(bt_snapshot *snap, const char *group, const bt_state_row *row, int n_rows, const void *base)
 {
     for (int k = 0; k < n_rows; k++)
-        bt_snapshot_add_row(s, group, &row[k], 1, (const char *)base + row[k].offset);
+        bt_snapshot_add_row(snap, group, &row[k], 1, (const char *)base + row[k].offset);
 }
 
-void bt_snapshot_free(bt_snapshot *s)
+void bt_snapshot_free(bt_snapshot *snap)
 {
-    if (s->sink) s->sink->drop(s);
-    for (int k = 0; k < s->n; k++) {
-        free(s->item[k].name);
-        free(s->item[k].data);
+    if (snap->sink) snap->sink->drop(snap);
+    for (int k = 0; k < snap->n; k++) {
+        free(snap->item[k].name);
+        free(snap->item[k].data);
     }
-    free(s->item);
-    *s = (bt_snapshot){0};
+    free(snap->item);
+    *snap = (bt_snapshot){0};
 }
 
 // --- taking ----------------------------------------------------------------------------------------------------------
 
-const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name)
+const bt_item *bt_snapshot_find(const bt_snapshot *snap, const char *name)
 {
-    for (int k = 0; k < s->n; k++)
-        if (!strcmp(s->item[k].name, name)) return &s->item[k];
+    for (int k = 0; k < snap->n; k++)
+        if (!strcmp(snap->item[k].name, name)) return &snap->item[k];
     return NULL;
 }
 
-static void complain(bt_snapshot *s, const char *name, const char *what)
+static void complain(bt_snapshot *snap, const char *name, const char *what)
 {
-    if (!s->faulty && s->err)
+    if (!snap->faulty && snap->err)
         bt_errors_add(
-            s->err,
+            snap->err,
             "%s: /%s %s; it was written by another version of the program: go on with that one, or start the run anew",
-            s->path ? s->path : "checkpoint", name, what);
-    s->faulty = true;
+            snap->path ? snap->path : "checkpoint", name, what);
+    snap->faulty = true;
 }
 
-void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, const char *what)
+void bt_snapshot_want(bt_snapshot *snap, bool good, const char *name, int64_t row, const char *what)
 {
     if (good) return;
     char where[32] = "";
     if (row >= 0) snprintf(where, sizeof where, ", row %" PRId64 ",", row);
-    if (!s->faulty && s->err)
-        bt_errors_add(s->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew",
-                      s->path ? s->path : "checkpoint", name, where, what);
-    s->faulty = true;
+    if (!snap->faulty && snap->err)
+        bt_errors_add(snap->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew",
+                      snap->path ? snap->path : "checkpoint", name, where, what);
+    snap->faulty = true;
 }
 
-static bool yes_and_no(const bt_item *i)
+static bool yes_and_no(const bt_item *item)
 {
-    for (int64_t k = 0; k < i->n * i->width; k++)
-        if (((const uint8_t *)i->data)[k] > 1) return false;
+    for (int64_t k = 0; k < item->n * item->width; k++)
+        if (((const uint8_t *)item->data)[k] > 1) return false;
     return true;
 }
 
-static const bt_item *demand(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width)
+static const bt_item *demand(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width)
 {
-    const bt_item *i = bt_snapshot_find(s, name);
-    if (!i) complain(s, name, "is missing");
-    else if (i->type != type || i->width != width || (n >= 0 && i->n != n))
-        complain(s, name, "has another shape than expected");
-    else if (type == BT_ITEM_U8 && !yes_and_no(i)) bt_snapshot_want(s, false, name, -1, "holds more than 0 and 1");
-    else return i;
+    const bt_item *item = bt_snapshot_find(snap, name);
+    if (!item) complain(snap, name, "is missing");
+    else if (item->type != type || item->width != width || (n >= 0 && item->n != n))
+        complain(snap, name, "has another shape than expected");
+    else if (type == BT_ITEM_U8 && !yes_and_no(item))
+        bt_snapshot_want(snap, false, name, -1, "holds more than 0 and 1");
+    else return item;
     return NULL;
 }
 
-int64_t bt_snapshot_rows(bt_snapshot *s, const char *name)
+int64_t bt_snapshot_rows(bt_snapshot *snap, const char *name)
 {
-    const bt_item *i = bt_snapshot_find(s, name);
-    if (!i) complain(s, name, "is missing");
-    return i ? i->n : 0;
+    const bt_item *item = bt_snapshot_find(snap, name);
+    if (!item) complain(snap, name, "is missing");
+    return item ? item->n : 0;
 }
 
-void bt_snapshot_take(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, void *to)
+void bt_snapshot_take(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width, void *to)
 {
-    const bt_item *i = demand(s, name, type, n, width);
-    if (i && bytes_of(i)) memcpy(to, i->data, bytes_of(i));
+    const bt_item *item = demand(snap, name, type, n, width);
+    if (item && bytes_of(item)) memcpy(to, item->data, bytes_of(item));
 }
 
-const char *bt_snapshot_text(bt_snapshot *s, const char *name)
+const char *bt_snapshot_text(bt_snapshot *snap, const char *name)
 {
-    const bt_item *i = demand(s, name, BT_ITEM_TEXT, -1, 1);
-    return i ? i->data : "";
+    const bt_item *item = demand(snap, name, BT_ITEM_TEXT, -1, 1);
+    return item ? item->data : "";
 }
 
-int64_t bt_snapshot_int(bt_snapshot *s, const char *name)
+int64_t bt_snapshot_int(bt_snapshot *snap, const char *name)
 {
     int64_t x = 0;
-    bt_snapshot_take(s, name, BT_ITEM_I64, 1, 1, &x);
+    bt_snapshot_take(snap, name, BT_ITEM_I64, 1, 1, &x);
     return x;
 }
 
-double bt_snapshot_real(bt_snapshot *s, const char *name)
+double bt_snapshot_real(bt_snapshot *snap, const char *name)
 {
     double x = NAN;
-    bt_snapshot_take(s, name, BT_ITEM_F64, 1, 1, &x);
+    bt_snapshot_take(snap, name, BT_ITEM_F64, 1, 1, &x);
     return x;
 }
 
@@ -185,19 +187,19 @@ static bool sound(bt_row_check check, double x)
     }
 }
 
-static double number_of(const bt_item *i, int64_t at)
+static double number_of(const bt_item *item, int64_t at)
 {
-    switch (i->type) {
-    case BT_ITEM_F64: return ((const double *)i->data)[at];
-    case BT_ITEM_I64: return (double)((const int64_t *)i->data)[at];
-    case BT_ITEM_I32: return ((const int32_t *)i->data)[at];
-    case BT_ITEM_U32: return ((const uint32_t *)i->data)[at];
-    case BT_ITEM_U16: return ((const uint16_t *)i->data)[at];
-    default: return ((const uint8_t *)i->data)[at];
+    switch (item->type) {
+    case BT_ITEM_F64: return ((const double *)item->data)[at];
+    case BT_ITEM_I64: return (double)((const int64_t *)item->data)[at];
+    case BT_ITEM_I32: return ((const int32_t *)item->data)[at];
+    case BT_ITEM_U32: return ((const uint32_t *)item->data)[at];
+    case BT_ITEM_U16: return ((const uint16_t *)item->data)[at];
+    default: return ((const uint8_t *)item->data)[at];
     }
 }
 
-void bt_snapshot_take_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, void *to)
+void bt_snapshot_take_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n, void *to)
 {
     static const char *const what[BT_ROW_CHECKS] = {
         [BT_ROW_FINITE] = "is not finite", [BT_ROW_NOT_NEGATIVE] = "is negative or not finite",
@@ -205,54 +207,55 @@ void bt_snapshot_take_row(bt_snapshot *s, const char *group, const bt_state_row 
         [BT_ROW_FAR] = "is out of range",  [BT_ROW_YES_OR_NO] = "is neither 0 nor 1"};
     char name[128];
     snprintf(name, sizeof name, "%s/%s", group, row->name);
-    bt_snapshot_take(s, name, row->type, n, row->width, to);
-    const bt_item *i = bt_snapshot_find(s, name);
-    for (int64_t k = 0; row->check && k < n * row->width && !s->faulty; k++)
-        bt_snapshot_want(s, sound(row->check, number_of(i, k)), name, n > 1 ? k / row->width : -1, what[row->check]);
+    bt_snapshot_take(snap, name, row->type, n, row->width, to);
+    const bt_item *item = bt_snapshot_find(snap, name);
+    for (int64_t k = 0; row->check && k < n * row->width && !snap->faulty; k++)
+        bt_snapshot_want(snap, sound(row->check, number_of(item, k)), name, n > 1 ? k / row->width : -1,
+                         what[row->check]);
 }
 
-void bt_snapshot_take_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, void *base)
+void bt_snapshot_take_rows(bt_snapshot *snap, const char *group, const bt_state_row *row, int n_rows, void *base)
 {
-    for (int k = 0; k < n_rows; k++) bt_snapshot_take_row(s, group, &row[k], 1, (char *)base + row[k].offset);
+    for (int k = 0; k < n_rows; k++) bt_snapshot_take_row(snap, group, &row[k], 1, (char *)base + row[k].offset);
 }
 
-void *bt_snapshot_copy(bt_snapshot *s, const char *name, bt_item_type type, int width, int64_t *n)
+void *bt_snapshot_copy(bt_snapshot *snap, const char *name, bt_item_type type, int width, int64_t *n)
 {
-    const bt_item *i = demand(s, name, type, -1, width);
-    *n = i ? i->n : 0;
-    void *copy = bt_alloc(i ? bytes_of(i) : 0, 1);
-    if (i && bytes_of(i)) memcpy(copy, i->data, bytes_of(i));
+    const bt_item *item = demand(snap, name, type, -1, width);
+    *n = item ? item->n : 0;
+    void *copy = bt_alloc(item ? bytes_of(item) : 0, 1);
+    if (item && bytes_of(item)) memcpy(copy, item->data, bytes_of(item));
     return copy;
 }
 
 // --- sharing ---------------------------------------------------------------------------------------------------------
 
-void bt_snapshot_share(const bt_comm *c, bt_snapshot *s)
+void bt_snapshot_share(const bt_comm *comm, bt_snapshot *snap)
 {
-    if (c->size == 1) return;
-    int64_t n = s->n;
-    bt_comm_bcast(c, &n, sizeof n);
+    if (comm->size == 1) return;
+    int64_t n = snap->n;
+    bt_comm_bcast(comm, &n, sizeof n);
     for (int64_t k = 0; k < n; k++) {
         int64_t head[4] = {0}; // name, type, rows, width
-        if (c->rank == 0) {
-            const bt_item *i = &s->item[k];
-            head[0] = (int64_t)strlen(i->name) + 1, head[1] = i->type, head[2] = i->n, head[3] = i->width;
+        if (comm->rank == 0) {
+            const bt_item *item = &snap->item[k];
+            head[0] = (int64_t)strlen(item->name) + 1, head[1] = item->type, head[2] = item->n, head[3] = item->width;
         }
-        bt_comm_bcast(c, head, sizeof head);
+        bt_comm_bcast(comm, head, sizeof head);
         char name[160] = "";
-        if (c->rank == 0) snprintf(name, sizeof name, "%s", s->item[k].name);
-        bt_comm_bcast(c, name, sizeof name);
-        if (c->rank != 0) bt_snapshot_begin(s, name, (bt_item_type)head[1], head[2], (int)head[3]);
-        bt_comm_bcast(c, s->item[k].data, bytes_of(&s->item[k]));
+        if (comm->rank == 0) snprintf(name, sizeof name, "%s", snap->item[k].name);
+        bt_comm_bcast(comm, name, sizeof name);
+        if (comm->rank != 0) bt_snapshot_begin(snap, name, (bt_item_type)head[1], head[2], (int)head[3]);
+        bt_comm_bcast(comm, snap->item[k].data, bytes_of(&snap->item[k]));
     }
 }
 
 // --- comparing -------------------------------------------------------------------------------------------------------
 
-const char *bt_item_number(const bt_item *i, int64_t at, char out[40])
+const char *bt_item_number(const bt_item *item, int64_t at, char out[40])
 {
-    const void *d = i->data;
-    switch (i->type) {
+    const void *d = item->data;
+    switch (item->type) {
     case BT_ITEM_F64: snprintf(out, 40, "%.17g", ((const double *)d)[at]); break;
     case BT_ITEM_I64: snprintf(out, 40, "%" PRId64, ((const int64_t *)d)[at]); break;
     case BT_ITEM_I32: snprintf(out, 40, "%" PRId32, ((const int32_t *)d)[at]); break;
@@ -303,7 +306,10 @@ static bool differ(const bt_item *a, const bt_item *b, char out[400])
     return true;
 }
 
-static bool compared(const bt_item *i) { return strncmp(i->name, "about/", 6) && strncmp(i->name, "clock/", 6); }
+static bool compared(const bt_item *item)
+{
+    return strncmp(item->name, "about/", 6) && strncmp(item->name, "clock/", 6);
+}
 
 bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400])
 {

@@ -46,9 +46,9 @@ typedef struct bt_snapshot {
 
 /// What takes the arrays of a set in place of memory.
 typedef struct bt_snapshot_sink {
-    void (*begin)(bt_snapshot *s); ///< the array added last
-    void (*put)(bt_snapshot *s, int64_t n, const void *rows); ///< the next rows of it
-    void (*drop)(bt_snapshot *s); ///< the set is given up: nothing of it stays
+    void (*begin)(bt_snapshot *snap); ///< the array added last
+    void (*put)(bt_snapshot *snap, int64_t n, const void *rows); ///< the next rows of it
+    void (*drop)(bt_snapshot *snap); ///< the set is given up: nothing of it stays
 } bt_snapshot_sink;
 
 /// What each number of a member must be by itself: COUNT from 0 to 1e15, SHARE from 0 to 1, FAR within 1e9 of 0.
@@ -76,62 +76,62 @@ typedef struct bt_state_row {
 
 size_t bt_item_size(bt_item_type type); ///< bytes of one number
 /// number `at` of an array in digits that give it back; returns out
-const char *bt_item_number(const bt_item *i, int64_t at, char out[40]);
+const char *bt_item_number(const bt_item *item, int64_t at, char out[40]);
 
 /// Add an array [n][width], to be filled by bt_snapshot_put, once at least. Returns where it lies, zeros; NULL in a
 /// file.
-void *bt_snapshot_begin(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width);
+void *bt_snapshot_begin(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width);
 /// The next n rows of the array added last.
-void bt_snapshot_put(bt_snapshot *s, int64_t n, const void *rows);
+void bt_snapshot_put(bt_snapshot *snap, int64_t n, const void *rows);
 /// Add an array [n][width]; data are copied.
-void bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data);
-void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text);
-void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value);
-void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value);
+void bt_snapshot_add(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width, const void *data);
+void bt_snapshot_add_text(bt_snapshot *snap, const char *name, const char *text);
+void bt_snapshot_add_int(bt_snapshot *snap, const char *name, int64_t value);
+void bt_snapshot_add_real(bt_snapshot *snap, const char *name, double value);
 /// The same by a row: [n][width], group/name.
-void bt_snapshot_begin_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n);
-void bt_snapshot_add_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, const void *data);
+void bt_snapshot_begin_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n);
+void bt_snapshot_add_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n, const void *data);
 /// Add the members of a struct, group/name each.
-void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base);
+void bt_snapshot_add_rows(bt_snapshot *snap, const char *group, const bt_state_row *row, int n_rows, const void *base);
 
 /// The array of that name, or NULL.
-const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name);
+const bt_item *bt_snapshot_find(const bt_snapshot *snap, const char *name);
 /// Rows of the array of that name; 0 and a complaint when it is missing.
-int64_t bt_snapshot_rows(bt_snapshot *s, const char *name);
+int64_t bt_snapshot_rows(bt_snapshot *snap, const char *name);
 /// Copy an array that must be there with this type and shape; otherwise complain, and leave `to`.
-void bt_snapshot_take(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, void *to);
+void bt_snapshot_take(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width, void *to);
 /// Complain unless good: what the array holds, in its row (from 0; -1: as a whole), is what no run leaves; `what`
 /// completes "/name, row 3, ...".
-void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, const char *what);
-const char *bt_snapshot_text(bt_snapshot *s, const char *name); ///< "" and a complaint when it is missing
-int64_t bt_snapshot_int(bt_snapshot *s, const char *name);
-double bt_snapshot_real(bt_snapshot *s, const char *name);
-void bt_snapshot_take_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, void *base);
+void bt_snapshot_want(bt_snapshot *snap, bool good, const char *name, int64_t row, const char *what);
+const char *bt_snapshot_text(bt_snapshot *snap, const char *name); ///< "" and a complaint when it is missing
+int64_t bt_snapshot_int(bt_snapshot *snap, const char *name);
+double bt_snapshot_real(bt_snapshot *snap, const char *name);
+void bt_snapshot_take_rows(bt_snapshot *snap, const char *group, const bt_state_row *row, int n_rows, void *base);
 /// [n][width], as bt_snapshot_take; complains of a number that its check does not hold for.
-void bt_snapshot_take_row(bt_snapshot *s, const char *group, const bt_state_row *row, int64_t n, void *to);
+void bt_snapshot_take_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n, void *to);
 /// In new memory, [rows][width]: as bt_snapshot_take.
-void *bt_snapshot_copy(bt_snapshot *s, const char *name, bt_item_type type, int width, int64_t *n);
+void *bt_snapshot_copy(bt_snapshot *snap, const char *name, bt_item_type type, int width, int64_t *n);
 
 /// Collective. The snapshot of rank 0 to all ranks; on others it is empty before.
-void bt_snapshot_share(const bt_comm *c, bt_snapshot *s);
+void bt_snapshot_share(const bt_comm *comm, bt_snapshot *snap);
 
 /// The first difference between two states, in words; false when there is none.
 bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400]);
 
-void bt_snapshot_free(bt_snapshot *s);
+void bt_snapshot_free(bt_snapshot *snap);
 
 /// What an array without a row is, its units (NULL: it is text) and its axes, as in h5dataset.h; NULL where that is not
 /// known.
 typedef const char *bt_item_meaning(const char *name, const char **units, const char **axes);
 
-/// An HDF5 file, which what is added to s from here on goes to, with what each array is unless meaning is NULL. s is
-/// empty before. What fails here or on the way, bt_snapshot_close returns.
-void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err);
+/// An HDF5 file, which what is added to `snap` from here on goes to, with what each array is unless meaning is NULL.
+/// `snap` is empty before. What fails here or on the way, bt_snapshot_close returns.
+void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *meaning, bt_errors *err);
 /// Nothing more comes: the file is completed, protected by a checksum, and closed.
-void bt_snapshot_end(bt_snapshot *s, bt_errors *err);
+void bt_snapshot_end(bt_snapshot *snap, bt_errors *err);
 /// The same, unless it has been, and the file stays: without this call bt_snapshot_free removes it. Errors: BT_ERR_IO.
-bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err);
+bt_status bt_snapshot_close(bt_snapshot *snap, bt_errors *err);
 /// A file in memory. Errors as bt_checksum_check, and BT_ERR_IO.
-bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
+bt_status bt_snapshot_read(bt_snapshot *snap, const char *path, bt_errors *err);
 
 #endif

@@ -27,14 +27,14 @@ static hid_t memory_type(bt_item_type type)
 }
 
 /// Make the group of item k where it is the first of it.
-static void enter(bt_h5 *h, const bt_snapshot *s, int k)
+static void enter(bt_h5 *h5, const bt_snapshot *snap, int k)
 {
-    const size_t length = strcspn(s->item[k].name, "/") + 1;
+    const size_t length = strcspn(snap->item[k].name, "/") + 1;
     for (int j = 0; j < k; j++)
-        if (!strncmp(s->item[j].name, s->item[k].name, length)) return;
+        if (!strncmp(snap->item[j].name, snap->item[k].name, length)) return;
     char group[64];
-    snprintf(group, sizeof group, "/%.*s", (int)length - 1, s->item[k].name);
-    bt_h5_group(h, group);
+    snprintf(group, sizeof group, "/%.*s", (int)length - 1, snap->item[k].name);
+    bt_h5_group(h5, group);
 }
 
 struct bt_snapshot_file {
@@ -47,107 +47,109 @@ struct bt_snapshot_file {
 };
 
 /// By its row, or by what the file was begun with.
-static const char *meaning_of(const struct bt_snapshot_file *f, const bt_item *i, const char **units, const char **axes)
+static const char *meaning_of(const struct bt_snapshot_file *file, const bt_item *item, const char **units,
+                              const char **axes)
 {
-    if (!i->meaning) return f->meaning ? f->meaning(i->name, units, axes) : NULL;
-    *units = i->units, *axes = i->axes;
-    return i->meaning;
+    if (!item->meaning) return file->meaning ? file->meaning(item->name, units, axes) : NULL;
+    *units = item->units, *axes = item->axes;
+    return item->meaning;
 }
 
 /// Some rows, or all at once, which takes HDF5 a third of the calls.
-static void put_rows(bt_snapshot *s, int64_t n, const void *rows)
+static void put_rows(bt_snapshot *snap, int64_t n, const void *rows)
 {
-    struct bt_snapshot_file *f = s->file;
-    const bt_item *i = &s->item[s->n - 1];
-    const hsize_t size[] = {(hsize_t)i->n, (hsize_t)i->width};
+    struct bt_snapshot_file *file = snap->file;
+    const bt_item *item = &snap->item[snap->n - 1];
+    const hsize_t size[] = {(hsize_t)item->n, (hsize_t)item->width};
     char name[160];
-    snprintf(name, sizeof name, "/%s", i->name);
-    if (i->type == BT_ITEM_TEXT) {
-        bt_h5_write_text(&f->h, name, rows);
-    } else if (n == i->n) {
-        bt_h5_write(&f->h, name, memory_type(i->type), size[0], i->width > 1 ? size[1] : 0, rows);
+    snprintf(name, sizeof name, "/%s", item->name);
+    if (item->type == BT_ITEM_TEXT) {
+        bt_h5_write_text(&file->h, name, rows);
+    } else if (n == item->n) {
+        bt_h5_write(&file->h, name, memory_type(item->type), size[0], item->width > 1 ? size[1] : 0, rows);
     } else {
-        if (s->rows == 0)
-            f->dataset = bt_h5_dataset(&f->h, name, memory_type(i->type), i->width > 1 ? 2 : 1, size, 0);
-        bt_h5_write_rows(&f->h, f->dataset, memory_type(i->type), false, 0, (hsize_t)s->rows, (hsize_t)n, rows);
+        if (snap->rows == 0)
+            file->dataset = bt_h5_dataset(&file->h, name, memory_type(item->type), item->width > 1 ? 2 : 1, size, 0);
+        bt_h5_write_rows(&file->h, file->dataset, memory_type(item->type), false, 0, (hsize_t)snap->rows, (hsize_t)n,
+                         rows);
     }
 }
 
 /// The last of the first n arrays has all its rows.
-static void end_array(bt_snapshot *s, int n)
+static void end_array(bt_snapshot *snap, int n)
 {
-    struct bt_snapshot_file *f = s->file;
+    struct bt_snapshot_file *file = snap->file;
     if (n == 0) return;
-    const bt_item *i = &s->item[n - 1];
-    if (f->dataset >= 0) bt_h5_check(&f->h, H5Dclose(f->dataset) >= 0); // small data go to the file only now
-    f->dataset = -1;
-    const char *units, *axes, *text = meaning_of(f, i, &units, &axes);
+    const bt_item *item = &snap->item[n - 1];
+    if (file->dataset >= 0) bt_h5_check(&file->h, H5Dclose(file->dataset) >= 0); // small data go to the file only now
+    file->dataset = -1;
+    const char *units, *axes, *text = meaning_of(file, item, &units, &axes);
     if (!text) return;
     char name[160];
-    snprintf(name, sizeof name, "/%s", i->name);
-    if (units) bt_h5_units(&f->h, name, units);
-    bt_h5_attr_text(&f->h, name, "long_name", text);
+    snprintf(name, sizeof name, "/%s", item->name);
+    if (units) bt_h5_units(&file->h, name, units);
+    bt_h5_attr_text(&file->h, name, "long_name", text);
 }
 
-static void begin_array(bt_snapshot *s)
+static void begin_array(bt_snapshot *snap)
 {
-    end_array(s, s->n - 1);
-    enter(&s->file->h, s, s->n - 1);
+    end_array(snap, snap->n - 1);
+    enter(&snap->file->h, snap, snap->n - 1);
 }
 
-void bt_snapshot_end(bt_snapshot *s, bt_errors *err)
+void bt_snapshot_end(bt_snapshot *snap, bt_errors *err)
 {
-    struct bt_snapshot_file *f = s->file;
-    if (f->ended) return;
-    f->ended = true;
-    f->h.err = err;
-    end_array(s, s->n);
+    struct bt_snapshot_file *file = snap->file;
+    if (file->ended) return;
+    file->ended = true;
+    file->h.err = err;
+    end_array(snap, snap->n);
     // The axes last: a coordinate such as /history/time may follow what it belongs to.
-    for (int k = 0; k < s->n; k++) {
+    for (int k = 0; k < snap->n; k++) {
         char name[160];
         const char *units, *axes;
-        if (s->item[k].type == BT_ITEM_TEXT || !meaning_of(f, &s->item[k], &units, &axes)) continue;
-        snprintf(name, sizeof name, "/%s", s->item[k].name);
-        bt_h5_axes(&f->h, name, axes);
+        if (snap->item[k].type == BT_ITEM_TEXT || !meaning_of(file, &snap->item[k], &units, &axes)) continue;
+        snprintf(name, sizeof name, "/%s", snap->item[k].name);
+        bt_h5_axes(&file->h, name, axes);
     }
-    f->status = bt_h5_close(&f->h);
-    if (f->status == BT_OK) f->status = bt_checksum_write(f->path, BT_CHECKSUM_CHECKPOINT, err);
+    file->status = bt_h5_close(&file->h);
+    if (file->status == BT_OK) file->status = bt_checksum_write(file->path, BT_CHECKSUM_CHECKPOINT, err);
 }
 
-static void release(bt_snapshot *s, bool keep)
+static void release(bt_snapshot *snap, bool keep)
 {
-    if (!keep) unlink(s->file->path);
-    free(s->file->path);
-    free(s->file);
-    s->file = NULL;
-    s->sink = NULL;
+    if (!keep) unlink(snap->file->path);
+    free(snap->file->path);
+    free(snap->file);
+    snap->file = NULL;
+    snap->sink = NULL;
 }
 
-bt_status bt_snapshot_close(bt_snapshot *s, bt_errors *err)
+bt_status bt_snapshot_close(bt_snapshot *snap, bt_errors *err)
 {
-    bt_snapshot_end(s, err);
-    const bt_status status = s->file->status;
-    release(s, status == BT_OK);
+    bt_snapshot_end(snap, err);
+    const bt_status status = snap->file->status;
+    release(snap, status == BT_OK);
     return status;
 }
 
-static void drop(bt_snapshot *s)
+static void drop(bt_snapshot *snap)
 {
     bt_errors unheard = {0};
-    if (s->file->dataset >= 0) H5Dclose(s->file->dataset);
-    s->file->h.err = &unheard;
-    if (!s->file->ended) bt_h5_close(&s->file->h);
+    if (snap->file->dataset >= 0) H5Dclose(snap->file->dataset);
+    snap->file->h.err = &unheard;
+    if (!snap->file->ended) bt_h5_close(&snap->file->h);
     bt_errors_free(&unheard);
-    release(s, false);
+    release(snap, false);
 }
 
-void bt_snapshot_create(bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err)
+void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *meaning, bt_errors *err)
 {
     static const bt_snapshot_sink sink = {.begin = begin_array, .put = put_rows, .drop = drop};
-    s->sink = &sink;
-    struct bt_snapshot_file *f = s->file = bt_alloc(1, sizeof *f);
-    *f = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
-    if (bt_h5_create(&f->h, path, err) == BT_OK) bt_h5_describe_file(&f->h, NULL);
+    snap->sink = &sink;
+    struct bt_snapshot_file *file = snap->file = bt_alloc(1, sizeof *file);
+    *file = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
+    if (bt_h5_create(&file->h, path, err) == BT_OK) bt_h5_describe_file(&file->h, NULL);
 }
 
 enum { MOST_COLUMNS = 1000 };
@@ -196,7 +198,7 @@ static bool is_name(const char *name) { return name[strspn(name, "abcdefghijklmn
 
 static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *data)
 {
-    bt_snapshot *s = data;
+    bt_snapshot *snap = data;
     (void)info; // links have been refused: bt_h5_open
     const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
     herr_t result = o < 0 ? -1 : 0;
@@ -209,7 +211,7 @@ static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *
         if (length < 2 || length >= (ssize_t)sizeof full || !is_name(full) || !describe(o, &type, &n, &width)) {
             result = -1;
         } else {
-            void *to = bt_snapshot_begin(s, full + 1, type, n, width);
+            void *to = bt_snapshot_begin(snap, full + 1, type, n, width);
             const hid_t stored = H5Dget_type(o);
             if (n * width > 0 &&
                 H5Dread(o, type == BT_ITEM_TEXT ? stored : memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, to) < 0)
@@ -237,14 +239,14 @@ static herr_t take_group(hid_t file, const char *name, const H5L_info_t *info, v
     return H5Literate_by_name(file, name, H5_INDEX_NAME, H5_ITER_INC, NULL, take, data, H5P_DEFAULT);
 }
 
-bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err)
+bt_status bt_snapshot_read(bt_snapshot *snap, const char *path, bt_errors *err)
 {
-    *s = (bt_snapshot){.path = path, .err = err};
-    bt_h5_reader r;
-    if (bt_h5_open(&r, path, BT_CHECKSUM_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
-    if (H5Literate(r.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, s) < 0)
-        bt_h5_fail(&r, "holds what this program does not write; use the program that wrote it");
-    const bt_status status = bt_h5_end(&r);
-    if (status != BT_OK) bt_snapshot_free(s);
+    *snap = (bt_snapshot){.path = path, .err = err};
+    bt_h5_reader reader;
+    if (bt_h5_open(&reader, path, BT_CHECKSUM_CHECKPOINT, err) != BT_OK) return bt_h5_end(&reader);
+    if (H5Literate(reader.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, snap) < 0)
+        bt_h5_fail(&reader, "holds what this program does not write; use the program that wrote it");
+    const bt_status status = bt_h5_end(&reader);
+    if (status != BT_OK) bt_snapshot_free(snap);
     return status;
 }

@@ -95,42 +95,42 @@ static double slow_variance(const double *z, int count, int64_t n, int from, int
 
 bt_mean bt_stats_mean(const double *x, int64_t n)
 {
-    bt_mean r = {.mean = NAN, .sd = NAN, .se = NAN, .low = NAN, .high = NAN, .tau = 0.5, .n_eff = (double)n, .n = n};
-    if (n < 1) return r;
-    r.mean = mean_of(x, n);
-    if (n < 2) return r;
+    bt_mean mean = {.mean = NAN, .sd = NAN, .se = NAN, .low = NAN, .high = NAN, .tau = 0.5, .n_eff = (double)n, .n = n};
+    if (n < 1) return mean;
+    mean.mean = mean_of(x, n);
+    if (n < 2) return mean;
 
     double sum = 0, spread = 0;
     for (int64_t i = 0; i < n; i++) {
-        sum += (x[i] - r.mean) * (x[i] - r.mean);
+        sum += (x[i] - mean.mean) * (x[i] - mean.mean);
         spread = bt_max(spread, fabs(x[i] - x[0]));
     }
-    r.sd = sqrt(sum / (double)(n - 1));
+    mean.sd = sqrt(sum / (double)(n - 1));
     if (spread == 0 && isfinite(sum)) { // a constant series: the rounding of its mean is no fluctuation
-        r.mean = r.low = r.high = x[0];
-        r.sd = r.se = 0;
+        mean.mean = mean.low = mean.high = x[0];
+        mean.sd = mean.se = 0;
     } else if (isfinite(sum)) {
         double z[BATCHES];
-        const int count = batches_of(x, n, r.mean, BATCHES, z), most = count - 1;
+        const int count = batches_of(x, n, mean.mean, BATCHES, z), most = count - 1;
         const double few = slow_variance(z, count, n, 1, most < FEW ? most : FEW),
                      more = slow_variance(z, count, n, 1, most < WAVES ? most : WAVES);
         // One sample more or less at the end always moves the mean by about sd/n, also that of a series that
         // alternates.
-        r.se = sqrt(bt_max(bt_max(few, more) / (double)n, r.sd * r.sd / ((double)n * (double)n)));
-        r.low = r.mean - FACTOR * r.se;
-        r.high = r.mean + FACTOR * r.se;
-        r.tau = bt_max(0.5, (double)n * variance_of_batches(z, count, 1) / count / (2 * r.sd * r.sd));
-        r.n_eff = (double)n / (2 * r.tau);
+        mean.se = sqrt(bt_max(bt_max(few, more) / (double)n, mean.sd * mean.sd / ((double)n * (double)n)));
+        mean.low = mean.mean - FACTOR * mean.se;
+        mean.high = mean.mean + FACTOR * mean.se;
+        mean.tau = bt_max(0.5, (double)n * variance_of_batches(z, count, 1) / count / (2 * mean.sd * mean.sd));
+        mean.n_eff = (double)n / (2 * mean.tau);
     } else {
-        r.sd = r.tau = r.n_eff = NAN;
+        mean.sd = mean.tau = mean.n_eff = NAN;
     }
-    return r;
+    return mean;
 }
 
 bt_trend bt_stats_trend(const double *x, int64_t n)
 {
-    bt_trend t = {.change = NAN, .se = NAN, .low = NAN, .high = NAN};
-    if (n < BT_TREND_LEAST) return t;
+    bt_trend trend = {.change = NAN, .se = NAN, .low = NAN, .high = NAN};
+    if (n < BT_TREND_LEAST) return trend;
     double z[BATCHES], squares = 0, product = 0, level = 0;
     const int count = batches_of(x, n, mean_of(x, n), BATCHES, z);
     for (int k = 0; k < count; k++) level += z[k] / count;
@@ -139,14 +139,14 @@ bt_trend bt_stats_trend(const double *x, int64_t n)
         squares += u * u;
         product += u * (z[k] - level);
     }
-    t.change = product / squares;
-    for (int k = 0; k < count; k++) z[k] -= level + t.change * ((k + 0.5) / count - 0.5);
+    trend.change = product / squares;
+    for (int k = 0; k < count; k++) z[k] -= level + trend.change * ((k + 0.5) / count - 0.5);
     const double slow = slow_variance(z, count, n, 2, TREND_WAVES + 1) * count / (double)n;
-    t.se = sqrt(bt_max(variance_of_batches(z, count, 2), slow) / squares);
-    t.low = t.change - TREND_FACTOR * t.se;
-    t.high = t.change + TREND_FACTOR * t.se;
-    t.significant = t.low > 0 || t.high < 0;
-    return t;
+    trend.se = sqrt(bt_max(variance_of_batches(z, count, 2), slow) / squares);
+    trend.low = trend.change - TREND_FACTOR * trend.se;
+    trend.high = trend.change + TREND_FACTOR * trend.se;
+    trend.significant = trend.low > 0 || trend.high < 0;
+    return trend;
 }
 
 void bt_stats_quarters(const double *x, int64_t n, double quarter[4])

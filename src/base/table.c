@@ -14,10 +14,10 @@
 enum { LONGEST_LINE = 255, MOST_COMPLAINTS = 10 };
 static const double largest_speed = 100; // m/s, as for the keys of a constant current or wind
 
-void bt_table_free(bt_table *t)
+void bt_table_free(bt_table *table)
 {
-    free(t->row);
-    *t = (bt_table){0};
+    free(table->row);
+    *table = (bt_table){0};
 }
 
 /// Cut off the end of the line and blanks around the text.
@@ -67,7 +67,7 @@ static char *next_line(char **rest, const char *end, size_t *n)
     return line;
 }
 
-static void read_lines(bt_table *t, char *rest, const char *end, const char *path, bt_errors *err)
+static void read_lines(bt_table *table, char *rest, const char *end, const char *path, bt_errors *err)
 {
     char *line, why[BT_WHY];
     size_t length;
@@ -91,48 +91,49 @@ static void read_lines(bt_table *t, char *rest, const char *end, const char *pat
         }
         double row[3];
         const char *fault = read_row(text, row, why);
-        if (!fault && t->n && !(row[0] > t->row[3 * (t->n - 1)]))
+        if (!fault && table->n && !(row[0] > table->row[3 * (table->n - 1)]))
             fault = "its time is not after that of the row before; sort the rows and remove doubles";
         if (fault) {
             bt_errors_add(err, "%s:%d: %s", path, number, fault);
             continue;
         }
-        if (t->n == BT_MOST_ROWS) {
+        if (table->n == BT_MOST_ROWS) {
             bt_errors_add(err, "%s:%d: more than %d rows; take longer steps between them", path, number, BT_MOST_ROWS);
             return;
         }
-        if (t->n == cap) t->row = bt_realloc(t->row, (size_t)(cap = cap ? 2 * cap : 256), 3 * sizeof *t->row);
-        memcpy(t->row + 3 * t->n++, row, sizeof row);
+        if (table->n == cap)
+            table->row = bt_realloc(table->row, (size_t)(cap = cap ? 2 * cap : 256), 3 * sizeof *table->row);
+        memcpy(table->row + 3 * table->n++, row, sizeof row);
     }
-    if (err->n == before && t->n == 0)
+    if (err->n == before && table->n == 0)
         bt_errors_add(err, "%s: holds no row; write the header t,u,v and below it a row for each time", path);
 }
 
-bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err)
+bt_status bt_table_read(bt_table *table, const char *path, bt_errors *err)
 {
-    bt_table_free(t);
+    bt_table_free(table);
     const size_t before = err->n;
     char *text;
     size_t size;
     bt_status status = bt_file_read_to(path, "a CSV table", BT_MOST_TABLE_BYTES, &text, &size, err);
-    if (status == BT_OK) read_lines(t, text, text + size, path, err);
+    if (status == BT_OK) read_lines(table, text, text + size, path, err);
     free(text);
     if (status == BT_OK && err->n > before) status = BT_ERR_CASE;
-    if (status != BT_OK) bt_table_free(t);
+    if (status != BT_OK) bt_table_free(table);
     return status;
 }
 
-bool bt_table_row_sound(const bt_table *t, int64_t i)
+bool bt_table_row_sound(const bt_table *table, int64_t i)
 {
-    const double *row = t->row + 3 * i;
+    const double *row = table->row + 3 * i;
     return isfinite(row[0]) && (i == 0 || row[0] > row[-3]) && fabs(row[1]) <= largest_speed &&
            fabs(row[2]) <= largest_speed;
 }
 
-void bt_table_at(const bt_table *t, double time, double v[2])
+void bt_table_at(const bt_table *table, double time, double v[2])
 {
-    const double *row = t->row;
-    int64_t low = 0, high = t->n - 1; // row[low] <= time < row[high], once the ends are done with
+    const double *row = table->row;
+    int64_t low = 0, high = table->n - 1; // row[low] <= time < row[high], once the ends are done with
     const int64_t end = !(time > row[0]) ? 0 : time >= row[3 * high] ? high : -1;
     if (end >= 0) {
         memcpy(v, row + 3 * end + 1, 2 * sizeof *v);
@@ -146,9 +147,9 @@ void bt_table_at(const bt_table *t, double time, double v[2])
     for (int k = 0; k < 2; k++) v[k] = p[k + 1] == q[k + 1] ? p[k + 1] : (1 - s) * p[k + 1] + s * q[k + 1];
 }
 
-double bt_table_fastest(const bt_table *t)
+double bt_table_fastest(const bt_table *table)
 {
     double most = 0;
-    for (int64_t i = 0; i < t->n; i++) most = bt_max(most, bt_hypot(t->row[3 * i + 1], t->row[3 * i + 2]));
+    for (int64_t i = 0; i < table->n; i++) most = bt_max(most, bt_hypot(table->row[3 * i + 1], table->row[3 * i + 2]));
     return most;
 }

@@ -22,31 +22,32 @@ typedef struct {
 } text_line;
 
 /// Line of this number, from 1; empty beyond the end.
-static text_line line_of(const bt_syntax *s, int number)
+static text_line line_of(const bt_syntax *syntax, int number)
 {
-    const char *end = s->text + s->n, *p = s->text;
+    const char *end = syntax->text + syntax->n, *p = syntax->text;
     for (int i = 1; i < number && p < end; i++) {
         const char *stop = memchr(p, '\n', (size_t)(end - p));
         p = stop ? stop + 1 : end;
     }
     const char *stop = memchr(p, '\n', (size_t)(end - p));
-    text_line l = {.begin = p, .n = (size_t)((stop ? stop : end) - p)};
-    while (l.n && (p[l.n - 1] == '\r' || p[l.n - 1] == ' ')) l.n--;
-    while (l.blank < l.n && (p[l.blank] == ' ' || p[l.blank] == '\t')) l.blank++;
-    return l;
+    text_line line = {.begin = p, .n = (size_t)((stop ? stop : end) - p)};
+    while (line.n && (p[line.n - 1] == '\r' || p[line.n - 1] == ' ')) line.n--;
+    while (line.blank < line.n && (p[line.blank] == ' ' || p[line.blank] == '\t')) line.blank++;
+    return line;
 }
 
-static bool says_nothing(const text_line *l) { return l->blank == l->n || l->begin[l->blank] == '#'; }
+static bool says_nothing(const text_line *line) { return line->blank == line->n || line->begin[line->blank] == '#'; }
 
 /// Place of the first colon from i on that ends a key, n = none.
-static size_t key_end(const text_line *l, size_t i)
+static size_t key_end(const text_line *line, size_t i)
 {
-    for (; i < l->n; i++)
-        if (l->begin[i] == ':' && (i + 1 == l->n || l->begin[i + 1] == ' ' || l->begin[i + 1] == '\t')) return i;
-    return l->n;
+    for (; i < line->n; i++)
+        if (line->begin[i] == ':' && (i + 1 == line->n || line->begin[i + 1] == ' ' || line->begin[i + 1] == '\t'))
+            return i;
+    return line->n;
 }
 
-static bool has_key(const text_line *l) { return key_end(l, 0) < l->n; }
+static bool has_key(const text_line *line) { return key_end(line, 0) < line->n; }
 
 /// How to write "word value" with the colon that it lacks: "dt: 1 s".
 static void with_colon(const char *text, size_t n, char out[80])
@@ -58,11 +59,11 @@ static void with_colon(const char *text, size_t n, char out[80])
     snprintf(out, 80, "%.*s:%s%.*s", shown, text, rest ? " " : "", rest, text + value);
 }
 
-static int colon_missing(const text_line *l, int number, char *why)
+static int colon_missing(const text_line *line, int number, char *why)
 {
     char right[80];
-    const char *text = l->begin + l->blank;
-    const size_t n = l->n - l->blank;
+    const char *text = line->begin + line->blank;
+    const size_t n = line->n - line->blank;
     size_t word = 0;
     while (word < n && !strchr(" \t:", text[word])) word++;
     if (!n || strchr("-[]{},\"'#", *text)) return 0; // no key begins so
@@ -74,48 +75,49 @@ static int colon_missing(const text_line *l, int number, char *why)
 }
 
 /// A colon where none can be: the lines before lack one, this one has two, or it is indented below a value.
-static int colon_out_of_place(const bt_syntax *s, char *why)
+static int colon_out_of_place(const bt_syntax *syntax, char *why)
 {
-    const text_line here = line_of(s, s->line);
-    int first = 0, above = s->line - 1;
-    text_line l = {0};
+    const text_line here = line_of(syntax, syntax->line);
+    int first = 0, above = syntax->line - 1;
+    text_line line = {0};
     for (; above > 0; above--) {
-        l = line_of(s, above);
-        if (says_nothing(&l)) continue;
-        if (has_key(&l)) break;
+        line = line_of(syntax, above);
+        if (says_nothing(&line)) continue;
+        if (has_key(&line)) break;
         first = above;
     }
     if (first) {
-        l = line_of(s, first);
-        return colon_missing(&l, first, why);
+        line = line_of(syntax, first);
+        return colon_missing(&line, first, why);
     }
     const size_t colon = key_end(&here, 0);
     if (colon < here.n && key_end(&here, colon + 1) < here.n) {
         snprintf(why, BT_SYNTAX_WHY,
                  "two keys in one line; write the second below the first, both in { } with a comma between them, or a "
                  "text with a colon in quotes");
-        return s->line;
+        return syntax->line;
     }
-    if (!above || here.blank <= l.blank) return 0;
+    if (!above || here.blank <= line.blank) return 0;
     snprintf(why, BT_SYNTAX_WHY,
              "indented deeper than line %d, whose key has a value already; indent both lines alike", above);
-    return s->line;
+    return syntax->line;
 }
 
 /// The slip behind the error: its line, with the remedy in why; 0 where it is none of those that are known.
-static int syntax_explain(const bt_syntax *s, char why[BT_SYNTAX_WHY])
+static int syntax_explain(const bt_syntax *syntax, char why[BT_SYNTAX_WHY])
 {
-    const text_line here = line_of(s, s->line);
+    const text_line here = line_of(syntax, syntax->line);
     if (memchr(here.begin, '\t', here.blank)) {
         snprintf(why, BT_SYNTAX_WHY, "the line begins with a tab; YAML is indented by blanks alone, write two blanks");
-        return s->line;
+        return syntax->line;
     }
-    if (strstr(s->problem, "could not find expected ':'") && s->begun) {
-        const text_line l = line_of(s, s->begun);
-        return colon_missing(&l, s->begun, why);
+    if (strstr(syntax->problem, "could not find expected ':'") && syntax->begun) {
+        const text_line line = line_of(syntax, syntax->begun);
+        return colon_missing(&line, syntax->begun, why);
     }
-    if (strstr(s->problem, "mapping values are not allowed") || strstr(s->problem, "did not find expected key"))
-        return colon_out_of_place(s, why);
+    if (strstr(syntax->problem, "mapping values are not allowed") ||
+        strstr(syntax->problem, "did not find expected key"))
+        return colon_out_of_place(syntax, why);
     return 0;
 }
 
@@ -144,40 +146,40 @@ void bt_tree_free(bt_node *node)
     free(node);
 }
 
-static void tell_syntax(const parser *p)
+static void tell_syntax(const parser *yaml)
 {
-    const yaml_parser_t *y = &p->yaml;
+    const yaml_parser_t *y = &yaml->yaml;
     char why[BT_SYNTAX_WHY];
-    const bt_syntax s = {.text = p->text,
-                         .n = p->n,
-                         .problem = y->problem ? y->problem : "",
-                         .line = (int)y->problem_mark.line + 1,
-                         .begun = y->context ? (int)y->context_mark.line + 1 : 0};
-    const int line = syntax_explain(&s, why);
-    if (line) bt_errors_add(p->err, "%s:%d: not valid YAML: %s", p->name, line, why);
+    const bt_syntax syntax = {.text = yaml->text,
+                              .n = yaml->n,
+                              .problem = y->problem ? y->problem : "",
+                              .line = (int)y->problem_mark.line + 1,
+                              .begun = y->context ? (int)y->context_mark.line + 1 : 0};
+    const int line = syntax_explain(&syntax, why);
+    if (line) bt_errors_add(yaml->err, "%s:%d: not valid YAML: %s", yaml->name, line, why);
     else
-        bt_errors_add(p->err, "%s:%d: not valid YAML: %s%s%s; check indentation and colons near this line", p->name,
-                      s.line, y->problem ? y->problem : "unknown error", y->context ? " " : "",
+        bt_errors_add(yaml->err, "%s:%d: not valid YAML: %s%s%s; check indentation and colons near this line",
+                      yaml->name, syntax.line, y->problem ? y->problem : "unknown error", y->context ? " " : "",
                       y->context ? y->context : "");
 }
 
 // The next event; on a syntax error one message and false.
-static bool next(parser *p, yaml_event_t *event)
+static bool next(parser *yaml, yaml_event_t *event)
 {
-    if (yaml_parser_parse(&p->yaml, event)) return true;
-    const yaml_parser_t *y = &p->yaml;
-    p->failed = true;
+    if (yaml_parser_parse(&yaml->yaml, event)) return true;
+    const yaml_parser_t *y = &yaml->yaml;
+    yaml->failed = true;
     if (y->error == YAML_READER_ERROR)
-        bt_errors_add(p->err, "%s: byte %zu is not UTF-8 text (%s); is this a case file? save it as UTF-8", p->name,
-                      y->problem_offset, y->problem);
-    else tell_syntax(p);
+        bt_errors_add(yaml->err, "%s: byte %zu is not UTF-8 text (%s); is this a case file? save it as UTF-8",
+                      yaml->name, y->problem_offset, y->problem);
+    else tell_syntax(yaml);
     return false;
 }
 
-static bool refuse(parser *p, int line, const char *why)
+static bool refuse(parser *yaml, int line, const char *why)
 {
-    bt_errors_add(p->err, "%s:%d: %s", p->name, line, why);
-    p->failed = true;
+    bt_errors_add(yaml->err, "%s:%d: %s", yaml->name, line, why);
+    yaml->failed = true;
     return false;
 }
 
@@ -207,85 +209,86 @@ static void append(bt_node *parent, char *key, int key_line, bt_node *item)
     parent->n++;
 }
 
-static bool plain_event(parser *p, const yaml_event_t *e, int line)
+static bool plain_event(parser *yaml, const yaml_event_t *e, int line)
 {
     const yaml_char_t *anchor = NULL, *tag = NULL;
     if (e->type == YAML_SCALAR_EVENT) anchor = e->data.scalar.anchor, tag = e->data.scalar.tag;
     if (e->type == YAML_MAPPING_START_EVENT) anchor = e->data.mapping_start.anchor, tag = e->data.mapping_start.tag;
     if (e->type == YAML_SEQUENCE_START_EVENT) anchor = e->data.sequence_start.anchor, tag = e->data.sequence_start.tag;
     if (e->type == YAML_ALIAS_EVENT || anchor)
-        return refuse(p, line,
+        return refuse(yaml, line,
                       "anchors and aliases (& and *) are not read in a case file; write the value out, or quote a text "
                       "that begins so");
     if (tag)
-        return refuse(p, line, "tags (!) are not read in a case file; remove the tag, or quote a text that begins so");
+        return refuse(yaml, line,
+                      "tags (!) are not read in a case file; remove the tag, or quote a text that begins so");
     return true;
 }
 
-static bt_node *read_node(parser *p, const yaml_event_t *first, int depth);
+static bt_node *read_node(parser *yaml, const yaml_event_t *first, int depth);
 
-static void read_map(parser *p, bt_node *map, int depth)
+static void read_map(parser *yaml, bt_node *map, int depth)
 {
     for (;;) {
         yaml_event_t e;
-        if (!next(p, &e)) return;
+        if (!next(yaml, &e)) return;
         if (e.type == YAML_MAPPING_END_EVENT) {
             yaml_event_delete(&e);
             return;
         }
         int line = (int)e.start_mark.line + 1;
-        bool good = plain_event(p, &e, line);
-        if (good && e.type != YAML_SCALAR_EVENT) good = refuse(p, line, "a key must be a word; write key: value");
+        bool good = plain_event(yaml, &e, line);
+        if (good && e.type != YAML_SCALAR_EVENT) good = refuse(yaml, line, "a key must be a word; write key: value");
         if (good && memchr(e.data.scalar.value, 0, e.data.scalar.length))
-            good = refuse(p, line, "a key holds a NUL character; remove it");
+            good = refuse(yaml, line, "a key holds a NUL character; remove it");
         if (good && map->n >= BT_TREE_MAP)
-            good = refuse(p, line, "more than 256 keys in one map; see bergtow --list-keys for the keys there are");
+            good = refuse(yaml, line, "more than 256 keys in one map; see bergtow --list-keys for the keys there are");
         char *key = good ? copy_text(e.data.scalar.value, e.data.scalar.length) : NULL;
         yaml_event_delete(&e);
         if (!good) return;
 
         bt_node *value = NULL;
-        if (next(p, &e)) {
-            value = read_node(p, &e, depth + 1);
+        if (next(yaml, &e)) {
+            value = read_node(yaml, &e, depth + 1);
             yaml_event_delete(&e);
         }
         int twin = -1;
         for (int i = 0; i < map->n && twin < 0; i++)
             if (!strcmp(map->key[i], key)) twin = i;
         if (value && twin >= 0)
-            bt_errors_add(p->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", p->name, line,
-                          key, map->key_line[twin]);
+            bt_errors_add(yaml->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", yaml->name,
+                          line, key, map->key_line[twin]);
         if (!value || twin >= 0) {
             bt_tree_free(value);
             free(key);
         } else {
             append(map, key, line, value);
         }
-        if (p->failed) return;
+        if (yaml->failed) return;
     }
 }
 
-static void read_list(parser *p, bt_node *list, int depth)
+static void read_list(parser *yaml, bt_node *list, int depth)
 {
     for (;;) {
         yaml_event_t e;
-        if (!next(p, &e)) return;
+        if (!next(yaml, &e)) return;
         bool end = e.type == YAML_SEQUENCE_END_EVENT;
-        bt_node *value = end ? NULL : read_node(p, &e, depth + 1);
+        bt_node *value = end ? NULL : read_node(yaml, &e, depth + 1);
         yaml_event_delete(&e);
         if (value) append(list, NULL, 0, value);
-        if (end || p->failed) return;
+        if (end || yaml->failed) return;
     }
 }
 
-static bt_node *read_node(parser *p, const yaml_event_t *first, int depth)
+static bt_node *read_node(parser *yaml, const yaml_event_t *first, int depth)
 {
     int line = (int)first->start_mark.line + 1;
-    if (!plain_event(p, first, line)) return NULL;
+    if (!plain_event(yaml, first, line)) return NULL;
     if (depth > BT_TREE_DEPTH)
-        return refuse(p, line, "nested deeper than 16 levels; no key of a case needs that"), NULL;
-    if (++p->n_nodes > BT_TREE_NODES)
-        return refuse(p, line,
+        return refuse(yaml, line, "nested deeper than 16 levels; no key of a case needs that"), NULL;
+    if (++yaml->n_nodes > BT_TREE_NODES)
+        return refuse(yaml, line,
                       "more than 2 million values; put large fields into an HDF5 file and name it in ice.field"),
                NULL;
 
@@ -293,33 +296,33 @@ static bt_node *read_node(parser *p, const yaml_event_t *first, int depth)
     node->line = line;
     if (first->type == YAML_MAPPING_START_EVENT) {
         node->kind = BT_NODE_MAP;
-        read_map(p, node, depth);
+        read_map(yaml, node, depth);
     } else if (first->type == YAML_SEQUENCE_START_EVENT) {
         node->kind = BT_NODE_LIST;
-        read_list(p, node, depth);
+        read_list(yaml, node, depth);
     } else {
         node->kind = BT_NODE_SCALAR;
         node->plain = first->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
         if (memchr(first->data.scalar.value, 0, first->data.scalar.length))
-            refuse(p, line, "a text holds a NUL character; remove it");
+            refuse(yaml, line, "a text holds a NUL character; remove it");
         node->text = copy_text(first->data.scalar.value, first->data.scalar.length);
     }
     return node;
 }
 
-static bt_node *read_document(parser *p)
+static bt_node *read_document(parser *yaml)
 {
     bt_node *root = NULL;
     int n_documents = 0;
-    for (bool end = false; !end && !p->failed;) {
+    for (bool end = false; !end && !yaml->failed;) {
         yaml_event_t e;
-        if (!next(p, &e)) break;
+        if (!next(yaml, &e)) break;
         if (e.type == YAML_STREAM_END_EVENT) end = true;
         else if (e.type == YAML_DOCUMENT_START_EVENT && ++n_documents > 1)
-            refuse(p, (int)e.start_mark.line + 1, "a second document begins (---); keep one case in a file");
+            refuse(yaml, (int)e.start_mark.line + 1, "a second document begins (---); keep one case in a file");
         else if (e.type == YAML_SCALAR_EVENT || e.type == YAML_MAPPING_START_EVENT ||
                  e.type == YAML_SEQUENCE_START_EVENT || e.type == YAML_ALIAS_EVENT)
-            root = read_node(p, &e, 0);
+            root = read_node(yaml, &e, 0);
         yaml_event_delete(&e);
     }
     return root;
@@ -327,17 +330,17 @@ static bt_node *read_document(parser *p)
 
 bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *err)
 {
-    parser p = {.name = name, .text = text, .n = n, .err = err};
-    if (!yaml_parser_initialize(&p.yaml)) {
+    parser yaml = {.name = name, .text = text, .n = n, .err = err};
+    if (!yaml_parser_initialize(&yaml.yaml)) {
         bt_errors_add(err, "%s: libyaml could not start; free some memory", name);
         return NULL;
     }
     // Without this libyaml takes two leading bytes of a binary file for UTF-16.
-    yaml_parser_set_encoding(&p.yaml, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(&p.yaml, (const unsigned char *)text, n);
-    bt_node *root = read_document(&p);
-    yaml_parser_delete(&p.yaml);
-    if (p.failed) {
+    yaml_parser_set_encoding(&yaml.yaml, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(&yaml.yaml, (const unsigned char *)text, n);
+    bt_node *root = read_document(&yaml);
+    yaml_parser_delete(&yaml.yaml);
+    if (yaml.failed) {
         bt_tree_free(root);
         return NULL;
     }

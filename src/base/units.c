@@ -169,19 +169,19 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
     void *locale = bt_point_begin();
     double number = strtod(text, NULL);
     bt_point_end(locale);
-    const bt_unit_entry *u = NULL;
+    const bt_unit_entry *unit = NULL;
     if (n_symbol) {
-        u = find_unit(symbol, n_symbol, kind);
-        if (!u) return refuse_unit(text, n, symbol, n_symbol, kind, why);
+        unit = find_unit(symbol, n_symbol, kind);
+        if (!unit) return refuse_unit(text, n, symbol, n_symbol, kind, why);
     } else if (kind == BT_UNIT_ANGLE || kind == BT_UNIT_TURN) {
-        u = find_unit(kinds[kind].bare, strlen(kinds[kind].bare), kind);
+        unit = find_unit(kinds[kind].bare, strlen(kinds[kind].bare), kind);
     }
     if (number == 0 && strcspn(text, "123456789") < strcspn(text, "eE") && strcspn(text, "123456789") < n) {
         snprintf(why, BT_WHY, "%.*s is too small for a number of this program; give 0, or at least 1e-300",
                  n > 40 ? 40 : (int)n, text);
         return false;
     }
-    double si = u ? number * u->up / u->down : number;
+    double si = unit ? number * unit->up / unit->down : number;
     if (!isfinite(si)) {
         snprintf(why, BT_WHY, "%.*s is too large for a number of this program; give at most 1e308",
                  n > 40 ? 40 : (int)n, text);

@@ -18,9 +18,9 @@ const bt_body_field bt_body_fields[] = {
     FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(exposure), FIELD(motion), FIELD(large),
     FIELD(disturbed), FIELD(cell), FIELD(lap),      FIELD(home),
 };
-int bt_bodies_n_fields(const bt_bodies *b)
+int bt_bodies_n_fields(const bt_bodies *bodies)
 {
-    return (int)(sizeof bt_body_fields / sizeof *bt_body_fields) - (b->home == NULL);
+    return (int)(sizeof bt_body_fields / sizeof *bt_body_fields) - (bodies->home == NULL);
 }
 
 const bt_body_field bt_vertex_fields[] = {
@@ -31,56 +31,60 @@ const bt_body_field bt_vertex_fields[] = {
 };
 const int bt_n_vertex_fields = sizeof bt_vertex_fields / sizeof *bt_vertex_fields;
 
-void bt_bodies_free(bt_bodies *b)
+void bt_bodies_free(bt_bodies *bodies)
 {
-    for (int k = 0; k < bt_bodies_n_fields(b); k++) free(*(void **)((char *)b + bt_body_fields[k].array));
-    for (int k = 0; k < bt_n_vertex_fields; k++) free(*(void **)((char *)b + bt_vertex_fields[k].array));
-    free(b->offset);
-    free(b->index_of);
-    free(b->gone);
+    for (int k = 0; k < bt_bodies_n_fields(bodies); k++) free(*(void **)((char *)bodies + bt_body_fields[k].array));
+    for (int k = 0; k < bt_n_vertex_fields; k++) free(*(void **)((char *)bodies + bt_vertex_fields[k].array));
+    free(bodies->offset);
+    free(bodies->index_of);
+    free(bodies->gone);
 }
 
-void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
+void bt_bodies_reserve(bt_bodies *bodies, bt_idx n, int64_t n_vertices)
 {
-    if (n > b->cap) {
-        const bt_idx cap = b->cap == 0 ? n : n > b->cap + b->cap / 4 ? n : b->cap + b->cap / 4;
-        for (int k = 0; k < bt_bodies_n_fields(b); k++) {
-            void **array = (void **)((char *)b + bt_body_fields[k].array), *old = *array;
+    if (n > bodies->cap) {
+        const bt_idx cap = bodies->cap == 0 ? n : n > bodies->cap + bodies->cap / 4 ? n : bodies->cap + bodies->cap / 4;
+        for (int k = 0; k < bt_bodies_n_fields(bodies); k++) {
+            void **array = (void **)((char *)bodies + bt_body_fields[k].array), *old = *array;
             *array = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
-            if (old) memcpy(*array, old, (size_t)b->n * bt_body_fields[k].size);
+            if (old) memcpy(*array, old, (size_t)bodies->n * bt_body_fields[k].size);
             free(old);
         }
-        b->offset = bt_realloc(b->offset, (size_t)cap + 1, sizeof *b->offset);
-        b->cap = cap;
+        bodies->offset = bt_realloc(bodies->offset, (size_t)cap + 1, sizeof *bodies->offset);
+        bodies->cap = cap;
     }
-    if (n_vertices > b->cap_vertices) {
-        const int64_t more = b->cap_vertices + b->cap_vertices / 4, cap = n_vertices > more ? n_vertices : more;
+    if (n_vertices > bodies->cap_vertices) {
+        const int64_t more = bodies->cap_vertices + bodies->cap_vertices / 4,
+                      cap = n_vertices > more ? n_vertices : more;
         for (int k = 0; k < bt_n_vertex_fields; k++) {
-            void **array = (void **)((char *)b + bt_vertex_fields[k].array);
+            void **array = (void **)((char *)bodies + bt_vertex_fields[k].array);
             *array = bt_realloc(*array, (size_t)cap, bt_vertex_fields[k].size);
         }
-        b->cap_vertices = cap;
+        bodies->cap_vertices = cap;
     }
 }
 
-void bt_bodies_make_homes(bt_bodies *b) { b->home = bt_alloc_aligned((size_t)b->cap, sizeof *b->home); }
+void bt_bodies_make_homes(bt_bodies *bodies)
+{
+    bodies->home = bt_alloc_aligned((size_t)bodies->cap, sizeof *bodies->home);
+}
 
 /// Marks and lengths of the n vertices of one polygon, from `first` on.
-static void close_polygon(bt_bodies *b, int64_t first, int n)
+static void close_polygon(bt_bodies *bodies, int64_t first, int n)
 {
     for (int k = 0; k < n; k++) {
-        const double *p = b->vertices + 2 * (first + k), *q = b->vertices + 2 * (first + (k + 1) % n);
-        b->per_length[first + k] = 1 / bt_hypot(q[0] - p[0], q[1] - p[1]);
-        b->mark[first + k].count = 0;
+        const double *p = bodies->vertices + 2 * (first + k), *q = bodies->vertices + 2 * (first + (k + 1) % n);
+        bodies->per_length[first + k] = 1 / bt_hypot(q[0] - p[0], q[1] - p[1]);
+        bodies->mark[first + k].count = 0;
     }
-    b->mark[first].count = (uint8_t)n;
+    bodies->mark[first].count = (uint8_t)n;
 }
 
 /// The convex hull of the outline of body i: its vertices are those that the hull of a copy has kept.
-static void mark_hull(bt_bodies *b, bt_idx i, int n, bool convex)
+static void mark_hull(bt_bodies *bodies, bt_idx i, int n, bool convex)
 {
-    bt_mark *mark = b->mark + b->offset[i];
-    const double *v = b->vertices + 2 * b->offset[i];
+    bt_mark *mark = bodies->mark + bodies->offset[i];
+    const double *v = bodies->vertices + 2 * bodies->offset[i];
     for (int k = 0; k < n; k++) mark[k].next = (uint8_t)((k + 1) % n);
     if (convex) return;
     double hull[2 * BT_MAX_VERTICES];
@@ -100,120 +104,121 @@ static void mark_hull(bt_bodies *b, bt_idx i, int n, bool convex)
 }
 
 /// The outline of a new body i, and its parts.
-static void add_polygons(bt_bodies *b, bt_idx i, const bt_body_def *d)
+static void add_polygons(bt_bodies *bodies, bt_idx i, const bt_body_def *def)
 {
-    int64_t at = b->offset[i];
-    memcpy(b->vertices + 2 * at, d->vertices, 2 * sizeof(double) * (size_t)d->n_vertices);
-    for (int k = 0; k < d->n_vertices; k++) b->mark[at + k].corner = (uint8_t)k;
-    close_polygon(b, at, d->n_vertices);
-    mark_hull(b, i, d->n_vertices, !d->parts);
-    at += d->n_vertices;
-    const bt_parts *p = d->parts;
-    for (int j = 0, from = 0; p && j < p->n; from += p->count[j++], at = b->offset[i] + d->n_vertices + from) {
-        for (int k = 0; k < p->count[j]; k++) {
-            b->mark[at + k].corner = p->corner[from + k];
-            memcpy(b->vertices + 2 * (at + k), d->vertices + 2 * p->corner[from + k], 2 * sizeof(double));
+    int64_t at = bodies->offset[i];
+    memcpy(bodies->vertices + 2 * at, def->vertices, 2 * sizeof(double) * (size_t)def->n_vertices);
+    for (int k = 0; k < def->n_vertices; k++) bodies->mark[at + k].corner = (uint8_t)k;
+    close_polygon(bodies, at, def->n_vertices);
+    mark_hull(bodies, i, def->n_vertices, !def->parts);
+    at += def->n_vertices;
+    const bt_parts *parts = def->parts;
+    for (int j = 0, from = 0; parts && j < parts->n; from += parts->count[j++],
+         at = bodies->offset[i] + def->n_vertices + from) {
+        for (int k = 0; k < parts->count[j]; k++) {
+            bodies->mark[at + k].corner = parts->corner[from + k];
+            memcpy(bodies->vertices + 2 * (at + k), def->vertices + 2 * parts->corner[from + k], 2 * sizeof(double));
         }
-        close_polygon(b, at, p->count[j]);
+        close_polygon(bodies, at, parts->count[j]);
     }
 }
 
 /// Ids up to n_global + n have a place in index_of.
-static void make_ids(bt_bodies *b, bt_gid n)
+static void make_ids(bt_bodies *bodies, bt_gid n)
 {
-    if (b->n_global + n <= b->cap_global) return;
-    b->cap_global = 2 * b->cap_global > b->n_global + n ? 2 * b->cap_global : b->n_global + n;
-    b->index_of = bt_realloc(b->index_of, (size_t)b->cap_global, sizeof *b->index_of);
-    b->gone = bt_realloc(b->gone, (size_t)b->cap_global, sizeof *b->gone);
+    if (bodies->n_global + n <= bodies->cap_global) return;
+    bodies->cap_global = 2 * bodies->cap_global > bodies->n_global + n ? 2 * bodies->cap_global : bodies->n_global + n;
+    bodies->index_of = bt_realloc(bodies->index_of, (size_t)bodies->cap_global, sizeof *bodies->index_of);
+    bodies->gone = bt_realloc(bodies->gone, (size_t)bodies->cap_global, sizeof *bodies->gone);
 }
 
-void bt_bodies_skip(bt_bodies *b, bt_gid n)
+void bt_bodies_skip(bt_bodies *bodies, bt_gid n)
 {
-    make_ids(b, n);
-    for (bt_gid g = b->n_global; g < b->n_global + n; g++) b->index_of[g] = -1, b->gone[g] = 1;
-    b->n_global += n;
-    b->n_kept += n;
+    make_ids(bodies, n);
+    for (bt_gid g = bodies->n_global; g < bodies->n_global + n; g++) bodies->index_of[g] = -1, bodies->gone[g] = 1;
+    bodies->n_global += n;
+    bodies->n_kept += n;
 }
 
-bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
+bt_gid bt_bodies_add(bt_bodies *bodies, const bt_body_def *def)
 {
-    make_ids(b, 1);
-    const bt_gid gid = b->n_global++;
-    bt_bodies_put(b, d, gid);
+    make_ids(bodies, 1);
+    const bt_gid gid = bodies->n_global++;
+    bt_bodies_put(bodies, def, gid);
     return gid;
 }
 
-bt_idx bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid)
+bt_idx bt_bodies_put(bt_bodies *bodies, const bt_body_def *def, bt_gid gid)
 {
-    assert(gid >= 0 && gid < b->n_global);
-    assert(d->n_vertices >= 3 && d->n_vertices <= BT_MAX_VERTICES);
-    assert(d->motion != BT_DYNAMIC || (d->mass > 0 && d->inertia > 0));
-    int64_t first = b->offset[b->n];
-    const int n_vertices = d->n_vertices + (d->parts ? d->parts->n_vertices : 0);
-    bt_bodies_reserve(b, b->n + 1, first + n_vertices);
-    const bt_idx i = b->n++;
-    b->index_of[gid] = i;
-    b->gone[gid] = 0;
-    b->offset[i + 1] = first + n_vertices;
-    add_polygons(b, i, d);
-    bt_moments m = bt_shape_extent(d->n_vertices, d->vertices);
-    b->gid[i] = gid;
-    b->pose[i] = (bt_pose){.x = d->x, .y = d->y, .yaw = d->yaw};
-    b->vel[i] = b->vel_start[i] = b->vel_free[i] =
-        d->motion == BT_STATIC ? (bt_vel){0} : (bt_vel){.x = d->vx, .y = d->vy, .w = d->yaw_rate};
-    b->inv[i] = d->motion == BT_DYNAMIC ? (bt_inv){1 / d->mass, 1 / d->inertia} : (bt_inv){0};
-    b->path[i] = 0;
-    b->radius[i] = m.radius;
-    b->area[i] = m.area;
-    b->mass[i] = d->mass;
-    b->inertia[i] = d->inertia;
-    b->share[i] = d->added > 0 ? 1 - d->added / d->mass : 1;
-    b->friction[i] = d->friction;
-    b->restitution[i] = d->restitution;
-    b->thickness[i] = d->thickness;
-    b->drag[i] = d->drag;
-    b->exposure[i] = bt_exposed;
-    b->motion[i] = (uint8_t)d->motion;
-    b->large[i] = d->large;
-    b->disturbed[i] = 1;
-    b->cell[i][0] = b->cell[i][1] = 0;
-    b->lap[i] = 0;
-    bt_bodies_turn(b, i);
+    assert(gid >= 0 && gid < bodies->n_global);
+    assert(def->n_vertices >= 3 && def->n_vertices <= BT_MAX_VERTICES);
+    assert(def->motion != BT_DYNAMIC || (def->mass > 0 && def->inertia > 0));
+    int64_t first = bodies->offset[bodies->n];
+    const int n_vertices = def->n_vertices + (def->parts ? def->parts->n_vertices : 0);
+    bt_bodies_reserve(bodies, bodies->n + 1, first + n_vertices);
+    const bt_idx i = bodies->n++;
+    bodies->index_of[gid] = i;
+    bodies->gone[gid] = 0;
+    bodies->offset[i + 1] = first + n_vertices;
+    add_polygons(bodies, i, def);
+    bt_moments moments = bt_shape_extent(def->n_vertices, def->vertices);
+    bodies->gid[i] = gid;
+    bodies->pose[i] = (bt_pose){.x = def->x, .y = def->y, .yaw = def->yaw};
+    bodies->vel[i] = bodies->vel_start[i] = bodies->vel_free[i] =
+        def->motion == BT_STATIC ? (bt_vel){0} : (bt_vel){.x = def->vx, .y = def->vy, .w = def->yaw_rate};
+    bodies->inv[i] = def->motion == BT_DYNAMIC ? (bt_inv){1 / def->mass, 1 / def->inertia} : (bt_inv){0};
+    bodies->path[i] = 0;
+    bodies->radius[i] = moments.radius;
+    bodies->area[i] = moments.area;
+    bodies->mass[i] = def->mass;
+    bodies->inertia[i] = def->inertia;
+    bodies->share[i] = def->added > 0 ? 1 - def->added / def->mass : 1;
+    bodies->friction[i] = def->friction;
+    bodies->restitution[i] = def->restitution;
+    bodies->thickness[i] = def->thickness;
+    bodies->drag[i] = def->drag;
+    bodies->exposure[i] = bt_exposed;
+    bodies->motion[i] = (uint8_t)def->motion;
+    bodies->large[i] = def->large;
+    bodies->disturbed[i] = 1;
+    bodies->cell[i][0] = bodies->cell[i][1] = 0;
+    bodies->lap[i] = 0;
+    bt_bodies_turn(bodies, i);
     return i;
 }
 
-void bt_bodies_compact(bt_bodies *b, const uint8_t *keep)
+void bt_bodies_compact(bt_bodies *bodies, const uint8_t *keep)
 {
     bt_idx n = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
+    for (bt_idx i = 0; i < bodies->n; i++) {
         if (!keep[i]) continue;
         if (n != i) {
-            for (int k = 0; k < bt_bodies_n_fields(b); k++) {
-                char *array = *(char **)((char *)b + bt_body_fields[k].array);
+            for (int k = 0; k < bt_bodies_n_fields(bodies); k++) {
+                char *array = *(char **)((char *)bodies + bt_body_fields[k].array);
                 const size_t size = bt_body_fields[k].size;
                 memcpy(array + (size_t)n * size, array + (size_t)i * size, size);
             }
-            const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
+            const int64_t from = bodies->offset[i], to = bodies->offset[n], m = bodies->offset[i + 1] - from;
             for (int k = 0; k < bt_n_vertex_fields; k++) {
-                char *array = *(char **)((char *)b + bt_vertex_fields[k].array);
+                char *array = *(char **)((char *)bodies + bt_vertex_fields[k].array);
                 const size_t size = bt_vertex_fields[k].size;
                 memmove(array + (size_t)to * size, array + (size_t)from * size, (size_t)m * size);
             }
-            b->offset[n + 1] = to + m;
+            bodies->offset[n + 1] = to + m;
         }
         n++;
     }
-    b->n = n;
+    bodies->n = n;
 }
 
-void bt_bodies_turn(bt_bodies *b, bt_idx i)
+void bt_bodies_turn(bt_bodies *bodies, bt_idx i)
 {
     double s, c;
-    bt_sincos(b->pose[i].yaw, &s, &c);
-    for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
-        const double *v = b->vertices + 2 * k;
-        b->outline[2 * k] = c * v[0] - s * v[1];
-        b->outline[2 * k + 1] = s * v[0] + c * v[1];
+    bt_sincos(bodies->pose[i].yaw, &s, &c);
+    for (int64_t k = bodies->offset[i]; k < bodies->offset[i + 1]; k++) {
+        const double *v = bodies->vertices + 2 * k;
+        bodies->outline[2 * k] = c * v[0] - s * v[1];
+        bodies->outline[2 * k + 1] = s * v[0] + c * v[1];
     }
 }
 
@@ -225,12 +230,12 @@ static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at)
     return at + mark[at].count < n ? at + mark[at].count : -1;
 }
 
-double bt_bodies_depth(const bt_bodies *b, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n, double dx,
-                       double dy)
+double bt_bodies_depth(const bt_bodies *bodies, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n,
+                       double dx, double dy)
 {
-    const bt_mark *own = b->mark + b->offset[i];
-    const double *own_vertex = b->outline + 2 * b->offset[i];
-    const int64_t n_own = b->offset[i + 1] - b->offset[i];
+    const bt_mark *own = bodies->mark + bodies->offset[i];
+    const double *own_vertex = bodies->outline + 2 * bodies->offset[i];
+    const int64_t n_own = bodies->offset[i + 1] - bodies->offset[i];
     double deepest = 0;
     for (int64_t p = first_polygon(mark, n); p >= 0; p = next_polygon(mark, n, p))
         for (int64_t q = first_polygon(own, n_own); q >= 0; q = next_polygon(own, n_own, q))

@@ -14,7 +14,7 @@ typedef struct bt_body_field {
 } bt_body_field;
 extern const bt_body_field bt_body_fields[];
 /// How many there are: the last one, the homes, only where these bodies have them.
-int bt_bodies_n_fields(const bt_bodies *b);
+int bt_bodies_n_fields(const bt_bodies *bodies);
 
 /// Arrays over the vertices of the bodies; size: bytes a vertex.
 extern const bt_body_field bt_vertex_fields[];
@@ -24,48 +24,49 @@ extern const int bt_n_vertex_fields;
 extern const bt_exposure bt_exposed;
 
 /// Room for n bodies and n_vertices vertices.
-void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
-void bt_bodies_free(bt_bodies *b);
+void bt_bodies_reserve(bt_bodies *bodies, bt_idx n, int64_t n_vertices);
+void bt_bodies_free(bt_bodies *bodies);
 
 /// Room for the homes of all bodies, 0, before they are distributed to ranks.
-void bt_bodies_make_homes(bt_bodies *b);
+void bt_bodies_make_homes(bt_bodies *bodies);
 
 /// Add a body (bt_world_add); returns its gid. Before bodies are distributed to ranks.
-bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d);
+bt_gid bt_bodies_add(bt_bodies *bodies, const bt_body_def *def);
 /// Keep the next n ids for bodies that are put there later.
-void bt_bodies_skip(bt_bodies *b, bt_gid n);
+void bt_bodies_skip(bt_bodies *bodies, bt_gid n);
 /// A body at the end of the storage, with an id that no body here has; returns it.
-bt_idx bt_bodies_put(bt_bodies *b, const bt_body_def *d, bt_gid gid);
+bt_idx bt_bodies_put(bt_bodies *bodies, const bt_body_def *def, bt_gid gid);
 /// Leave out the bodies that keep [n] does not say, and close the gaps: the others stay in their order. index_of is not
 /// brought up to date.
-void bt_bodies_compact(bt_bodies *b, const uint8_t *keep);
+void bt_bodies_compact(bt_bodies *bodies, const uint8_t *keep);
 
 /// Outline of body i turned by its yaw (after a change of pose).
-void bt_bodies_turn(bt_bodies *b, bt_idx i);
+void bt_bodies_turn(bt_bodies *bodies, bt_idx i);
 
 /// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
-static inline double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v)
+static inline double bt_bodies_speed(const bt_world *world, bt_idx i, const bt_vel *v)
 {
-    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
-    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
+    const double x = v->x - world->par.water_u, y = v->y - world->par.water_v;
+    return sqrt(x * x + y * y) + world->bodies.radius[i] * fabs(v->w);
 }
 
 /// Is v the velocity of the water, to the last bit, without turning?
-static inline bool bt_bodies_drift(const bt_world *w, const bt_vel *v)
+static inline bool bt_bodies_drift(const bt_world *world, const bt_vel *v)
 {
-    return v->x == w->par.water_u && v->y == w->par.water_v && v->w == 0;
+    return v->x == world->par.water_u && v->y == world->par.water_v && v->w == 0;
 }
 
 /// Depth to which body i overlaps with polygons, m; <= 0: it does not. They have n vertices, with their marks, and with
 /// their places relative to a centroid from which that of i is (dx, dy), m, as bt_bodies has them: an outline, with its
 /// parts after it.
-double bt_bodies_depth(const bt_bodies *b, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n, double dx,
-                       double dy);
+double bt_bodies_depth(const bt_bodies *bodies, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n,
+                       double dx, double dy);
 
 /// Is body i a sheet that may slide over others (contact/raft.h)?
-static inline bool bt_bodies_sheet(const bt_bodies *b, bt_idx i, bt_gid towed)
+static inline bool bt_bodies_sheet(const bt_bodies *bodies, bt_idx i, bt_gid towed)
 {
-    return b->thickness[i] > 0 && b->motion[i] != BT_STATIC && b->gid[i] != towed && bt_part_first(b, i) == 0;
+    return bodies->thickness[i] > 0 && bodies->motion[i] != BT_STATIC && bodies->gid[i] != towed &&
+           bt_part_first(bodies, i) == 0;
 }
 
 /// May i and j slide over each other? deck: freeboard / thickness.
@@ -77,15 +78,15 @@ static inline bool bt_bodies_slide(const bt_bodies *a, bt_idx i, const bt_bodies
 }
 
 /// Coefficients of the pair (i, j), gid[i] < gid[j]: those of j (bergtow/body.h).
-static inline double bt_pair_friction(const bt_bodies *b, bt_idx i, bt_idx j)
+static inline double bt_pair_friction(const bt_bodies *bodies, bt_idx i, bt_idx j)
 {
     (void)i;
-    return b->friction[j];
+    return bodies->friction[j];
 }
-static inline double bt_pair_restitution(const bt_bodies *b, bt_idx i, bt_idx j)
+static inline double bt_pair_restitution(const bt_bodies *bodies, bt_idx i, bt_idx j)
 {
     (void)i;
-    return b->restitution[j];
+    return bodies->restitution[j];
 }
 
 /// x brought into the period from `low`; *laps grows by the periods that were taken off. 0 = not periodic.
@@ -111,11 +112,11 @@ static inline double bt_nearest_image(double d, double period)
 }
 
 /// Vector from the centroid of a to that of b, the nearest image in periodic directions.
-static inline void bt_bodies_offset(const bt_world *w, bt_idx a, bt_idx b, double d[2])
+static inline void bt_bodies_offset(const bt_world *world, bt_idx a, bt_idx b, double d[2])
 {
-    const bt_pose *pa = &w->bodies.pose[a], *pb = &w->bodies.pose[b];
-    d[0] = bt_nearest_image(pb->x - pa->x, w->par.period_x);
-    d[1] = bt_nearest_image(pb->y - pa->y, w->par.period_y);
+    const bt_pose *pa = &world->bodies.pose[a], *pb = &world->bodies.pose[b];
+    d[0] = bt_nearest_image(pb->x - pa->x, world->par.period_x);
+    d[1] = bt_nearest_image(pb->y - pa->y, world->par.period_y);
 }
 
 #endif

@@ -54,13 +54,13 @@ typedef struct bt_arch {
 } bt_arch;
 
 /// concentration, and mean floe size in m (0 without floes): as made, or as the case asks for.
-bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size);
+bt_arch bt_arch_of(const bt_case *input, double concentration, double floe_size);
 
 /// "rigid floes" or "floes": of what the arches are.
-const char *bt_arch_floes(const bt_arch *a);
+const char *bt_arch_floes(const bt_arch *arch);
 
 /// Warn of a width of which the answer is a property, of ice that ends beside the tow, and of a load without an upper
 /// bound.
-void bt_arch_warn(const bt_arch *a, bt_errors *warnings);
+void bt_arch_warn(const bt_arch *arch, bt_errors *warnings);
 
 #endif

@@ -81,17 +81,17 @@ bt_file_kind bt_case_kind_of(const char *path)
     return kind;
 }
 
-static bt_case_file *add(bt_case_files *f, char *path, char *text, size_t size)
+static bt_case_file *add(bt_case_files *files, char *path, char *text, size_t size)
 {
-    f->file = bt_realloc(f->file, (size_t)f->n + 1, sizeof *f->file);
-    f->file[f->n] = (bt_case_file){.path = path, .text = text, .size = size};
-    return &f->file[f->n++];
+    files->file = bt_realloc(files->file, (size_t)files->n + 1, sizeof *files->file);
+    files->file[files->n] = (bt_case_file){.path = path, .text = text, .size = size};
+    return &files->file[files->n++];
 }
 
 /// Parse the last file, which must hold keys of a case.
-static bt_status parse(bt_case_files *f, bt_errors *err)
+static bt_status parse(bt_case_files *files, bt_errors *err)
 {
-    bt_case_file *file = &f->file[f->n - 1];
+    bt_case_file *file = &files->file[files->n - 1];
     const bt_node *root = file->root = bt_tree_parse(file->text, file->size, file->path, err);
     if (!root) return BT_ERR_CASE;
     if (root->kind != BT_NODE_MAP)
@@ -110,20 +110,20 @@ static bt_status parse(bt_case_files *f, bt_errors *err)
 }
 
 /// The file of this absolute path, or NULL.
-static const bt_case_file *find(const bt_case_files *f, const char *absolute)
+static const bt_case_file *find(const bt_case_files *files, const char *absolute)
 {
-    for (int i = 0; i < f->n; i++) {
-        char *other = realpath(f->file[i].path, NULL);
+    for (int i = 0; i < files->n; i++) {
+        char *other = realpath(files->file[i].path, NULL);
         const bool same = other && !strcmp(other, absolute);
         free(other);
-        if (same) return &f->file[i];
+        if (same) return &files->file[i];
     }
     return NULL;
 }
 
-static bt_status read_base(bt_case_files *f, const bt_node *value, int line, bt_errors *err)
+static bt_status read_base(bt_case_files *files, const bt_node *value, int line, bt_errors *err)
 {
-    const char *from = f->file[f->n - 1].path;
+    const char *from = files->file[files->n - 1].path;
     if (value->kind != BT_NODE_SCALAR || !*value->text) {
         bt_errors_add(err, "%s:%d: base: needs the name of one file, as in base: basin-80.yml", from, line);
         return BT_ERR_CASE;
@@ -131,23 +131,23 @@ static bt_status read_base(bt_case_files *f, const bt_node *value, int line, bt_
     char *folder = bt_file_folder(from),
          *path = *value->text == '/' ? bt_text_copy(value->text) : bt_file_join(folder, value->text),
          *absolute = realpath(path, NULL), *text = NULL;
-    const bt_case_file *twin = absolute ? find(f, absolute) : NULL;
+    const bt_case_file *twin = absolute ? find(files, absolute) : NULL;
     bt_status status = BT_ERR_CASE;
     size_t size = 0;
     bt_errors why = {0};
     if (twin)
         bt_errors_add(err, "%s:%d: base: %s is read already: it, or its base, leads here; remove one of these keys",
                       from, line, twin->path);
-    else if (f->n > BT_MOST_BASES)
+    else if (files->n > BT_MOST_BASES)
         bt_errors_add(err, "%s:%d: base: more than %d files, each based on the next; write the keys into fewer", from,
                       line, BT_MOST_BASES);
     else status = bt_file_read_to(path, "a case file", BT_MOST_TEXT_BYTES, &text, &size, &why);
     for (size_t i = 0; i < why.n; i++) bt_errors_add(err, "%s:%d: base: %s", from, line, why.text[i]);
     bt_errors_free(&why);
     if (status == BT_OK) {
-        add(f, path, text, size);
+        add(files, path, text, size);
         path = text = NULL;
-        status = parse(f, err);
+        status = parse(files, err);
     }
     free(folder);
     free(path);
@@ -156,42 +156,42 @@ static bt_status read_base(bt_case_files *f, const bt_node *value, int line, bt_
     return status;
 }
 
-bt_status bt_case_files_read(bt_case_files *f, const char *path, const char *text, size_t size, bool alone,
+bt_status bt_case_files_read(bt_case_files *files, const char *path, const char *text, size_t size, bool alone,
                              bt_errors *err)
 {
-    *f = (bt_case_files){0};
+    *files = (bt_case_files){0};
     char *copy = bt_alloc(size + 1, 1);
-    add(f, bt_text_copy(path), memcpy(copy, text, size), size);
-    bt_status status = parse(f, err);
+    add(files, bt_text_copy(path), memcpy(copy, text, size), size);
+    bt_status status = parse(files, err);
     int line = 0;
-    if (status == BT_OK && alone && bt_tree_has(f->file[0].root, "base")) {
+    if (status == BT_OK && alone && bt_tree_has(files->file[0].root, "base")) {
         bt_errors_add(err, "%s: base: a case that has been kept has none; the file is damaged", path);
         status = BT_ERR_CASE;
     }
-    for (const bt_node *base; status == BT_OK && (base = entry(f->file[f->n - 1].root, "base", &line));)
-        status = read_base(f, base, line, err);
+    for (const bt_node *base; status == BT_OK && (base = entry(files->file[files->n - 1].root, "base", &line));)
+        status = read_base(files, base, line, err);
     return status;
 }
 
-void bt_case_files_free(bt_case_files *f)
+void bt_case_files_free(bt_case_files *files)
 {
-    for (int i = 0; i < f->n; i++) {
-        free(f->file[i].path);
-        free(f->file[i].text);
-        bt_tree_free(f->file[i].root);
+    for (int i = 0; i < files->n; i++) {
+        free(files->file[i].path);
+        free(files->file[i].text);
+        bt_tree_free(files->file[i].root);
     }
-    free(f->file);
-    *f = (bt_case_files){0};
+    free(files->file);
+    *files = (bt_case_files){0};
 }
 
-char *bt_case_files_text(const bt_case_files *f)
+char *bt_case_files_text(const bt_case_files *files)
 {
-    if (f->n == 1) return bt_text_copy(f->file[0].text);
+    if (files->n == 1) return bt_text_copy(files->file[0].text);
     bt_text text;
     bt_text_begin(&text);
-    for (int i = 0; i < f->n; i++) {
-        const char *slash = strrchr(f->file[i].path, '/');
-        fprintf(text.out, "--- # %s\n%s\n", slash ? slash + 1 : f->file[i].path, f->file[i].text);
+    for (int i = 0; i < files->n; i++) {
+        const char *slash = strrchr(files->file[i].path, '/');
+        fprintf(text.out, "--- # %s\n%s\n", slash ? slash + 1 : files->file[i].path, files->file[i].text);
     }
     return bt_text_end(&text);
 }

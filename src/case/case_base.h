@@ -22,13 +22,13 @@ typedef struct bt_case_files {
 /// Take over path and text of the case's own file, of size bytes, and read those that it is based on; every text is
 /// parsed. alone: a base is refused, and no file read. After an error, too, bt_case_files_free. Errors: BT_ERR_CASE,
 /// BT_ERR_IO (a base cannot be read).
-bt_status bt_case_files_read(bt_case_files *f, const char *path, const char *text, size_t size, bool alone,
+bt_status bt_case_files_read(bt_case_files *files, const char *path, const char *text, size_t size, bool alone,
                              bt_errors *err);
-void bt_case_files_free(bt_case_files *f);
+void bt_case_files_free(bt_case_files *files);
 
 /// All texts as one, for the record: of a case without a base its own, otherwise one YAML document a file, which begins
 /// with "--- # FILE". Caller frees.
-char *bt_case_files_text(const bt_case_files *f);
+char *bt_case_files_text(const bt_case_files *files);
 
 /// What a file holds, by its keys; other where it cannot be read. Pipes, which can be read only once, are not read.
 typedef enum { BT_FILE_OTHER, BT_FILE_CASE, BT_FILE_STUDY } bt_file_kind;

@@ -22,8 +22,6 @@
 #include <string.h>
 #include <unistd.h>
 
-typedef bt_check check;
-
 typedef struct {
     double x_min, x_max, y_min, y_max;
 } box;
@@ -31,25 +29,27 @@ typedef struct {
 // Bounds of an outline at a pose.
 static box bounds_of(int n, const double *v, double x, double y, double yaw)
 {
-    box b = {INFINITY, -INFINITY, INFINITY, -INFINITY};
+    box bounds = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     double cosine = bt_cos(yaw), sine = bt_sin(yaw);
     for (int i = 0; i < n; i++) {
         double px = x + cosine * v[2 * i] - sine * v[2 * i + 1], py = y + sine * v[2 * i] + cosine * v[2 * i + 1];
-        b.x_min = bt_min(b.x_min, px), b.x_max = bt_max(b.x_max, px);
-        b.y_min = bt_min(b.y_min, py), b.y_max = bt_max(b.y_max, py);
+        bounds.x_min = bt_min(bounds.x_min, px), bounds.x_max = bt_max(bounds.x_max, px);
+        bounds.y_min = bt_min(bounds.y_min, py), bounds.y_max = bt_max(bounds.y_max, py);
     }
-    return b;
+    return bounds;
 }
 
 // Where a body stands against the boundaries: the axis in which it is outside, or 0. Walls hold the whole outline, open
 // and periodic boundaries the centroid. The slack is round-off of x0 + length.
-static char outside(const bt_case *c, box b, double x, double y)
+static char outside(const bt_case *input, box bounds, double x, double y)
 {
-    double slack = 1e-9 * (c->domain.length + c->domain.width);
-    bool ends = c->domain.ends == BT_BOUND_WALL, sides = c->domain.sides == BT_BOUND_WALL;
-    if ((ends ? b.x_min : x) < c->domain.x0 - slack || (ends ? b.x_max : x) > c->domain.x0 + c->domain.length + slack)
+    double slack = 1e-9 * (input->domain.length + input->domain.width);
+    bool ends = input->domain.ends == BT_BOUND_WALL, sides = input->domain.sides == BT_BOUND_WALL;
+    if ((ends ? bounds.x_min : x) < input->domain.x0 - slack ||
+        (ends ? bounds.x_max : x) > input->domain.x0 + input->domain.length + slack)
         return 'x';
-    if ((sides ? b.y_min : y) < c->domain.y0 - slack || (sides ? b.y_max : y) > c->domain.y0 + c->domain.width + slack)
+    if ((sides ? bounds.y_min : y) < input->domain.y0 - slack ||
+        (sides ? bounds.y_max : y) > input->domain.y0 + input->domain.width + slack)
         return 'y';
     return 0;
 }
@@ -67,12 +67,12 @@ char *bt_case_named_file(const char *from, const char *file)
 }
 
 /// Files that the case names, as absolute paths: the resolved file lies elsewhere.
-static void follow_files(const check *k)
+static void follow_files(const bt_check *check)
 {
     for (int i = 0; i < bt_n_case_keys; i++) {
         if (!bt_case_keys[i].file) continue;
-        char **file = (char **)((char *)k->c + bt_case_keys[i].offset);
-        char *absolute = *file ? bt_case_named_file(bt_check_file(k, bt_case_keys[i].name), *file) : NULL;
+        char **file = (char **)((char *)check->c + bt_case_keys[i].offset);
+        char *absolute = *file ? bt_case_named_file(bt_check_file(check, bt_case_keys[i].name), *file) : NULL;
         if (!absolute) continue;
         free(*file);
         *file = absolute;
@@ -88,21 +88,23 @@ static void follow_start(bool drifts, double *vx, double *vy)
     bt_check_fill(vy, 0);
 }
 
-static void follow(const check *k)
+static void follow(const bt_check *check)
 {
-    bt_case *c = k->c;
-    bt_case_fill_scene(c);
-    const bool drift = c->ice.start == BT_START_DRIFT;
-    follow_start(drift && c->tow.mode == BT_TOW_NONE && c->body.shape != BT_BODY_ABSENT, &c->body.vx, &c->body.vy);
-    for (bt_idx i = 0; i < c->n_floes; i++) {
-        bt_floe_def *f = &c->floes[i];
-        bt_check_fill(&f->width, f->length);
-        bt_check_fill(&f->thickness, c->ice.thickness);
-        follow_start(drift && !f->fixed, &f->vx, &f->vy);
+    bt_case *input = check->c;
+    bt_case_fill_scene(input);
+    const bool drift = input->ice.start == BT_START_DRIFT;
+    follow_start(drift && input->tow.mode == BT_TOW_NONE && input->body.shape != BT_BODY_ABSENT, &input->body.vx,
+                 &input->body.vy);
+    for (bt_idx i = 0; i < input->n_floes; i++) {
+        bt_floe_def *floe = &input->floes[i];
+        bt_check_fill(&floe->width, floe->length);
+        bt_check_fill(&floe->thickness, input->ice.thickness);
+        follow_start(drift && !floe->fixed, &floe->vx, &floe->vy);
     }
-    bt_case_fill_size(c);
-    if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
-    follow_files(k);
+    bt_case_fill_size(input);
+    if (input->output.frame_interval == 0 && input->run.duration > 0)
+        input->output.frame_interval = input->run.duration / 200;
+    follow_files(check);
 }
 
 // ---- defaults of the frames ----
@@ -114,221 +116,236 @@ static void follow(const check *k)
 // speed, a named line its stiffness). Where it is then still none and has an effect, the case is refused. Other
 // defaults hold in both frames, or follow from the scene in the geographic one (case_fill.c, case_tow.c).
 
-static double *number(bt_case *c, const bt_key *k) { return (double *)(void *)((char *)c + k->offset); }
+static double *number(bt_case *input, const bt_key *key) { return (double *)(void *)((char *)input + key->offset); }
 
-static bool is_basin(const bt_case *c) { return c->domain.frame == BT_FRAME_BASIN; }
+static bool is_basin(const bt_case *input) { return input->domain.frame == BT_FRAME_BASIN; }
 
 /// May the run use the value of this key?
-static bool is_used(const bt_case *c, const char *key, bool by_hand)
+static bool is_used(const bt_case *input, const char *key, bool by_hand)
 {
-    if (bt_case_is_unused(c, key)) return false;
-    if (!strcmp(key, "ice.thickness")) return bt_case_makes_ice(c) || by_hand || c->ice.outlines;
-    if (!strcmp(key, "tow.speed")) return c->body.shape != BT_BODY_ABSENT && c->tow.mode != BT_TOW_NONE;
+    if (bt_case_is_unused(input, key)) return false;
+    if (!strcmp(key, "ice.thickness")) return bt_case_makes_ice(input) || by_hand || input->ice.outlines;
+    if (!strcmp(key, "tow.speed")) return input->body.shape != BT_BODY_ABSENT && input->tow.mode != BT_TOW_NONE;
     return true;
 }
 
 /// Numbers that nobody gave, that have an effect, and whose default is a model basin's, become NaN. by_hand: there are
 /// floes of the list without a thickness of their own.
-static void clear_at_sea(const bt_check *k, bool by_hand)
+static void clear_at_sea(const bt_check *check, bool by_hand)
 {
-    if (!k->from || is_basin(k->c)) return;
+    if (!check->from || is_basin(check->c)) return;
     for (int i = 0; i < bt_n_case_keys; i++) {
         const bt_key *row = &bt_case_keys[i];
-        if (!row->at_sea || row->type != BT_KEY_REAL || bt_check_given(k, row->name)) continue;
-        if (is_used(k->c, row->name, by_hand)) *number(k->c, row) = NAN;
+        if (!row->at_sea || row->type != BT_KEY_REAL || bt_check_given(check, row->name)) continue;
+        if (is_used(check->c, row->name, by_hand)) *number(check->c, row) = NAN;
     }
 }
 
-static bool is_missing(const bt_check *k, const bt_key *row)
+static bool is_missing(const bt_check *check, const bt_key *row)
 {
-    if (row->type == BT_KEY_REAL) return isnan(*number(k->c, row));
-    return k->from && !is_basin(k->c) && !bt_check_given(k, row->name);
+    if (row->type == BT_KEY_REAL) return isnan(*number(check->c, row));
+    return check->from && !is_basin(check->c) && !bt_check_given(check, row->name);
 }
 
 /// geojson.c asks for a thickness where outlines lack one.
-static bool may_miss(const bt_case *c, const char *key, bool by_hand)
+static bool may_miss(const bt_case *input, const char *key, bool by_hand)
 {
-    return !strcmp(key, "ice.thickness") && c->ice.outlines && !by_hand;
+    return !strcmp(key, "ice.thickness") && input->ice.outlines && !by_hand;
 }
 
 /// Refuse a case that lacks such a value once others have followed from what it gives. ice.thickness beside outlines
 /// may stay NaN: the file says whether it is needed.
-static void check_at_sea(const bt_check *k, bool by_hand)
+static void check_at_sea(const bt_check *check, bool by_hand)
 {
-    bt_case *c = k->c;
-    if (!bt_check_sound(k, "domain.frame")) return;
+    bt_case *input = check->c;
+    if (!bt_check_sound(check, "domain.frame")) return;
     for (int i = 0; i < bt_n_case_keys; i++) {
         const bt_key *row = &bt_case_keys[i];
-        if (!row->at_sea || !bt_check_sound(k, row->name) || !is_missing(k, row)) continue;
-        if (!is_used(c, row->name, by_hand)) { // a number without effect that is given as none
-            bt_schema_preset(row, row->type == BT_KEY_REAL, c);
+        if (!row->at_sea || !bt_check_sound(check, row->name) || !is_missing(check, row)) continue;
+        if (!is_used(input, row->name, by_hand)) { // a number without effect that is given as none
+            bt_schema_preset(row, row->type == BT_KEY_REAL, input);
             continue;
         }
-        if (may_miss(c, row->name, by_hand)) continue;
-        if (is_basin(c)) bt_check_fault(k, row->name, "is none where a value is needed; give it (%s)", row->at_sea);
+        if (may_miss(input, row->name, by_hand)) continue;
+        if (is_basin(input))
+            bt_check_fault(check, row->name, "is none where a value is needed; give it (%s)", row->at_sea);
         else
-            bt_check_fault(k, row->name,
+            bt_check_fault(check, row->name,
                            "missing, and in domain.frame: geographic it has no default (that would be a model "
                            "basin's); add it (%s)",
                            row->at_sea);
-        if (k->from) k->from[i].faulty = true;
+        if (check->from) check->from[i].faulty = true;
     }
 }
 
 // ---- checks ----
 
-static void check_run(const check *k)
+static void check_run(const bt_check *check)
 {
-    const bt_case *c = k->c;
-    if (!bt_check_sound(k, "run.dt run.duration")) return;
-    if (!(c->run.dt > 0) || !(c->run.duration > 0)) return;
-    double steps = (double)bt_case_steps(c);
+    const bt_case *input = check->c;
+    if (!bt_check_sound(check, "run.dt run.duration")) return;
+    if (!(input->run.dt > 0) || !(input->run.duration > 0)) return;
+    double steps = (double)bt_case_steps(input);
     if (steps > BT_MOST_STEPS)
-        bt_check_fault(k, "run.dt",
+        bt_check_fault(check, "run.dt",
                        "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run",
                        steps, BT_MOST_STEPS);
-    if (bt_check_sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > BT_MOST_FRAMES)
-        bt_check_fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it",
-                       c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
+    if (bt_check_sound(check, "output.frame_interval") && input->run.duration / input->output.frame_interval >
+        BT_MOST_FRAMES)
+        bt_check_fault(check, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it",
+                       input->run.duration / input->output.frame_interval, BT_MOST_FRAMES);
 }
 
-static void check_closing(const check *k, const char *key, const char *boundary_key, double closing, bt_bound boundary,
-                          double extent)
+static void check_closing(const bt_check *check, const char *key, const char *boundary_key, double closing,
+                          bt_bound boundary, double extent)
 {
-    if (closing == 0 || boundary != BT_BOUND_WALL || !bt_check_sound(k, key) || !bt_check_sound(k, boundary_key))
+    if (closing == 0 || boundary != BT_BOUND_WALL || !bt_check_sound(check, key) ||
+        !bt_check_sound(check, boundary_key))
         return;
-    if (bt_check_sound(k, "run.duration domain.length domain.width") && 2 * closing * k->c->run.duration >= extent)
+    if (bt_check_sound(check, "run.duration domain.length domain.width") &&
+        2 * closing * check->c->run.duration >= extent)
         bt_check_fault(
-            k, key,
+            check, key,
             "%g m/s brings the walls together after %g s, before the end of the run; slow them or shorten run.duration",
             closing, extent / (2 * closing));
 }
 
-static void check_domain(const check *k)
+static void check_domain(const bt_check *check)
 {
-    const bt_case *c = k->c;
-    check_closing(k, "domain.ends_closing", "domain.ends", c->domain.ends_closing, c->domain.ends, c->domain.length);
-    check_closing(k, "domain.sides_closing", "domain.sides", c->domain.sides_closing, c->domain.sides, c->domain.width);
+    const bt_case *input = check->c;
+    check_closing(check, "domain.ends_closing", "domain.ends", input->domain.ends_closing, input->domain.ends,
+                  input->domain.length);
+    check_closing(check, "domain.sides_closing", "domain.sides", input->domain.sides_closing, input->domain.sides,
+                  input->domain.width);
 }
 
 /// Reported elsewhere: sizes in the wrong order, a region without room.
-static void check_floes_made(const check *k)
+static void check_floes_made(const bt_check *check)
 {
-    const bt_case *c = k->c;
-    const bool power = c->ice.size_law == BT_SIZE_POWER;
-    const bool sized = power ? c->ice.size_min > 0 && c->ice.size_min < c->ice.size_max : c->ice.size > 0;
-    if (!bt_case_makes_ice(c) || !sized || c->ice.x_min >= c->ice.x_max || c->ice.y_min >= c->ice.y_max ||
-        !bt_check_sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent "
-                           "ice.size_spread ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length "
-                           "domain.width"))
+    const bt_case *input = check->c;
+    const bool power = input->ice.size_law == BT_SIZE_POWER;
+    const bool sized = power ? input->ice.size_min > 0 && input->ice.size_min < input->ice.size_max
+                             : input->ice.size > 0;
+    if (!bt_case_makes_ice(input) || !sized || input->ice.x_min >= input->ice.x_max ||
+        input->ice.y_min >= input->ice.y_max ||
+        !bt_check_sound(check, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent "
+                               "ice.size_spread ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 "
+                               "domain.length "
+                               "domain.width"))
         return;
-    const double n = bt_case_floes_made(c);
+    const double n = bt_case_floes_made(input);
     if (n > BT_MOST_FLOES)
-        bt_check_fault(k, power ? "ice.size_min" : "ice.size",
+        bt_check_fault(check, power ? "ice.size_min" : "ice.size",
                        "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n,
                        BT_MOST_FLOES);
 }
 
-static bool check_body(const check *k, int *n, double *v)
+static bool check_body(const bt_check *check, int *n, double *v)
 {
-    const bt_case *c = k->c;
+    const bt_case *input = check->c;
     *n = 0;
-    if (c->body.shape == BT_BODY_ABSENT ||
-        !bt_check_sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw"))
+    if (input->body.shape == BT_BODY_ABSENT ||
+        !bt_check_sound(check, "body.shape body.length body.width body.vertices body.x body.y body.yaw"))
         return false;
-    if (c->body.shape == BT_BODY_POLYGON && !c->body.n_vertices) return false;
+    if (input->body.shape == BT_BODY_POLYGON && !input->body.n_vertices) return false;
     const char *why = NULL;
-    *n = bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, &why);
+    *n = bt_case_outline(input->body.shape, input->body.length, input->body.width, input->body.n_vertices,
+                         input->body.vertices, v, &why);
     if (why) {
-        bt_check_fault(k, c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length",
+        bt_check_fault(check, input->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length",
                        "the waterline is refused: %s", why);
         return false;
     }
-    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides"))
+    if (!bt_check_sound(check, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides"))
         return false;
-    box b = bounds_of(*n, v, c->body.x, c->body.y, c->body.yaw);
-    const char *extent = c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length";
-    const bool too_long = b.x_max - b.x_min >= c->domain.length, too_wide = b.y_max - b.y_min >= c->domain.width;
+    box bounds = bounds_of(*n, v, input->body.x, input->body.y, input->body.yaw);
+    const char *extent = input->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length";
+    const bool too_long = bounds.x_max - bounds.x_min >= input->domain.length,
+               too_wide = bounds.y_max - bounds.y_min >= input->domain.width;
     if (too_long)
-        bt_check_fault(k, extent,
+        bt_check_fault(check, extent,
                        "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length",
-                       b.x_max - b.x_min, c->domain.length);
+                       bounds.x_max - bounds.x_min, input->domain.length);
     if (too_wide)
-        bt_check_fault(k, extent,
+        bt_check_fault(check, extent,
                        "the body spans %g m along y in a domain of %g m; take a smaller body or a larger domain.width",
-                       b.y_max - b.y_min, c->domain.width);
+                       bounds.y_max - bounds.y_min, input->domain.width);
     if (too_long || too_wide) return false;
-    char axis = outside(c, b, c->body.x, c->body.y);
+    char axis = outside(input, bounds, input->body.x, input->body.y);
     if (axis == 'x')
-        bt_check_fault(k, "body.x", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.x_min,
-                       b.x_max, c->domain.x0, c->domain.x0 + c->domain.length);
+        bt_check_fault(check, "body.x", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside",
+                       bounds.x_min, bounds.x_max, input->domain.x0, input->domain.x0 + input->domain.length);
     if (axis == 'y')
-        bt_check_fault(k, "body.y", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.y_min,
-                       b.y_max, c->domain.y0, c->domain.y0 + c->domain.width);
+        bt_check_fault(check, "body.y", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside",
+                       bounds.y_min, bounds.y_max, input->domain.y0, input->domain.y0 + input->domain.width);
     return !axis;
 }
 
-static void check_tow(const check *k)
+static void check_tow(const bt_check *check)
 {
-    bt_case *c = k->c;
-    if (!bt_check_sound(k, "tow.mode tow.speed body.shape")) return;
-    if (c->body.shape == BT_BODY_ABSENT && c->tow.mode != BT_TOW_NONE) {
-        if (bt_check_given(k, "tow.mode"))
-            bt_check_fault(k, "tow.mode",
+    bt_case *input = check->c;
+    if (!bt_check_sound(check, "tow.mode tow.speed body.shape")) return;
+    if (input->body.shape == BT_BODY_ABSENT && input->tow.mode != BT_TOW_NONE) {
+        if (bt_check_given(check, "tow.mode"))
+            bt_check_fault(check, "tow.mode",
                            "there is no body to tow (body.shape: none); set tow.mode: none or give a body");
-        else c->tow.mode = BT_TOW_NONE;
+        else input->tow.mode = BT_TOW_NONE;
     }
-    if (c->tow.mode == BT_TOW_NONE && c->tow.speed != 0) {
-        if (bt_check_given(k, "tow.speed") && bt_check_given(k, "tow.mode"))
-            bt_check_fault(k, "tow.speed",
+    if (input->tow.mode == BT_TOW_NONE && input->tow.speed != 0) {
+        if (bt_check_given(check, "tow.speed") && bt_check_given(check, "tow.mode"))
+            bt_check_fault(check, "tow.speed",
                            "%g m/s has no effect with tow.mode: none; set it to 0, or set tow.mode: speed",
-                           c->tow.speed);
-        else c->tow.speed = 0;
+                           input->tow.speed);
+        else input->tow.speed = 0;
     }
 }
 
 /// Way of the tow after which the body meets a wall, `room` ahead of it at the start, that comes with this speed;
 /// INFINITY: not within the run. towards: cosine of the angle between the course and the way to the wall.
-static double way_to_wall(const bt_case *c, double room, double towards, double closing)
+static double way_to_wall(const bt_case *input, double room, double towards, double closing)
 {
-    const double end = c->run.duration, slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (!(towards > 0) || towards * bt_case_tow_led(c, end) + closing * end <= room + slack) return INFINITY;
+    const double end = input->run.duration, slack = 1e-9 * (input->domain.length + input->domain.width);
+    if (!(towards > 0) || towards * bt_case_tow_led(input, end) + closing * end <= room + slack) return INFINITY;
     if (closing == 0) return bt_max(0, room / towards);
-    int64_t early = 0, late = bt_case_steps(c);
+    int64_t early = 0, late = bt_case_steps(input);
     while (late - early > 1) {
         const int64_t middle = early + (late - early) / 2;
-        const double time = (double)middle * c->run.dt;
-        if (towards * bt_case_tow_led(c, time) + closing * time <= room) early = middle;
+        const double time = (double)middle * input->run.dt;
+        if (towards * bt_case_tow_led(input, time) + closing * time <= room) early = middle;
         else late = middle;
     }
-    return bt_case_tow_led(c, (double)early * c->run.dt);
+    return bt_case_tow_led(input, (double)early * input->run.dt);
 }
 
 // A body of prescribed velocity goes through a wall: two infinite masses have no contact law.
-static void check_path(const check *k, int n, const double *v)
+static void check_path(const bt_check *check, int n, const double *v)
 {
-    const bt_case *c = k->c;
+    const bt_case *input = check->c;
     // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A
     // vessel may be slower. way-points: case_tow.c
-    const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0;
-    if (!straight || !(c->run.duration > 0) ||
-        !bt_check_sound(k, "run.dt run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme "
-                           "domain.ends_closing domain.sides_closing"))
+    const bool straight = input->tow.mode != BT_TOW_NONE && input->tow.mode != BT_TOW_THRUST &&
+                          input->tow.n_waypoints == 0;
+    if (!straight || !(input->run.duration > 0) ||
+        !bt_check_sound(check, "run.dt run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme "
+                               "domain.ends_closing domain.sides_closing"))
         return;
-    double way = bt_case_tow_led(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
-    const box b = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
+    double way = bt_case_tow_led(input, input->run.duration), ux = bt_cos(input->tow.direction),
+           uy = bt_sin(input->tow.direction);
+    const box bounds = bounds_of(n, v, input->body.x, input->body.y, input->body.yaw);
     double reach = INFINITY;
-    if (c->domain.ends == BT_BOUND_WALL) {
-        reach = bt_min(reach, way_to_wall(c, c->domain.x0 + c->domain.length - b.x_max, ux, c->domain.ends_closing));
-        reach = bt_min(reach, way_to_wall(c, b.x_min - c->domain.x0, -ux, c->domain.ends_closing));
+    if (input->domain.ends == BT_BOUND_WALL) {
+        reach = bt_min(reach, way_to_wall(input, input->domain.x0 + input->domain.length - bounds.x_max, ux,
+                                          input->domain.ends_closing));
+        reach = bt_min(reach, way_to_wall(input, bounds.x_min - input->domain.x0, -ux, input->domain.ends_closing));
     }
-    if (c->domain.sides == BT_BOUND_WALL) {
-        reach = bt_min(reach, way_to_wall(c, c->domain.y0 + c->domain.width - b.y_max, uy, c->domain.sides_closing));
-        reach = bt_min(reach, way_to_wall(c, b.y_min - c->domain.y0, -uy, c->domain.sides_closing));
+    if (input->domain.sides == BT_BOUND_WALL) {
+        reach = bt_min(reach, way_to_wall(input, input->domain.y0 + input->domain.width - bounds.y_max, uy,
+                                          input->domain.sides_closing));
+        reach = bt_min(reach, way_to_wall(input, bounds.y_min - input->domain.y0, -uy, input->domain.sides_closing));
     }
     if (isinf(reach)) return;
-    const double time = bt_case_tow_last(c, reach);
-    bt_check_fault(k, "run.duration",
+    const double time = bt_case_tow_last(input, reach);
+    bt_check_fault(check, "run.duration",
                    "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
                    "enlarge the domain",
                    way, reach, time);
@@ -364,139 +381,140 @@ static double least_gyration2(int n, const double *v)
 
 /// Walls that close on the body: however it turns, it needs its least width. Between open ends it may be towed away,
 /// and guard.overlap: 0 lets bodies into each other.
-static void check_squeeze(const check *k, const char *key, double closing, double extent, int n, const double *v)
+static void check_squeeze(const bt_check *check, const char *key, double closing, double extent, int n, const double *v)
 {
-    const bt_case *c = k->c;
-    const bool open = c->domain.ends == BT_BOUND_OPEN || c->domain.sides == BT_BOUND_OPEN;
-    if (closing == 0 || open || c->guard.overlap == 0 || !bt_check_sound(k, key) ||
-        !bt_check_sound(k, "run.dt run.duration domain.length domain.width domain.ends domain.sides"))
+    const bt_case *input = check->c;
+    const bool open = input->domain.ends == BT_BOUND_OPEN || input->domain.sides == BT_BOUND_OPEN;
+    if (closing == 0 || open || input->guard.overlap == 0 || !bt_check_sound(check, key) ||
+        !bt_check_sound(check, "run.dt run.duration domain.length domain.width domain.ends domain.sides"))
         return;
-    const double left = extent - 2 * closing * c->run.duration, needed = least_width(n, v);
+    const double left = extent - 2 * closing * input->run.duration, needed = least_width(n, v);
     if (left > 0 && left < needed * (1 - 1e-9)) // 0: check_closing
-        bt_check_fault(k, key,
+        bt_check_fault(check, key,
                        "%g m/s leaves %g m between the walls at the end of the run, and the body is %g m wide where it "
                        "is narrowest; slow them, or end the run after %.10g s",
-                       closing, left, needed, floor((extent - needed) / (2 * closing * c->run.dt)) * c->run.dt);
+                       closing, left, needed, floor((extent - needed) / (2 * closing * input->run.dt)) * input->run.dt);
 }
 
-static void check_floe(const check *k, int index)
+static void check_floe(const bt_check *check, int index)
 {
-    const bt_case *c = k->c;
-    const bt_floe_def *f = &c->floes[index];
+    const bt_case *input = check->c;
+    const bt_floe_def *floe = &input->floes[index];
     char where[256];
-    const char *file = c->floes_path ? c->floes_path : c->path;
-    if (f->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", file ? file : "case", f->line, index);
-    else snprintf(where, sizeof where, "%.180s: floes[%d]", c->path ? c->path : "case", index);
-    bool polygon = f->shape == BT_BODY_POLYGON;
-    const size_t before = k->err->n;
-    if (polygon && !f->n_vertices)
-        bt_errors_add(k->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
-    if (!polygon && f->n_vertices)
+    const char *file = input->floes_path ? input->floes_path : input->path;
+    if (floe->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", file ? file : "case", floe->line, index);
+    else snprintf(where, sizeof where, "%.180s: floes[%d]", input->path ? input->path : "case", index);
+    bool polygon = floe->shape == BT_BODY_POLYGON;
+    const size_t before = check->err->n;
+    if (polygon && !floe->n_vertices)
+        bt_errors_add(check->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
+    if (!polygon && floe->n_vertices)
         bt_errors_add(
-            k->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices", where);
-    else if (!polygon && !(f->length > 0)) bt_errors_add(k->err, "%s: has no length; give it, as in 1 m", where);
-    if (k->err->n > before) return;
+            check->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices",
+            where);
+    else if (!polygon && !(floe->length > 0)) bt_errors_add(check->err, "%s: has no length; give it, as in 1 m", where);
+    if (check->err->n > before) return;
     double v[2 * BT_MAX_VERTICES];
     const char *why = NULL;
-    int n = bt_case_floe_admit(f, v, &why);
+    int n = bt_case_floe_admit(floe, v, &why);
     if (why) {
-        bt_errors_add(k->err, "%s: the outline is refused: %s", where, why);
+        bt_errors_add(check->err, "%s: the outline is refused: %s", where, why);
         return;
     }
-    if (isnan(f->thickness)) return; // that of the ice, which is asked for
+    if (isnan(floe->thickness)) return; // that of the ice, which is asked for
     char text[BT_ICE_WHY];
-    const bt_moments m = bt_shape_moments(n, v);
-    const bt_ice_floe given = {n, v, f->x, f->y, f->yaw, f->thickness, NAN, 0};
-    why = sqrt(4 * m.area / BT_PI) < BT_LEAST_SIZE ? "it is less than a millimetre in size; check the unit"
-                                                   : bt_ice_floe_fault(&given, text, NULL);
+    const bt_moments moments = bt_shape_moments(n, v);
+    const bt_ice_floe given = {n, v, floe->x, floe->y, floe->yaw, floe->thickness, NAN, 0};
+    why = sqrt(4 * moments.area / BT_PI) < BT_LEAST_SIZE ? "it is less than a millimetre in size; check the unit"
+                                                         : bt_ice_floe_fault(&given, text, NULL);
     if (why) {
-        bt_errors_add(k->err, "%s: %s", where, why);
+        bt_errors_add(check->err, "%s: %s", where, why);
         return;
     }
-    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides"))
+    if (!bt_check_sound(check, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides"))
         return;
-    box b = bounds_of(n, v, f->x, f->y, f->yaw);
-    const bool long_x = bt_bound_wraps(c->domain.ends) && b.x_max - b.x_min >= c->domain.length,
-               long_y = c->domain.sides == BT_BOUND_PERIODIC && b.y_max - b.y_min >= c->domain.width;
+    box bounds = bounds_of(n, v, floe->x, floe->y, floe->yaw);
+    const bool long_x = bt_bound_wraps(input->domain.ends) && bounds.x_max - bounds.x_min >= input->domain.length,
+               long_y = input->domain.sides == BT_BOUND_PERIODIC && bounds.y_max - bounds.y_min >= input->domain.width;
     if (long_x || long_y)
-        bt_errors_add(k->err,
+        bt_errors_add(check->err,
                       "%s: spans more than the period of the domain in %c; take a shorter floe or a larger domain",
                       where, long_x ? 'x' : 'y');
     // A fixed body may stand in a wall, as a pier does.
-    if (f->fixed) b = (box){f->x, f->x, f->y, f->y};
-    const char axis = outside(c, b, f->x, f->y);
+    if (floe->fixed) bounds = (box){floe->x, floe->x, floe->y, floe->y};
+    const char axis = outside(input, bounds, floe->x, floe->y);
     if (axis)
-        bt_errors_add(k->err, "%s: is outside the domain in %c, %g to %g m; move it inside", where, axis,
-                      axis == 'x' ? b.x_min : b.y_min, axis == 'x' ? b.x_max : b.y_max);
+        bt_errors_add(check->err, "%s: is outside the domain in %c, %g to %g m; move it inside", where, axis,
+                      axis == 'x' ? bounds.x_min : bounds.y_min, axis == 'x' ? bounds.x_max : bounds.y_max);
 }
 
-bt_status bt_case_check(bt_case *c, bt_origin *from, bt_errors *err)
+bt_status bt_case_check(bt_case *input, bt_origin *from, bt_errors *err)
 {
-    check k = {.c = c, .from = from, .err = err};
+    bt_check check = {.c = input, .from = from, .err = err};
     size_t before = err->n;
     bool by_hand = false;
-    for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || isnan(c->floes[i].thickness);
-    clear_at_sea(&k, by_hand);
-    bt_case_tow_course(&k);
-    follow(&k);
-    bt_case_tow_follow(&k);
-    bt_status loaded = bt_case_read_flow_tables(c, err);
+    for (bt_idx i = 0; i < input->n_floes; i++) by_hand = by_hand || isnan(input->floes[i].thickness);
+    clear_at_sea(&check, by_hand);
+    bt_case_tow_course(&check);
+    follow(&check);
+    bt_case_tow_follow(&check);
+    bt_status loaded = bt_case_read_flow_tables(input, err);
     size_t at_files = err->n;
-    check_at_sea(&k, by_hand);
-    check_run(&k);
-    check_domain(&k);
-    check_floes_made(&k);
+    check_at_sea(&check, by_hand);
+    check_run(&check);
+    check_domain(&check);
+    check_floes_made(&check);
     double v[2 * BT_MAX_VERTICES];
     int n;
-    bool placed = check_body(&k, &n, v);
-    bt_case_tow_hull(c, n, v);
-    check_tow(&k);
-    bt_case_tow_ramp(c);
-    bt_case_tow_check(&k);
-    bt_case_fill_impact(c); // the reference speed goes by that of the tow
-    if (placed) check_path(&k, n, v);
-    if (placed && c->domain.ends == BT_BOUND_WALL)
-        check_squeeze(&k, "domain.ends_closing", c->domain.ends_closing, c->domain.length, n, v);
-    if (placed && c->domain.sides == BT_BOUND_WALL)
-        check_squeeze(&k, "domain.sides_closing", c->domain.sides_closing, c->domain.width, n, v);
-    bt_case_check_window(&k, n, v);
-    bt_case_check_tables(&k);
-    bt_case_lead_follow(c, n, v);
-    bt_case_check_constraints(&k);
-    for (bt_idx i = 0; i < c->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&k, i);
-    if (err->n == before) bt_case_check_cost(&k);
+    bool placed = check_body(&check, &n, v);
+    bt_case_tow_hull(input, n, v);
+    check_tow(&check);
+    bt_case_tow_ramp(input);
+    bt_case_tow_check(&check);
+    bt_case_fill_impact(input); // the reference speed goes by that of the tow
+    if (placed) check_path(&check, n, v);
+    if (placed && input->domain.ends == BT_BOUND_WALL)
+        check_squeeze(&check, "domain.ends_closing", input->domain.ends_closing, input->domain.length, n, v);
+    if (placed && input->domain.sides == BT_BOUND_WALL)
+        check_squeeze(&check, "domain.sides_closing", input->domain.sides_closing, input->domain.width, n, v);
+    bt_case_check_window(&check, n, v);
+    bt_case_check_tables(&check);
+    bt_case_lead_follow(input, n, v);
+    bt_case_check_constraints(&check);
+    for (bt_idx i = 0; i < input->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&check, i);
+    if (err->n == before) bt_case_check_cost(&check);
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
 
-void bt_case_warn_body(const bt_case *c, bt_errors *warnings)
+void bt_case_warn_body(const bt_case *input, bt_errors *warnings)
 {
     double v[2 * BT_MAX_VERTICES];
-    const int n = bt_case_waterline(c, v);
+    const int n = bt_case_waterline(input, v);
     if (!n) return;
     const double ratio =
-        bt_case_body_mass(c) / (c->water.density * bt_shape_extent(n, v).area * c->body.draft);
+        bt_case_body_mass(input) / (input->water.density * bt_shape_extent(n, v).area * input->body.draft);
     if (!(ratio >= 1 / BT_ODD_MASS && ratio <= BT_ODD_MASS))
         bt_warn(warnings, BT_WARN_ODD_MASS,
                       "%s: the body has %.3g times the mass of the water that its waterline and draft displace: is a "
                       "unit wrong?",
-                      c->body.mass > 0 ? "body.mass" : "body.density", ratio);
+                      input->body.mass > 0 ? "body.mass" : "body.density", ratio);
     const double least = least_width(n, v);
-    const double height = least_gyration2(n, v) / c->body.draft - 0.5 * c->body.sail;
-    if (c->body.draft <= BT_ODD_DRAFT * least && height < 0 && c->domain.frame == BT_FRAME_GEOGRAPHIC)
+    const double height = least_gyration2(n, v) / input->body.draft - 0.5 * input->body.sail;
+    if (input->body.draft <= BT_ODD_DRAFT * least && height < 0 && input->domain.frame == BT_FRAME_GEOGRAPHIC)
         bt_warn(warnings, BT_WARN_BERG_STABILITY,
                 "body.draft: %g m and a sail of %.4g m: a column of ice with this waterline would roll over, its "
                 "metacentric height is %.3g m, at a least width of %.4g m; check them, or expect a berg with a foot",
-                c->body.draft, c->body.sail, height, least);
-    if (c->body.draft > BT_ODD_DRAFT * least)
+                input->body.draft, input->body.sail, height, least);
+    if (input->body.draft > BT_ODD_DRAFT * least)
         bt_warn(warnings, BT_WARN_ODD_DRAFT,
                 "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check both, "
                 "and their units",
-                c->body.draft, c->body.draft / least, least);
-    if (c->impact.conversion == BT_IMPACT_DURATION && c->impact.duration > BT_LONG_IMPACT * c->run.dt)
+                input->body.draft, input->body.draft / least, least);
+    if (input->impact.conversion == BT_IMPACT_DURATION && input->impact.duration > BT_LONG_IMPACT * input->run.dt)
         bt_warn(warnings, BT_WARN_LONG_IMPACT,
                       "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "
                       "peaks of collisions are as much too low as that is too long: is a unit wrong?",
-                      c->impact.duration, c->impact.duration / c->run.dt);
+                      input->impact.duration, input->impact.duration / input->run.dt);
 }
 
-bt_status bt_case_finish(bt_case *c, bt_errors *err) { return bt_case_check(c, NULL, err); }
+bt_status bt_case_finish(bt_case *input, bt_errors *err) { return bt_case_check(input, NULL, err); }

@@ -54,7 +54,7 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
 
 // --- numbers that follow ---------------------------------------------------------------------------------------------
 
-double bt_case_tow_sign(const bt_case *c) { return bt_cos(c->tow.direction) < 0 ? -1 : 1; }
+double bt_case_tow_sign(const bt_case *input) { return bt_cos(input->tow.direction) < 0 ? -1 : 1; }
 
 /// fault: why an outline is refused, or NULL.
 static int outline_of(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
@@ -87,49 +87,50 @@ static const char *floe_fault(int n, const double *v)
     return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
 }
 
-int bt_case_floe_admit(const bt_floe_def *f, double *v, const char **why)
+int bt_case_floe_admit(const bt_floe_def *floe, double *v, const char **why)
 {
-    return outline_of(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, floe_fault, why);
+    return outline_of(floe->shape, floe->length, floe->width, floe->n_vertices, floe->vertices, v, floe_fault, why);
 }
 
-int bt_case_floe_outline(const bt_floe_def *f, double *v) { return bt_case_floe_admit(f, v, NULL); }
+int bt_case_floe_outline(const bt_floe_def *floe, double *v) { return bt_case_floe_admit(floe, v, NULL); }
 
-int bt_case_waterline(const bt_case *c, double *v)
+int bt_case_waterline(const bt_case *input, double *v)
 {
-    return bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, NULL);
+    return bt_case_outline(input->body.shape, input->body.length, input->body.width, input->body.n_vertices,
+                           input->body.vertices, v, NULL);
 }
 
-double bt_case_body_length(const bt_case *c, double angle)
+double bt_case_body_length(const bt_case *input, double angle)
 {
-    if (c->body.shape != BT_BODY_POLYGON) return c->body.length;
+    if (input->body.shape != BT_BODY_POLYGON) return input->body.length;
     double v[2 * BT_MAX_VERTICES] = {0};
-    const int n = bt_case_waterline(c, v);
-    const double along = angle - c->body.yaw;
+    const int n = bt_case_waterline(input, v);
+    const double along = angle - input->body.yaw;
     return n ? bt_shape_width(n, v, -bt_sin(along), bt_cos(along)) : 0;
 }
 
-double bt_case_size_moment(const bt_case *c, int k)
+double bt_case_size_moment(const bt_case *input, int k)
 {
-    bt_sizes s;
+    bt_sizes sizes;
     bt_errors refused = {0};
-    const double moment = bt_sizes_init(&s, c, &refused) == BT_OK ? bt_sizes_moment(&s, k) : NAN;
+    const double moment = bt_sizes_init(&sizes, input, &refused) == BT_OK ? bt_sizes_moment(&sizes, k) : NAN;
     bt_errors_free(&refused);
     return moment;
 }
 
-double bt_case_mean_size(const bt_case *c)
+double bt_case_mean_size(const bt_case *input)
 {
-    if (c->ice.size_law != BT_SIZE_POWER || bt_case_reads_field(c)) return c->ice.size;
-    return bt_case_size_moment(c, 1);
+    if (input->ice.size_law != BT_SIZE_POWER || bt_case_reads_field(input)) return input->ice.size;
+    return bt_case_size_moment(input, 1);
 }
 
-bool bt_case_ice_is_random(const bt_case *c)
+bool bt_case_ice_is_random(const bt_case *input)
 {
-    if (c->ice.outlines) return c->ice.thickness_law == BT_THICK_LOGNORMAL && c->ice.thickness_spread > 0;
-    return !c->ice.field && c->ice.concentration > 0;
+    if (input->ice.outlines) return input->ice.thickness_law == BT_THICK_LOGNORMAL && input->ice.thickness_spread > 0;
+    return !input->ice.field && input->ice.concentration > 0;
 }
 
-bool bt_case_key_is_idle(const bt_case *c, const char *key)
+bool bt_case_key_is_idle(const bt_case *input, const char *key)
 {
     static const char *const made[] = {"ice.concentration", "ice.shape",       "ice.sides",    "ice.aspect",
                                        "ice.size",          "ice.size_law",    "ice.size_min", "ice.size_max",
@@ -138,54 +139,55 @@ bool bt_case_key_is_idle(const bt_case *c, const char *key)
                                        // outlines may lack a thickness, and floes given by hand
                                        "ice.thickness_law", "ice.thickness_spread", "ice.thickness"};
     enum { N = sizeof made / sizeof *made };
-    const int n = !bt_case_reads_field(c) ? 0 : c->ice.outlines ? N - 3 : c->n_floes ? N - 1 : N;
+    const int n = !bt_case_reads_field(input) ? 0 : input->ice.outlines ? N - 3 : input->n_floes ? N - 1 : N;
     for (int k = 0; k < n; k++)
         if (!strcmp(made[k], key)) return true;
     return false;
 }
 
-void bt_case_ice_region(const bt_case *c, double low[2], double high[2])
+void bt_case_ice_region(const bt_case *input, double low[2], double high[2])
 {
-    const double whole[4] = {c->domain.x0, c->domain.y0, c->domain.x0 + c->domain.length,
-                             c->domain.y0 + c->domain.width},
-                 given[4] = {c->ice.x_min, c->ice.y_min, c->ice.x_max, c->ice.y_max};
-    const double *of = c->ice.field ? whole : given;
+    const double whole[4] = {input->domain.x0, input->domain.y0, input->domain.x0 + input->domain.length,
+                             input->domain.y0 + input->domain.width},
+                 given[4] = {input->ice.x_min, input->ice.y_min, input->ice.x_max, input->ice.y_max};
+    const double *of = input->ice.field ? whole : given;
     for (int k = 0; k < 2; k++) low[k] = of[k], high[k] = of[2 + k];
 }
 
-double bt_case_made_area(const bt_case *c)
+double bt_case_made_area(const bt_case *input)
 {
-    if (bt_case_reads_field(c)) return 0;
-    double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
+    if (bt_case_reads_field(input)) return 0;
+    double area = (input->ice.x_max - input->ice.x_min) * (input->ice.y_max - input->ice.y_min);
     double v[2 * BT_MAX_VERTICES];
-    int n = bt_case_waterline(c, v);
+    int n = bt_case_waterline(input, v);
     bool inside =
-        c->body.x > c->ice.x_min && c->body.x < c->ice.x_max && c->body.y > c->ice.y_min && c->body.y < c->ice.y_max;
+        input->body.x > input->ice.x_min && input->body.x < input->ice.x_max && input->body.y > input->ice.y_min &&
+        input->body.y < input->ice.y_max;
     if (n && inside) area -= bt_shape_moments(n, v).area;
-    for (bt_idx i = 0; i < c->n_floes; i++) {
-        const bt_floe_def *f = &c->floes[i];
-        if (f->x > c->ice.x_min && f->x < c->ice.x_max && f->y > c->ice.y_min && f->y < c->ice.y_max &&
-            (n = bt_case_floe_outline(f, v)))
+    for (bt_idx i = 0; i < input->n_floes; i++) {
+        const bt_floe_def *floe = &input->floes[i];
+        if (floe->x > input->ice.x_min && floe->x < input->ice.x_max && floe->y > input->ice.y_min &&
+            floe->y < input->ice.y_max && (n = bt_case_floe_outline(floe, v)))
             area -= bt_shape_moments(n, v).area;
     }
-    return bt_max(0, c->ice.concentration * area);
+    return bt_max(0, input->ice.concentration * area);
 }
 
-double bt_case_area_by_hand(const bt_case *c)
+double bt_case_area_by_hand(const bt_case *input)
 {
     double area = 0, v[2 * BT_MAX_VERTICES];
-    for (bt_idx i = 0; i < c->n_floes; i++) {
-        const int n = bt_case_floe_outline(&c->floes[i], v);
+    for (bt_idx i = 0; i < input->n_floes; i++) {
+        const int n = bt_case_floe_outline(&input->floes[i], v);
         if (n) area += bt_shape_moments(n, v).area;
     }
     return area;
 }
 
-double bt_case_expected_floes(const bt_case *c)
+double bt_case_expected_floes(const bt_case *input)
 {
-    if (bt_case_reads_field(c) || c->ice.concentration == 0) return 0; // a power law has no limits then
-    const double mean_area = BT_PI / 4 * bt_case_size_moment(c, 2);
-    return mean_area > 0 ? bt_max(0, bt_case_made_area(c) / mean_area) : 0; // a law that is refused makes none
+    if (bt_case_reads_field(input) || input->ice.concentration == 0) return 0; // a power law has no limits then
+    const double mean_area = BT_PI / 4 * bt_case_size_moment(input, 2);
+    return mean_area > 0 ? bt_max(0, bt_case_made_area(input) / mean_area) : 0; // a law that is refused makes none
 }
 
 // One axis: the region from low to high, and its domain.
@@ -198,56 +200,58 @@ static void extend(double from, double to, double *low, double *high, double *x0
     *low = *x0 = first, *high = last, *length = last - first;
 }
 
-bt_case bt_case_of_extent(const bt_case *c)
+bt_case bt_case_of_extent(const bt_case *input)
 {
-    bt_case of = *c;
-    extend(c->ice.extent_x_min, c->ice.extent_x_max, &of.ice.x_min, &of.ice.x_max, &of.domain.x0, &of.domain.length,
-           &of.domain.ends);
-    extend(c->ice.extent_y_min, c->ice.extent_y_max, &of.ice.y_min, &of.ice.y_max, &of.domain.y0, &of.domain.width,
-           &of.domain.sides);
+    bt_case of = *input;
+    extend(input->ice.extent_x_min, input->ice.extent_x_max, &of.ice.x_min, &of.ice.x_max, &of.domain.x0,
+           &of.domain.length, &of.domain.ends);
+    extend(input->ice.extent_y_min, input->ice.extent_y_max, &of.ice.y_min, &of.ice.y_max, &of.domain.y0,
+           &of.domain.width, &of.domain.sides);
     return of;
 }
 
-double bt_case_floes_made(const bt_case *c)
+double bt_case_floes_made(const bt_case *input)
 {
-    const bt_case of = bt_case_of_extent(c);
+    const bt_case of = bt_case_of_extent(input);
     return bt_case_expected_floes(&of);
 }
 
-int64_t bt_case_steps(const bt_case *c)
+int64_t bt_case_steps(const bt_case *input)
 {
-    double steps = ceil(c->run.duration / c->run.dt * (1 - 1e-12));
+    double steps = ceil(input->run.duration / input->run.dt * (1 - 1e-12));
     return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
 }
 
-double bt_case_body_mass(const bt_case *c)
+double bt_case_body_mass(const bt_case *input)
 {
     double v[2 * BT_MAX_VERTICES];
-    int n = bt_case_waterline(c, v);
+    int n = bt_case_waterline(input, v);
     if (!n) return 0;
-    if (c->body.mass > 0) return c->body.mass;
-    return c->body.density * bt_shape_moments(n, v).area * (c->body.draft + c->body.sail);
+    if (input->body.mass > 0) return input->body.mass;
+    return input->body.density * bt_shape_moments(n, v).area * (input->body.draft + input->body.sail);
 }
 
-double bt_case_reference_speed(const bt_case *c)
+double bt_case_reference_speed(const bt_case *input)
 {
-    if (c->solver.reference_speed > 0) return c->solver.reference_speed;
-    if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
-    double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
-    u = bt_max(u, bt_case_fastest_flow(c, true));
+    if (input->solver.reference_speed > 0) return input->solver.reference_speed;
+    if (input->tow.mode != BT_TOW_NONE && input->tow.speed > 0) return input->tow.speed;
+    double u = bt_max(input->domain.ends_closing, input->domain.sides_closing);
+    u = bt_max(u, bt_case_fastest_flow(input, true));
     // A velocity that is not given is that of free drift.
-    if (c->body.shape != BT_BODY_ABSENT && !isnan(c->body.vx)) u = bt_max(u, bt_hypot(c->body.vx, c->body.vy));
-    for (bt_idx i = 0; i < c->n_floes; i++)
-        if (!isnan(c->floes[i].vx)) u = bt_max(u, bt_hypot(c->floes[i].vx, c->floes[i].vy));
+    if (input->body.shape != BT_BODY_ABSENT && !isnan(input->body.vx))
+        u = bt_max(u, bt_hypot(input->body.vx, input->body.vy));
+    for (bt_idx i = 0; i < input->n_floes; i++)
+        if (!isnan(input->floes[i].vx)) u = bt_max(u, bt_hypot(input->floes[i].vx, input->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).
-    u = bt_max(u, 0.02 * bt_case_fastest_flow(c, false));
+    u = bt_max(u, 0.02 * bt_case_fastest_flow(input, false));
     return u > 0 ? u : 0.1;
 }
 
-double bt_case_fastest_flow(const bt_case *c, bool water)
+double bt_case_fastest_flow(const bt_case *input, bool water)
 {
-    const bt_table *t = water ? &c->water.table : &c->air.table;
-    if (t->n > 0) return bt_table_fastest(t);
-    if (!water) return bt_hypot(c->air.wind_x, c->air.wind_y);
-    return bt_hypot(c->water.current_x, c->water.current_y) + bt_max(c->water.tide.major, fabs(c->water.tide.minor));
+    const bt_table *table = water ? &input->water.table : &input->air.table;
+    if (table->n > 0) return bt_table_fastest(table);
+    if (!water) return bt_hypot(input->air.wind_x, input->air.wind_y);
+    return bt_hypot(input->water.current_x, input->water.current_y) +
+           bt_max(input->water.tide.major, fabs(input->water.tide.minor));
 }

@@ -20,10 +20,10 @@ int bt_case_outline(bt_body_shape shape, double length, double width, int n, con
                     const char **why);
 
 /// The same of a floe by hand, which need not be convex if it can be cut into convex parts.
-int bt_case_floe_admit(const bt_floe_def *f, double *v, const char **why);
+int bt_case_floe_admit(const bt_floe_def *floe, double *v, const char **why);
 
 /// Length of the body: of a named shape body.length, of a polygon its extent in the direction at this angle from x, m.
-double bt_case_body_length(const bt_case *c, double angle);
+double bt_case_body_length(const bt_case *input, double angle);
 
 #define BT_GRAVITY 9.81 ///< m/s²
 
@@ -35,45 +35,48 @@ static inline double bt_case_rise(double ice_density, double water_density)
 }
 
 /// Is the ice read from a file, not made?
-static inline bool bt_case_reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
+static inline bool bt_case_reads_field(const bt_case *input) { return input->ice.field || input->ice.outlines; }
 
 /// Is ice made? So of a concentration that is not known yet, too.
-static inline bool bt_case_makes_ice(const bt_case *c) { return !bt_case_reads_field(c) && c->ice.concentration != 0; }
+static inline bool bt_case_makes_ice(const bt_case *input)
+{
+    return !bt_case_reads_field(input) && input->ice.concentration != 0;
+}
 
 /// Does the ice depend on ice.seed? What is read does where outlines without a thickness of their own draw one.
-bool bt_case_ice_is_random(const bt_case *c);
+bool bt_case_ice_is_random(const bt_case *input);
 
 /// Is this a key of how ice is made, of no effect on that of this case, which is read?
-bool bt_case_key_is_idle(const bt_case *c, const char *key);
+bool bt_case_key_is_idle(const bt_case *input, const char *key);
 
 /// The ice region, x and y: of a field file, which has its own, all of the domain.
-void bt_case_ice_region(const bt_case *c, double low[2], double high[2]);
+void bt_case_ice_region(const bt_case *input, double low[2], double high[2]);
 
 /// Area of the ice that is made, concentration × ice region less body and floes given by hand, m²; 0 without a
 /// generator.
-double bt_case_made_area(const bt_case *c);
+double bt_case_made_area(const bt_case *input);
 
 /// Area of the floes given by hand, m².
-double bt_case_area_by_hand(const bt_case *c);
+double bt_case_area_by_hand(const bt_case *input);
 
 /// E[d^k] of the diameters that the size law draws, m^k; NaN where its keys leave none.
-double bt_case_size_moment(const bt_case *c, int k);
+double bt_case_size_moment(const bt_case *input, int k);
 
 /// Mean diameter of the floes, m: of the size law, and ice.size for ice that is read.
-double bt_case_mean_size(const bt_case *c);
+double bt_case_mean_size(const bt_case *input);
 
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
-double bt_case_expected_floes(const bt_case *c);
+double bt_case_expected_floes(const bt_case *input);
 
 /// The case whose ice region is the extent (ice.extent) of this one: the field is made for it, and then cut to the ice
 /// region. Along an axis on which the two differ it is the whole of its domain, which has periodic images of its own
 /// where those of the ice region join. No memory of its own.
-bt_case bt_case_of_extent(const bt_case *c);
+bt_case bt_case_of_extent(const bt_case *input);
 
 /// Floes that are made, those beyond the ice region too.
-double bt_case_floes_made(const bt_case *c);
+double bt_case_floes_made(const bt_case *input);
 
 /// Largest speed that the current (or wind) of a case can have, m/s.
-double bt_case_fastest_flow(const bt_case *c, bool water);
+double bt_case_fastest_flow(const bt_case *input, bool water);
 
 #endif

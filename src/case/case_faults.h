@@ -17,7 +17,7 @@ typedef struct bt_origin {
 
 /// "FILE:LINE: KEY", "FILE: KEY", "--set KEY=VALUE" or "PLACE: KEY=VALUE": how a message about a key begins. Truncated
 /// to the buffer.
-void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256]);
+void bt_case_locate(const bt_case *input, const bt_origin *origin, const char *key, char out[256]);
 
 /// A check under way.
 typedef struct bt_check {
@@ -27,13 +27,13 @@ typedef struct bt_check {
 } bt_check;
 
 /// The file in which a key stands; the case's own where it is not given.
-const char *bt_check_file(const bt_check *k, const char *key);
+const char *bt_check_file(const bt_check *check, const char *key);
 
-bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by an override
+bool bt_check_given(const bt_check *check, const char *key);  ///< in the file or by an override
 /// Is a key given where another is, in the same file or both on the command line? A default stands in both, but not in
 /// a study, where another member may have it otherwise.
-bool bt_check_together(const bt_check *k, const char *key, const char *other);
-bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused
-void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+bool bt_check_together(const bt_check *check, const char *key, const char *other);
+bool bt_check_sound(const bt_check *check, const char *keys); ///< none of the keys, separated by blanks, was refused
+void bt_check_fault(const bt_check *check, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
 #endif

@@ -11,35 +11,35 @@
 
 #define ITSELF "case" // no key has this name: all have a section
 
-const char *bt_case_file(const bt_case *c, const bt_key *k)
+const char *bt_case_file(const bt_case *input, const bt_key *key)
 {
     const char *file = NULL;
-    if (k->file) memcpy(&file, (const char *)c + k->offset, sizeof file);
+    if (key->file) memcpy(&file, (const char *)input + key->offset, sizeof file);
     return file;
 }
 
 /// The comment of a key, NULL where it names no file, or one that cannot be read; the caller frees it.
-static char *comment_of(const bt_case *c, const bt_key *k)
+static char *comment_of(const bt_case *input, const bt_key *key)
 {
     char digest[BT_CHECKSUM_DIGEST];
     int64_t bytes;
     bt_errors unheard = {0};
-    const char *path = bt_case_file(c, k);
+    const char *path = bt_case_file(input, key);
     const bool read = path && bt_checksum_digest_file(path, digest, &bytes, &unheard) == BT_OK;
     bt_errors_free(&unheard);
-    return read ? bt_text_of("# %s: %" PRId64 " bytes, xxh128 %s\n", k->name, bytes, digest) : NULL;
+    return read ? bt_text_of("# %s: %" PRId64 " bytes, xxh128 %s\n", key->name, bytes, digest) : NULL;
 }
 
-char *bt_case_digests(const bt_case *c)
+char *bt_case_digests(const bt_case *input)
 {
-    bt_text t;
-    bt_text_begin(&t);
+    bt_text text;
+    bt_text_begin(&text);
     for (int k = 0; k < bt_n_case_keys; k++) {
-        char *comment = comment_of(c, &bt_case_keys[k]);
-        fputs(comment ? comment : "", t.out);
+        char *comment = comment_of(input, &bt_case_keys[k]);
+        fputs(comment ? comment : "", text.out);
         free(comment);
     }
-    return bt_text_end(&t);
+    return bt_text_end(&text);
 }
 
 /// Length of a line with its end.
@@ -58,12 +58,12 @@ static const char *comment_in(const char *text, const char *name)
     return line;
 }
 
-char *bt_case_digests_in(const bt_case *c, const char *text)
+char *bt_case_digests_in(const bt_case *input, const char *text)
 {
     bt_text t;
     bt_text_begin(&t);
     for (int k = 0; k < bt_n_case_keys; k++) {
-        const char *line = bt_case_file(c, &bt_case_keys[k]) ? comment_in(text, bt_case_keys[k].name) : NULL;
+        const char *line = bt_case_file(input, &bt_case_keys[k]) ? comment_in(text, bt_case_keys[k].name) : NULL;
         if (line) fprintf(t.out, "%.*s\n", (int)strcspn(line, "\n"), line);
     }
     return bt_text_end(&t);
@@ -112,12 +112,13 @@ bt_status bt_case_itself_same(const char *path, const char *text, const char *di
     return BT_ERR_CASE;
 }
 
-bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *err)
+bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err)
 {
     bt_status status = BT_OK;
     for (int k = 0; k < bt_n_case_keys; k++) {
-        char *now = comment_of(c, &bt_case_keys[k]);
-        const char *file = bt_case_file(c, &bt_case_keys[k]), *before = comment_in(c->text, bt_case_keys[k].name);
+        char *now = comment_of(input, &bt_case_keys[k]);
+        const char *file = bt_case_file(input, &bt_case_keys[k]),
+                   *before = comment_in(input->text, bt_case_keys[k].name);
         if (now && (!before || strncmp(before, now, strlen(now)))) {
             bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
                                "(bergtow run)", file, dir);

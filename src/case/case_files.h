@@ -17,13 +17,13 @@
 #include "case/schema.h"
 
 /// The file of a key that names one, NULL = none.
-const char *bt_case_file(const bt_case *c, const bt_key *k);
+const char *bt_case_file(const bt_case *input, const bt_key *key);
 
 /// These comments, for all files that can be read; the caller frees them.
-char *bt_case_digests(const bt_case *c);
+char *bt_case_digests(const bt_case *input);
 
 /// Those of them that a text has; the caller frees it.
-char *bt_case_digests_in(const bt_case *c, const char *text);
+char *bt_case_digests_in(const bt_case *input, const char *text);
 
 /// case.resolved.yml: the resolved case with the comment of itself, and those of its files (bt_case_digests), or NULL.
 /// The caller frees it.
@@ -32,8 +32,8 @@ char *bt_case_with_digests(const char *resolved, const char *digests);
 /// Is the case.resolved.yml of this text what its comment says? dir: of the run, for the messages. Errors: BT_ERR_CASE.
 bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *err);
 
-/// Are the files what the comments in c->text say? The rest as above.
-bt_status bt_case_files_same(const bt_case *c, const char *dir, bt_errors *err);
+/// Are the files what the comments in input->text say? The rest as above.
+bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err);
 
 /// What a text says behind "NAME: " at the beginning of a line, NULL = nothing.
 const char *bt_case_said_of(const char *text, const char *name);

@@ -10,53 +10,54 @@ static const double REST_SPEED = 0.01; // of the reference speed, assumed; in th
 
 static double size_of(int n, const double *v) { return n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0; }
 
-void bt_case_fill_size(bt_case *c)
+void bt_case_fill_size(bt_case *input)
 {
-    if (!isnan(c->ice.size) || c->domain.frame == BT_FRAME_BASIN) return;
-    if (bt_case_makes_ice(c) || bt_case_reads_field(c)) return; // that is asked for
+    if (!isnan(input->ice.size) || input->domain.frame == BT_FRAME_BASIN) return;
+    if (bt_case_makes_ice(input) || bt_case_reads_field(input)) return; // that is asked for
     double v[2 * BT_MAX_VERTICES], sum = 0;
-    for (bt_idx i = 0; i < c->n_floes; i++) sum += size_of(bt_case_floe_outline(&c->floes[i], v), v);
-    const double body = size_of(bt_case_waterline(c, v), v);
-    c->ice.size = sum > 0 ? sum / c->n_floes : body > 0 ? body : 1; // of no bodies: without effect
+    for (bt_idx i = 0; i < input->n_floes; i++) sum += size_of(bt_case_floe_outline(&input->floes[i], v), v);
+    const double body = size_of(bt_case_waterline(input, v), v);
+    input->ice.size = sum > 0 ? sum / input->n_floes : body > 0 ? body : 1; // of no bodies: without effect
 }
 
-void bt_case_fill_scene(bt_case *c)
+void bt_case_fill_scene(bt_case *input)
 {
-    bool basin = c->domain.frame == BT_FRAME_BASIN;
-    if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
-    bt_check_fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
-    bt_check_fill(&c->domain.y0, -c->domain.width / 2);
-    bt_check_fill(&c->ice.x_min, c->domain.x0);
-    bt_check_fill(&c->ice.x_max, c->domain.x0 + c->domain.length);
-    bt_check_fill(&c->ice.y_min, c->domain.y0);
-    bt_check_fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
-    bt_check_fill(&c->body.width, c->body.length);
-    bt_check_fill(&c->body.x, basin ? c->domain.x0 + 2 * bt_case_body_length(c, 0) : 0);
-    bt_check_fill(&c->domain.ahead, bt_case_window_ahead(c));
-    bt_check_fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
-    bt_check_fill(&c->body.friction, c->ice.friction);
-    bt_check_fill(&c->body.restitution, c->ice.restitution);
+    bool basin = input->domain.frame == BT_FRAME_BASIN;
+    if (input->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(input);
+    bt_check_fill(&input->domain.x0, basin ? 0 : -input->domain.length / 2);
+    bt_check_fill(&input->domain.y0, -input->domain.width / 2);
+    bt_check_fill(&input->ice.x_min, input->domain.x0);
+    bt_check_fill(&input->ice.x_max, input->domain.x0 + input->domain.length);
+    bt_check_fill(&input->ice.y_min, input->domain.y0);
+    bt_check_fill(&input->ice.y_max, input->domain.y0 + input->domain.width);
+    bt_check_fill(&input->body.width, input->body.length);
+    bt_check_fill(&input->body.x, basin ? input->domain.x0 + 2 * bt_case_body_length(input, 0) : 0);
+    bt_check_fill(&input->domain.ahead, bt_case_window_ahead(input));
+    bt_check_fill(&input->body.sail, bt_max(0, input->body.draft * (input->water.density / input->body.density - 1)));
+    bt_check_fill(&input->body.friction, input->ice.friction);
+    bt_check_fill(&input->body.restitution, input->ice.restitution);
     // A thickness that every floe has for itself, NaN, leaves what the frame says.
-    bt_check_fill(&c->ice.splitting.least_size, basin ? 3 * c->ice.thickness : bt_max(3 * c->ice.thickness, 2));
+    bt_check_fill(&input->ice.splitting.least_size, basin ? 3 * input->ice.thickness
+                                                          : bt_max(3 * input->ice.thickness, 2));
 }
 
-void bt_case_fill_impact(bt_case *c)
+void bt_case_fill_impact(bt_case *input)
 {
-    bt_check_fill(&c->impact.duration, c->run.dt);
-    bt_check_fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
-    const bool basin = c->domain.frame == BT_FRAME_BASIN;
-    bt_check_fill(&c->solver.rest_speed, basin ? 1e-3 : REST_SPEED * bt_case_reference_speed(c));
+    bt_check_fill(&input->impact.duration, input->run.dt);
+    bt_check_fill(&input->impact.least_speed, 0.05 * bt_case_reference_speed(input));
+    const bool basin = input->domain.frame == BT_FRAME_BASIN;
+    bt_check_fill(&input->solver.rest_speed, basin ? 1e-3 : REST_SPEED * bt_case_reference_speed(input));
 }
 
-void bt_case_fill(bt_case *c)
+void bt_case_fill(bt_case *input)
 {
     double v[2 * BT_MAX_VERTICES];
-    const int n = bt_case_waterline(c, v);
-    bt_case_fill_scene(c);
-    bt_case_fill_size(c);
-    bt_case_tow_follow(&(bt_check){.c = c});
-    bt_case_tow_hull(c, n, v);
-    bt_case_tow_ramp(c);
-    bt_case_lead_follow(c, n, v);
-    bt_case_fill_impact(c);
+    const int n = bt_case_waterline(input, v);
+    bt_case_fill_scene(input);
+    bt_case_fill_size(input);
+    bt_case_tow_follow(&(bt_check){.c = input});
+    bt_case_tow_hull(input, n, v);
+    bt_case_tow_ramp(input);
+    bt_case_lead_follow(input, n, v);
+    bt_case_fill_impact(input);
 }

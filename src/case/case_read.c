@@ -27,11 +27,11 @@ typedef struct {
     const char *floes_path;
 } reader;
 
-void bt_case_defaults(bt_case *c)
+void bt_case_defaults(bt_case *input)
 {
-    *c = (bt_case){0};
-    bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
-    c->n_extra = bt_schema_added();
+    *input = (bt_case){0};
+    bt_schema_preset(bt_case_keys, bt_n_case_keys, input);
+    input->n_extra = bt_schema_added();
 }
 
 /// Is the first word of a text, which has more, a key of this section (with its dot)?
@@ -44,27 +44,27 @@ static bool begins_with_key(const bt_key *keys, int n, const char *section, cons
 }
 
 /// A text that is "key value", or "key:value" within { }; its key without the sections is written again.
-static void colon_missing(reader *r, int line, const char *section, const char *text)
+static void colon_missing(reader *in, int line, const char *section, const char *text)
 {
     const size_t word = strcspn(text, " \t:");
     size_t own = word;
     while (own && text[own - 1] != '.') own--;
     const int n = word - own > 60 ? 60 : (int)(word - own);
-    bt_errors_add(r->err, "%s:%d: %s%.64s: a colon%s is missing after the key; write %.*s: and then the value",
-                  r->path, line, section, text, text[word] == ':' ? " with a blank" : "", n, text + own);
+    bt_errors_add(in->err, "%s:%d: %s%.64s: a colon%s is missing after the key; write %.*s: and then the value",
+                  in->path, line, section, text, text[word] == ':' ? " with a blank" : "", n, text + own);
 }
 
-static void unknown_key(reader *r, const bt_key *keys, int n, int line, const char *where, const char *name)
+static void unknown_key(reader *in, const bt_key *keys, int n, int line, const char *where, const char *name)
 {
     char buffer[64];
     if (begins_with_key(keys, n, "", name)) {
-        colon_missing(r, line, where, name);
+        colon_missing(in, line, where, name);
         return;
     }
     const char *near = bt_schema_suggest(keys, n, name, buffer);
     if (near)
-        bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->path, line, where, name, near);
-    else bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; see bergtow --list-keys", r->path, line, where, name);
+        bt_errors_add(in->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", in->path, line, where, name, near);
+    else bt_errors_add(in->err, "%s:%d: %s%.64s: unknown key; see bergtow --list-keys", in->path, line, where, name);
 }
 
 static bool is_nothing(const bt_node *node)
@@ -83,36 +83,36 @@ static bool lacks_colon(const bt_node *value, const char *name)
 }
 
 /// The value of a key in the file that is read; one that stands in a file based on this holds.
-static void give(reader *r, int k, const bt_node *value, int line)
+static void give(reader *in, int k, const bt_node *value, int line)
 {
-    if (!r->given[k]) {
-        r->given[k] = value;
-        r->from[k].line = line;
-        r->from[k].file = r->path;
-    } else if (r->from[k].file == r->path) {
-        bt_errors_add(r->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", r->path, line,
-                      bt_case_keys[k].name, r->from[k].line);
+    if (!in->given[k]) {
+        in->given[k] = value;
+        in->from[k].line = line;
+        in->from[k].file = in->path;
+    } else if (in->from[k].file == in->path) {
+        bt_errors_add(in->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", in->path, line,
+                      bt_case_keys[k].name, in->from[k].line);
     }
 }
 
 /// A number with a decimal comma within { } is cut in two: `thickness: 0` and a key `8 m` without a value. section: of
 /// the map, or "".
-static bool is_after_comma(reader *r, const bt_node *map, int i, const char *section)
+static bool is_after_comma(reader *in, const bt_node *map, int i, const char *section)
 {
     const bt_node *left = i > 0 ? map->item[i - 1] : NULL;
     const size_t n = left && left->kind == BT_NODE_SCALAR ? strlen(left->text) : 0;
     if (!n || !isdigit((unsigned char)left->text[n - 1]) || !isdigit((unsigned char)*map->key[i]) ||
         !is_nothing(map->item[i]))
         return false;
-    bt_errors_add(r->err, "%s:%d: %s%s%.60s: %.20s,%.20s has a comma; write decimals with a point, as in %.20s.%.20s",
-                  r->path, map->key_line[i], section, *section ? "." : "", map->key[i - 1], left->text, map->key[i],
+    bt_errors_add(in->err, "%s:%d: %s%s%.60s: %.20s,%.20s has a comma; write decimals with a point, as in %.20s.%.20s",
+                  in->path, map->key_line[i], section, *section ? "." : "", map->key[i - 1], left->text, map->key[i],
                   left->text, map->key[i]);
     return true;
 }
 
 // Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed:
 // 1).
-static void walk(reader *r, const bt_node *map, const char *prefix)
+static void walk(reader *in, const bt_node *map, const char *prefix)
 {
     for (int i = 0; i < map->n; i++) {
         char name[160];
@@ -121,40 +121,40 @@ static void walk(reader *r, const bt_node *map, const char *prefix)
         snprintf(name, sizeof name, "%s%s%.90s", prefix, *prefix ? "." : "", map->key[i]);
         int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
         if (k >= 0) {
-            give(r, k, value, line);
+            give(in, k, value, line);
         } else if (!strcmp(name, "floes")) {
-            if (!r->floes) r->floes = value, r->floes_path = r->path;
+            if (!in->floes) in->floes = value, in->floes_path = in->path;
         } else if (!strcmp(name, "base")) {
             continue; // bt_case_files_read has followed it
-        } else if (is_after_comma(r, map, i, prefix)) {
+        } else if (is_after_comma(in, map, i, prefix)) {
             continue;
         } else if (!bt_schema_is_section(name)) {
-            unknown_key(r, bt_case_keys, bt_n_case_keys, line, "", name);
+            unknown_key(in, bt_case_keys, bt_n_case_keys, line, "", name);
         } else if (value->kind == BT_NODE_MAP) {
-            walk(r, value, name);
+            walk(in, value, name);
         } else if (lacks_colon(value, name)) {
             char section[164];
             snprintf(section, sizeof section, "%s.", name);
-            colon_missing(r, value->line, section, value->text);
+            colon_missing(in, value->line, section, value->text);
         } else if (!is_nothing(value)) {
-            bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->path,
+            bt_errors_add(in->err, "%s:%d: %s: is a section and holds keys; write them indented below it", in->path,
                           line, name);
         }
     }
 }
 
 // A list of points [[x, y], ...] into base. where: start of the message.
-static bool read_points(const bt_key *k, void *base, const bt_node *list, const char *where, bt_errors *err)
+static bool read_points(const bt_key *key, void *base, const bt_node *list, const char *where, bt_errors *err)
 {
     if (list->kind == BT_NODE_SCALAR && list->plain && !strcmp(list->text, "none")) return true;
     if (list->kind != BT_NODE_LIST) {
         bt_errors_add(err, "%s: needs a list of points; give it as [[x, y], [x, y], ...]", where);
         return false;
     }
-    const int least = k->least > 0 ? k->least : 3, most = k->most > 0 ? k->most : BT_MAX_VERTICES;
+    const int least = key->least > 0 ? key->least : 3, most = key->most > 0 ? key->most : BT_MAX_VERTICES;
     if (list->n < least || list->n > most) {
         bt_errors_add(err, "%s: has %d points; a %s has %d to %d", where, list->n,
-                      k->most > 0 ? "list here" : "polygon", least, most);
+                      key->most > 0 ? "list here" : "polygon", least, most);
         return false;
     }
     double *p = bt_alloc((size_t)list->n, 2 * sizeof *p);
@@ -166,7 +166,7 @@ static bool read_points(const bt_key *k, void *base, const bt_node *list, const 
         if (!good) bt_errors_add(err, "%s: point %d is not a pair; give it as [x, y]", where, i + 1);
         for (int j = 0; j < 2 && good; j++) {
             char why[BT_WHY];
-            const bt_key column = bt_schema_column(k, j);
+            const bt_key column = bt_schema_column(key, j);
             good = bt_value_read_coordinate(&column, point->item[j]->text, &p[2 * i + j], why);
             if (!good) bt_errors_add(err, "%s: point %d: %s", where, i + 1, why);
         }
@@ -175,103 +175,103 @@ static bool read_points(const bt_key *k, void *base, const bt_node *list, const 
         free(p);
         return false;
     }
-    memcpy((char *)base + k->offset, &p, sizeof p);
-    memcpy((char *)base + k->offset_count, &list->n, sizeof(int));
+    memcpy((char *)base + key->offset, &p, sizeof p);
+    memcpy((char *)base + key->offset_count, &list->n, sizeof(int));
     return true;
 }
 
-static bool read_value(const bt_key *k, void *base, const bt_node *value, const char *where, bt_errors *err)
+static bool read_value(const bt_key *key, void *base, const bt_node *value, const char *where, bt_errors *err)
 {
-    if (k->type == BT_KEY_POINTS) return read_points(k, base, value, where, err);
+    if (key->type == BT_KEY_POINTS) return read_points(key, base, value, where, err);
     if (value->kind != BT_NODE_SCALAR) {
         bt_errors_add(err, "%s: is a %s and needs a single value; write key: value", where,
                       value->kind == BT_NODE_MAP ? "section" : "list");
         return false;
     }
     char why[BT_WHY];
-    if (bt_value_read(k, base, value->text, value->plain, why)) return true;
+    if (bt_value_read(key, base, value->text, value->plain, why)) return true;
     bt_errors_add(err, "%s: %s", where, why);
     return false;
 }
 
-static void read_given(reader *r)
+static void read_given(reader *in)
 {
     for (int k = 0; k < bt_n_case_keys; k++) {
         const bt_key *key = &bt_case_keys[k];
-        if (r->from[k].faulty || r->from[k].set) continue;
-        if (!r->given[k]) {
+        if (in->from[k].faulty || in->from[k].set) continue;
+        if (!in->given[k]) {
             if (key->preset) continue;
-            bt_errors_add(r->err, "%s: %s: missing, and it has no default; add it (%s)", r->path, key->name,
+            bt_errors_add(in->err, "%s: %s: missing, and it has no default; add it (%s)", in->path, key->name,
                           key->doc);
-            r->from[k].faulty = true;
+            in->from[k].faulty = true;
             continue;
         }
         char where[256];
-        bt_case_locate(r->c, &r->from[k], key->name, where);
-        r->from[k].faulty = !read_value(key, r->c, r->given[k], where, r->err);
+        bt_case_locate(in->c, &in->from[k], key->name, where);
+        in->from[k].faulty = !read_value(key, in->c, in->given[k], where, in->err);
     }
 }
 
-static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
+static bool read_floe(reader *in, const bt_node *map, int index, bt_floe_def *floe)
 {
     char where[256], item[32];
     snprintf(item, sizeof item, "floes[%d].", index);
     if (map->kind != BT_NODE_MAP) {
-        bt_errors_add(r->err, "%s:%d: floes[%d]: is not a map; write - {shape: disc, length: 1 m, x: 3 m, y: 0 m}",
-                      r->path, map->line, index);
+        bt_errors_add(in->err, "%s:%d: floes[%d]: is not a map; write - {shape: disc, length: 1 m, x: 3 m, y: 0 m}",
+                      in->path, map->line, index);
         return false;
     }
-    size_t before = r->err->n;
+    size_t before = in->err->n;
     for (int i = 0; i < map->n; i++) {
         int k = bt_schema_find(bt_floe_keys, bt_n_floe_keys, map->key[i]);
         if (k < 0) {
             snprintf(where, sizeof where, "floes[%d]", index);
-            if (is_after_comma(r, map, i, where)) continue;
-            unknown_key(r, bt_floe_keys, bt_n_floe_keys, map->key_line[i], item, map->key[i]);
+            if (is_after_comma(in, map, i, where)) continue;
+            unknown_key(in, bt_floe_keys, bt_n_floe_keys, map->key_line[i], item, map->key[i]);
             continue;
         }
-        snprintf(where, sizeof where, "%.180s:%d: %s%s", r->path, map->key_line[i], item, bt_floe_keys[k].name);
-        read_value(&bt_floe_keys[k], f, map->item[i], where, r->err);
+        snprintf(where, sizeof where, "%.180s:%d: %s%s", in->path, map->key_line[i], item, bt_floe_keys[k].name);
+        read_value(&bt_floe_keys[k], floe, map->item[i], where, in->err);
     }
     for (int k = 0; k < bt_n_floe_keys; k++) {
         const bool found = bt_floe_keys[k].preset || bt_tree_has(map, bt_floe_keys[k].name);
         if (!found)
-            bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->path, map->line,
+            bt_errors_add(in->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", in->path, map->line,
                           item, bt_floe_keys[k].name, bt_floe_keys[k].doc);
     }
-    return r->err->n == before;
+    return in->err->n == before;
 }
 
-static void read_floes(reader *r)
+static void read_floes(reader *in)
 {
-    const bt_node *list = r->floes;
+    const bt_node *list = in->floes;
     if (!list || is_nothing(list)) return;
-    r->path = r->floes_path;
-    if (strcmp(r->path, r->c->path)) r->c->floes_path = bt_text_copy(r->path);
+    in->path = in->floes_path;
+    if (strcmp(in->path, in->c->path)) in->c->floes_path = bt_text_copy(in->path);
     if (list->kind != BT_NODE_LIST) {
-        bt_errors_add(r->err, "%s:%d: floes: is not a list; begin each floe with - below it", r->path, list->line);
+        bt_errors_add(in->err, "%s:%d: floes: is not a list; begin each floe with - below it", in->path, list->line);
         return;
     }
     if (list->n > BT_MAX_FLOES_BY_HAND) {
-        bt_errors_add(r->err,
+        bt_errors_add(in->err,
                       "%s:%d: floes: has %d entries, at most %d are read; put large fields into an HDF5 file and name "
                       "it in ice.field",
-                      r->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
+                      in->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
         return;
     }
-    r->c->floes = bt_alloc((size_t)list->n, sizeof *r->c->floes);
-    const size_t before = r->err->n;
+    in->c->floes = bt_alloc((size_t)list->n, sizeof *in->c->floes);
+    const size_t before = in->err->n;
     for (int i = 0; i < list->n; i++) {
-        if (r->err->n - before >= BT_MOST_COMPLAINTS) {
-            bt_errors_add(r->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first",
-                          r->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
+        if (in->err->n - before >= BT_MOST_COMPLAINTS) {
+            bt_errors_add(in->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first",
+                          in->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
             return;
         }
-        bt_floe_def f = {.line = list->item[i]->line};
-        bt_schema_preset(bt_floe_keys, bt_n_floe_keys, &f);
+        bt_floe_def floe = {.line = list->item[i]->line};
+        bt_schema_preset(bt_floe_keys, bt_n_floe_keys, &floe);
         // A refused floe is left out so that the checks across keys do not complain about it a second time.
-        if (read_floe(r, list->item[i], i, &f)) r->c->floes[r->c->n_floes++] = f;
-        else bt_schema_release(bt_floe_keys, bt_n_floe_keys, &f);
+        if (read_floe(in, list->item[i], i, &floe)) in->c->floes[in->c->n_floes++] = floe;
+        else bt_schema_release(bt_floe_keys, bt_n_floe_keys, &floe);
     }
 }
 
@@ -283,53 +283,53 @@ static size_t key_length(const char *set)
     return n;
 }
 
-static void read_override(reader *r, const char *set, const char *place)
+static void read_override(reader *in, const char *set, const char *place)
 {
     const char *equals = strchr(set, '=');
     if (!equals || equals == set) {
-        bt_errors_add(r->err, "%s%.80s: is not key=value; write %sice.concentration=0.5", place ? place : "--set ", set,
-                      place ? "" : "--set ");
+        bt_errors_add(in->err, "%s%.80s: is not key=value; write %sice.concentration=0.5", place ? place : "--set ",
+                      set, place ? "" : "--set ");
         return;
     }
     char name[96], where[256], why[BT_WHY], buffer[64];
     const size_t n = key_length(set);
     snprintf(name, sizeof name, "%.*s", n < 90 ? (int)n : 90, set);
     const char *value = equals + 1 + strspn(equals + 1, " ");
-    bt_case_locate(r->c, &(bt_origin){.set = set, .place = place}, name, where);
+    bt_case_locate(in->c, &(bt_origin){.set = set, .place = place}, name, where);
     int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
     if (k < 0) {
         const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
         if (!strcmp(name, "base"))
-            bt_errors_add(r->err, "%s: what a case is based on cannot be set here; edit the case file", where);
+            bt_errors_add(in->err, "%s: what a case is based on cannot be set here; edit the case file", where);
         else if (!strcmp(name, "floes"))
-            bt_errors_add(r->err, "%s: the list of floes cannot be set here; edit the case file", where);
+            bt_errors_add(in->err, "%s: the list of floes cannot be set here; edit the case file", where);
         else if (bt_schema_is_section(name))
-            bt_errors_add(r->err, "%s: %s is a section; set one of its keys, see bergtow --list-keys", where, name);
-        else if (near) bt_errors_add(r->err, "%s: unknown key; did you mean %s?", where, near);
-        else bt_errors_add(r->err, "%s: unknown key; see bergtow --list-keys", where);
+            bt_errors_add(in->err, "%s: %s is a section; set one of its keys, see bergtow --list-keys", where, name);
+        else if (near) bt_errors_add(in->err, "%s: unknown key; did you mean %s?", where, near);
+        else bt_errors_add(in->err, "%s: unknown key; see bergtow --list-keys", where);
         return;
     }
-    r->from[k].set = set;
-    r->from[k].place = place;
-    r->from[k].line = 0;
-    r->from[k].file = NULL;
+    in->from[k].set = set;
+    in->from[k].place = place;
+    in->from[k].line = 0;
+    in->from[k].file = NULL;
     if (bt_case_keys[k].type != BT_KEY_POINTS) {
-        r->from[k].faulty = !bt_value_read(&bt_case_keys[k], r->c, value, true, why);
-        if (r->from[k].faulty) bt_errors_add(r->err, "%s: %s", where, why);
+        in->from[k].faulty = !bt_value_read(&bt_case_keys[k], in->c, value, true, why);
+        if (in->from[k].faulty) bt_errors_add(in->err, "%s: %s", where, why);
         return;
     }
-    bt_schema_release(&bt_case_keys[k], 1, r->c); // an earlier override of the same key
-    memset((char *)r->c + bt_case_keys[k].offset_count, 0, sizeof(int));
-    bt_node *points = bt_tree_parse(value, strlen(value), where, r->err);
-    r->from[k].faulty = !points || !read_points(&bt_case_keys[k], r->c, points, where, r->err);
+    bt_schema_release(&bt_case_keys[k], 1, in->c); // an earlier override of the same key
+    memset((char *)in->c + bt_case_keys[k].offset_count, 0, sizeof(int));
+    bt_node *points = bt_tree_parse(value, strlen(value), where, in->err);
+    in->from[k].faulty = !points || !read_points(&bt_case_keys[k], in->c, points, where, in->err);
     bt_tree_free(points);
 }
 
 /// Defaults, and the file name for messages.
-static void begin_case(bt_case *c, const char *path)
+static void begin_case(bt_case *input, const char *path)
 {
-    bt_case_defaults(c);
-    c->path = bt_text_copy(path);
+    bt_case_defaults(input);
+    input->path = bt_text_copy(path);
 }
 
 /// Is the override the last one of its key, which holds?
@@ -347,109 +347,109 @@ static char *text_as_given(const bt_case_files *files, const char *const *overri
 {
     char *text = bt_case_files_text(files);
     if (n == 0) return text;
-    bt_json j = {0};
-    bt_json_open(&j, NULL, '{');
-    bt_json_open(&j, "set", '{');
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    bt_json_open(&json, "set", '{');
     for (int i = 0; i < n; i++) {
         if (!holds(overrides, i, n)) continue;
         char *key = bt_text_of("%.*s", (int)key_length(overrides[i]), overrides[i]);
         const char *value = strchr(overrides[i], '=') + 1;
-        bt_json_string(&j, key, value + strspn(value, " "));
+        bt_json_string(&json, key, value + strspn(value, " "));
         free(key);
     }
-    bt_json_close(&j, '}');
-    bt_json_close(&j, '}');
-    char *both = bt_text_of("%s\n--- # given beside the file\n%s", text, j.text);
-    bt_json_free(&j);
+    bt_json_close(&json, '}');
+    bt_json_close(&json, '}');
+    char *both = bt_text_of("%s\n--- # given beside the file\n%s", text, json.text);
+    bt_json_free(&json);
     free(text);
     return both;
 }
 
-/// The text of c into its values.
-static bt_status read_text(bt_case *c, size_t size, bool alone, const char *const *overrides,
+/// The text of `input` into its values.
+static bt_status read_text(bt_case *input, size_t size, bool alone, const char *const *overrides,
                            const char *const *place, int n, bt_errors *err)
 {
     const size_t before = err->n;
     if (!bt_keys_sound(err)) return BT_ERR_CASE;
     bt_case_files files;
-    bt_status status = bt_case_files_read(&files, c->path, c->text, size, alone, err);
-    free(c->text);
-    c->text = text_as_given(&files, overrides, n);
+    bt_status status = bt_case_files_read(&files, input->path, input->text, size, alone, err);
+    free(input->text);
+    input->text = text_as_given(&files, overrides, n);
     if (status != BT_OK) {
         bt_case_files_free(&files);
         return status;
     }
-    reader r = {.c = c, .err = err, .from = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_origin)),
-                .given = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_node *))};
+    reader in = {.c = input, .err = err, .from = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_origin)),
+                 .given = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_node *))};
     for (int i = 0; i < files.n; i++) {
-        r.path = files.file[i].path;
-        walk(&r, files.file[i].root, "");
+        in.path = files.file[i].path;
+        walk(&in, files.file[i].root, "");
     }
-    r.path = c->path;
-    for (int i = 0; i < n; i++) read_override(&r, overrides[i], place ? place[i] : NULL);
+    in.path = input->path;
+    for (int i = 0; i < n; i++) read_override(&in, overrides[i], place ? place[i] : NULL);
     for (int k = 0; place && k < bt_n_case_keys; k++) // another member may have another value of what nobody gives here
-        if (!r.given[k] && !r.from[k].set) r.from[k].place = "";
-    read_given(&r);
-    read_floes(&r);
+        if (!in.given[k] && !in.from[k].set) in.from[k].place = "";
+    read_given(&in);
+    read_floes(&in);
     size_t in_file = err->n;
-    status = bt_case_check(c, r.from, err);
+    status = bt_case_check(input, in.from, err);
     if (in_file > before) status = BT_ERR_CASE;
-    free(r.from);
-    free(r.given);
+    free(in.from);
+    free(in.given);
     bt_case_files_free(&files);
     return status;
 }
 
-bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err)
+bt_status bt_case_read(bt_case *input, const char *path, const char *const *overrides, int n, bt_errors *err)
 {
-    return bt_case_read_placed(c, path, overrides, NULL, n, err);
+    return bt_case_read_placed(input, path, overrides, NULL, n, err);
 }
 
-bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place,
+bt_status bt_case_read_placed(bt_case *input, const char *path, const char *const *overrides, const char *const *place,
                               int n, bt_errors *err)
 {
     size_t size;
-    begin_case(c, path);
-    const bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
-    return status == BT_OK ? read_text(c, size, false, overrides, place, n, err) : status;
+    begin_case(input, path);
+    const bt_status status = bt_file_read(path, "a case file", &input->text, &size, err);
+    return status == BT_OK ? read_text(input, size, false, overrides, place, n, err) : status;
 }
 
-bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, const char *const *overrides,
+bt_status bt_case_read_text(bt_case *input, const char *path, const char *text, const char *const *overrides,
                             const char *const *place, int n, bt_errors *err)
 {
-    begin_case(c, path);
+    begin_case(input, path);
     const size_t size = strlen(text);
-    c->text = memcpy(bt_alloc(size + 1, 1), text, size + 1);
-    return read_text(c, size, false, overrides, place, n, err);
+    input->text = memcpy(bt_alloc(size + 1, 1), text, size + 1);
+    return read_text(input, size, false, overrides, place, n, err);
 }
 
-static void keep_table(bt_table *t, const bt_table *from)
+static void keep_table(bt_table *table, const bt_table *from)
 {
     if (from->n == 0) return;
-    t->n = from->n;
-    t->row = bt_alloc((size_t)t->n, 3 * sizeof *t->row);
-    memcpy(t->row, from->row, (size_t)t->n * 3 * sizeof *t->row);
+    table->n = from->n;
+    table->row = bt_alloc((size_t)table->n, 3 * sizeof *table->row);
+    memcpy(table->row, from->row, (size_t)table->n * 3 * sizeof *table->row);
 }
 
-bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current,
+bt_status bt_case_read_kept(bt_case *input, const char *path, const char *text, const bt_table *current,
                             const bt_table *wind, bt_errors *err)
 {
-    begin_case(c, path);
-    c->text = bt_text_copy(text);
-    keep_table(&c->water.table, current);
-    keep_table(&c->air.table, wind);
-    return read_text(c, strlen(text), true, NULL, NULL, 0, err);
+    begin_case(input, path);
+    input->text = bt_text_copy(text);
+    keep_table(&input->water.table, current);
+    keep_table(&input->air.table, wind);
+    return read_text(input, strlen(text), true, NULL, NULL, 0, err);
 }
 
-void bt_case_free(bt_case *c)
+void bt_case_free(bt_case *input)
 {
-    bt_schema_release(bt_case_keys, bt_n_case_keys, c);
-    for (bt_idx i = 0; i < c->n_floes; i++) bt_schema_release(bt_floe_keys, bt_n_floe_keys, &c->floes[i]);
-    bt_table_free(&c->water.table);
-    bt_table_free(&c->air.table);
-    free(c->floes);
-    free(c->path);
-    free(c->text);
-    free(c->floes_path);
-    *c = (bt_case){0};
+    bt_schema_release(bt_case_keys, bt_n_case_keys, input);
+    for (bt_idx i = 0; i < input->n_floes; i++) bt_schema_release(bt_floe_keys, bt_n_floe_keys, &input->floes[i]);
+    bt_table_free(&input->water.table);
+    bt_table_free(&input->air.table);
+    free(input->floes);
+    free(input->path);
+    free(input->text);
+    free(input->floes_path);
+    *input = (bt_case){0};
 }

@@ -23,30 +23,30 @@ static const char *open_sections(FILE *out, const char *previous, const char *na
     return name;
 }
 
-static void write_floes(const bt_case *c, FILE *out)
+static void write_floes(const bt_case *input, FILE *out)
 {
-    if (!c->n_floes) return;
+    if (!input->n_floes) return;
     fputs("\nfloes:\n", out);
-    for (bt_idx i = 0; i < c->n_floes; i++)
+    for (bt_idx i = 0; i < input->n_floes; i++)
         for (int k = 0; k < bt_n_floe_keys; k++) {
             fprintf(out, "%s%s: ", k ? "    " : "  - ", bt_floe_keys[k].name);
-            bt_value_write(&bt_floe_keys[k], &c->floes[i], out);
+            bt_value_write(&bt_floe_keys[k], &input->floes[i], out);
             fputc('\n', out);
         }
 }
 
-char *bt_case_resolved(const bt_case *c)
+char *bt_case_resolved(const bt_case *input)
 {
-    return bt_case_text(c, BT_CASE_RESOLVED_HEAD);
+    return bt_case_text(input, BT_CASE_RESOLVED_HEAD);
 }
 
 /// The member of a key, of `size` bytes.
-static void member_of(const bt_case *c, const bt_key *k, void *out, size_t size)
+static void member_of(const bt_case *input, const bt_key *key, void *out, size_t size)
 {
-    memcpy(out, (const char *)c + k->offset, size);
+    memcpy(out, (const char *)input + key->offset, size);
 }
 
-static void json_value(bt_json *j, const bt_key *k, const bt_case *c)
+static void json_value(bt_json *json, const bt_key *key, const bt_case *input)
 {
     union {
         double real;
@@ -56,64 +56,65 @@ static void json_value(bt_json *j, const bt_key *k, const bt_case *c)
         const char *text;
         const double *points;
     } v;
-    switch (k->type) {
-    case BT_KEY_REAL: member_of(c, k, &v.real, sizeof v.real), bt_json_number(j, k->name, v.real); break;
-    case BT_KEY_INT: member_of(c, k, &v.integer, sizeof v.integer), bt_json_int(j, k->name, v.integer); break;
-    case BT_KEY_BOOL: member_of(c, k, &v.yes, sizeof v.yes), bt_json_bool(j, k->name, v.yes); break;
+    switch (key->type) {
+    case BT_KEY_REAL: member_of(input, key, &v.real, sizeof v.real), bt_json_number(json, key->name, v.real); break;
+    case BT_KEY_INT: member_of(input, key, &v.integer, sizeof v.integer),
+    bt_json_int(json, key->name, v.integer); break;
+    case BT_KEY_BOOL: member_of(input, key, &v.yes, sizeof v.yes), bt_json_bool(json, key->name, v.yes); break;
     case BT_KEY_CHOICE:
-        member_of(c, k, &v.choice, sizeof v.choice);
-        bt_json_string(j, k->name, k->choices[v.choice]);
+        member_of(input, key, &v.choice, sizeof v.choice);
+        bt_json_string(json, key->name, key->choices[v.choice]);
         break;
-    case BT_KEY_TEXT: member_of(c, k, &v.text, sizeof v.text), bt_json_string(j, k->name, v.text); break;
+    case BT_KEY_TEXT: member_of(input, key, &v.text, sizeof v.text), bt_json_string(json, key->name, v.text); break;
     case BT_KEY_MAP: break;
     case BT_KEY_POINTS: {
         int n;
-        member_of(c, k, &v.points, sizeof v.points);
-        memcpy(&n, (const char *)c + k->offset_count, sizeof n);
+        member_of(input, key, &v.points, sizeof v.points);
+        memcpy(&n, (const char *)input + key->offset_count, sizeof n);
         if (!n) {
-            bt_json_raw(j, k->name, "null");
+            bt_json_raw(json, key->name, "null");
             break;
         }
-        bt_json_open(j, k->name, '[');
+        bt_json_open(json, key->name, '[');
         for (int i = 0; i < n; i++) {
-            bt_json_open(j, NULL, '[');
-            bt_json_number(j, NULL, v.points[2 * i]);
-            bt_json_number(j, NULL, v.points[2 * i + 1]);
-            bt_json_close(j, ']');
+            bt_json_open(json, NULL, '[');
+            bt_json_number(json, NULL, v.points[2 * i]);
+            bt_json_number(json, NULL, v.points[2 * i + 1]);
+            bt_json_close(json, ']');
         }
-        bt_json_close(j, ']');
+        bt_json_close(json, ']');
     }
     }
 }
 
-char *bt_case_resolved_json(const bt_case *c)
+char *bt_case_resolved_json(const bt_case *input)
 {
-    bt_json j = {0};
-    bt_json_open(&j, NULL, '{');
-    const int n = bt_n_case_keys - bt_schema_added() + c->n_extra;
-    for (int k = 0; k < n; k++) json_value(&j, &bt_case_keys[k], c);
-    bt_json_close(&j, '}');
-    return j.text;
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    const int n = bt_n_case_keys - bt_schema_added() + input->n_extra;
+    for (int k = 0; k < n; k++) json_value(&json, &bt_case_keys[k], input);
+    bt_json_close(&json, '}');
+    return json.text;
 }
 
-char *bt_case_text(const bt_case *c, const char *head)
+char *bt_case_text(const bt_case *input, const char *head)
 {
     bt_text text;
     bt_text_begin(&text);
     FILE *out = text.out;
     fputs(head, out);
     const char *previous = "";
-    const int n = bt_n_case_keys - bt_schema_added() + c->n_extra; // of a law that came later it has no values
+    const int n = bt_n_case_keys - bt_schema_added() + input->n_extra; // of a law that came later it has no values
     for (int k = 0; k < n; k++) {
         const bt_key *key = &bt_case_keys[k];
         int depth;
         const char *name = open_sections(out, previous, key->name, &depth);
         fprintf(out, "%*s%s: ", 2 * depth, "", name);
-        bt_value_write(key, c, out);
+        bt_value_write(key, input, out);
         fprintf(out, "  # %s\n", key->doc);
         previous = key->name;
     }
-    write_floes(c, out);
+    write_floes(input, out);
     return bt_text_end(&text);
 }
 
@@ -121,24 +122,24 @@ static void list_keys(FILE *out, const bt_key *keys, int n)
 {
     char options[128];
     for (int i = 0; i < n; i++) {
-        const bt_key *k = &keys[i];
-        const char *unit = bt_units_bare(k->unit), *range = k->range ? k->range : "-";
-        if (k->type == BT_KEY_INT) unit = "integer";
-        if (k->type == BT_KEY_TEXT) unit = "text";
-        if (k->type == BT_KEY_MAP) unit = "map";
-        if (k->type == BT_KEY_BOOL) unit = "bool", range = "true | false";
-        if (k->type == BT_KEY_CHOICE) {
+        const bt_key *key = &keys[i];
+        const char *unit = bt_units_bare(key->unit), *range = key->range ? key->range : "-";
+        if (key->type == BT_KEY_INT) unit = "integer";
+        if (key->type == BT_KEY_TEXT) unit = "text";
+        if (key->type == BT_KEY_MAP) unit = "map";
+        if (key->type == BT_KEY_BOOL) unit = "bool", range = "true | false";
+        if (key->type == BT_KEY_CHOICE) {
             unit = "choice";
             *options = 0;
-            for (int j = 0; k->choices[j]; j++)
+            for (int j = 0; key->choices[j]; j++)
                 snprintf(options + strlen(options), sizeof options - strlen(options), "%s%s", j ? " | " : "",
-                         k->choices[j]);
+                         key->choices[j]);
             range = options;
         }
-        const char *preset = k->preset ? k->preset : "required", *rule = preset[0] == '=' ? preset : NULL;
-        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc,
+        const char *preset = key->preset ? key->preset : "required", *rule = preset[0] == '=' ? preset : NULL;
+        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s%s\n", key->name, unit, rule ? "follows" : preset, range, key->doc,
                 rule ? "; default: " : "", rule ? rule + 2 : "",
-                k->at_sea ? "; no default in the geographic frame" : "");
+                key->at_sea ? "; no default in the geographic frame" : "");
     }
 }
 
@@ -162,68 +163,68 @@ void bt_case_list_keys(void *stream)
 }
 
 /// Least and most value in the unit of a number without one, and whether the value itself is left out.
-static void json_range(bt_json *j, const bt_key *k)
+static void json_range(bt_json *json, const bt_key *key)
 {
-    bt_key bare = *k;
+    bt_key bare = *key;
     bare.unit = BT_UNIT_NONE;
-    bt_range r;
-    if (!k->range || !bt_value_range(&bare, &r)) return;
-    bt_json_number(j, "least", r.lo);
-    bt_json_bool(j, "above_least", r.lo_open);
-    bt_json_number(j, "most", r.hi);
-    bt_json_bool(j, "below_most", r.hi_open);
+    bt_range range;
+    if (!key->range || !bt_value_range(&bare, &range)) return;
+    bt_json_number(json, "least", range.lo);
+    bt_json_bool(json, "above_least", range.lo_open);
+    bt_json_number(json, "most", range.hi);
+    bt_json_bool(json, "below_most", range.hi_open);
 }
 
-static void json_keys(bt_json *j, const char *name, const bt_key *keys, int n)
+static void json_keys(bt_json *json, const char *name, const bt_key *keys, int n)
 {
     static const char *const types[] = {[BT_KEY_REAL] = "real", [BT_KEY_INT] = "integer",   [BT_KEY_BOOL] = "bool",
                                         [BT_KEY_TEXT] = "text", [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points",
                                         [BT_KEY_MAP] = "map"};
-    bt_json_open(j, name, '[');
+    bt_json_open(json, name, '[');
     for (int i = 0; i < n; i++) {
-        const bt_key *k = &keys[i];
-        const bool number = k->type == BT_KEY_REAL || k->type == BT_KEY_INT || k->type == BT_KEY_POINTS,
-                   rule = k->preset && k->preset[0] == '=';
-        bt_json_open(j, NULL, '{');
-        bt_json_string(j, "name", k->name);
-        bt_json_string(j, "type", types[k->type]);
-        bt_json_bool(j, "required", !k->preset);
-        bt_json_string(j, "default", rule ? NULL : k->preset);
-        bt_json_string(j, "follows", rule ? k->preset + 2 : NULL);
-        bt_json_bool(j, "default_at_sea", k->preset && !k->at_sea);
-        if (number) bt_json_string(j, "unit", k->type == BT_KEY_INT ? "" : bt_units_bare(k->unit));
-        if (number) json_range(j, k);
-        if (k->type == BT_KEY_CHOICE) {
-            bt_json_open(j, "choices", '[');
-            for (int c = 0; k->choices[c]; c++) bt_json_string(j, NULL, k->choices[c]);
-            bt_json_close(j, ']');
+        const bt_key *key = &keys[i];
+        const bool number = key->type == BT_KEY_REAL || key->type == BT_KEY_INT || key->type == BT_KEY_POINTS,
+                   rule = key->preset && key->preset[0] == '=';
+        bt_json_open(json, NULL, '{');
+        bt_json_string(json, "name", key->name);
+        bt_json_string(json, "type", types[key->type]);
+        bt_json_bool(json, "required", !key->preset);
+        bt_json_string(json, "default", rule ? NULL : key->preset);
+        bt_json_string(json, "follows", rule ? key->preset + 2 : NULL);
+        bt_json_bool(json, "default_at_sea", key->preset && !key->at_sea);
+        if (number) bt_json_string(json, "unit", key->type == BT_KEY_INT ? "" : bt_units_bare(key->unit));
+        if (number) json_range(json, key);
+        if (key->type == BT_KEY_CHOICE) {
+            bt_json_open(json, "choices", '[');
+            for (int c = 0; key->choices[c]; c++) bt_json_string(json, NULL, key->choices[c]);
+            bt_json_close(json, ']');
         }
-        bt_json_string(j, "doc", k->doc);
-        bt_json_close(j, '}');
+        bt_json_string(json, "doc", key->doc);
+        bt_json_close(json, '}');
     }
-    bt_json_close(j, ']');
+    bt_json_close(json, ']');
 }
 
 void bt_case_list_keys_json(void *stream)
 {
-    bt_json j = {0};
-    bt_json_open(&j, NULL, '{');
-    json_keys(&j, "keys", bt_case_keys, bt_n_case_keys);
-    json_keys(&j, "floe_keys", bt_floe_keys, bt_n_floe_keys);
-    json_keys(&j, "file_keys", &bt_base_key, 1);
-    json_keys(&j, "study_keys", bt_study_keys, bt_n_study_keys);
-    bt_json_open(&j, "units", '[');
-    bt_unit_entry u;
-    for (int k = 0; bt_units_entry(k, &u); k++) {
-        bt_json_open(&j, NULL, '{');
-        bt_json_string(&j, "symbol", u.symbol);
-        bt_json_string(&j, "si", bt_units_symbol(u.kind));
-        bt_json_number(&j, "up", u.up);
-        bt_json_number(&j, "down", u.down);
-        bt_json_close(&j, '}');
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    json_keys(&json, "keys", bt_case_keys, bt_n_case_keys);
+    json_keys(&json, "floe_keys", bt_floe_keys, bt_n_floe_keys);
+    json_keys(&json, "file_keys", &bt_base_key, 1);
+    json_keys(&json, "study_keys", bt_study_keys, bt_n_study_keys);
+    bt_json_open(&json, "units", '[');
+    bt_unit_entry unit;
+    for (int k = 0; bt_units_entry(k, &unit); k++) {
+        bt_json_open(&json, NULL, '{');
+        bt_json_string(&json, "symbol", unit.symbol);
+        bt_json_string(&json, "si", bt_units_symbol(unit.kind));
+        bt_json_number(&json, "up", unit.up);
+        bt_json_number(&json, "down", unit.down);
+        bt_json_close(&json, '}');
     }
-    bt_json_close(&j, ']');
-    bt_json_close(&j, '}');
-    fputs(j.text, stream);
-    bt_json_free(&j);
+    bt_json_close(&json, ']');
+    bt_json_close(&json, '}');
+    fputs(json.text, stream);
+    bt_json_free(&json);
 }

@@ -42,90 +42,92 @@ typedef struct idle {
 
 enum { IDLE = 36 };
 
-static void list_idle(const bt_case *c, idle out[IDLE])
+static void list_idle(const bt_case *input, idle out[IDLE])
 {
-    const bool read = bt_case_reads_field(c), power = c->ice.size_law == BT_SIZE_POWER;
+    const bool read = bt_case_reads_field(input), power = input->ice.size_law == BT_SIZE_POWER;
     // of ice that is read a moving window has its room in floes of ice.size (case_window.c)
-    const bool sized = c->domain.ends == BT_BOUND_MOVING;
-    const bool line = c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST;
-    const bool walls = c->domain.ends == BT_BOUND_WALL || c->domain.sides == BT_BOUND_WALL;
-    const char *source = c->ice.field ? "ice.field" : "ice.outlines";
+    const bool sized = input->domain.ends == BT_BOUND_MOVING;
+    const bool line = input->tow.mode == BT_TOW_LINE || input->tow.mode == BT_TOW_THRUST;
+    const bool walls = input->domain.ends == BT_BOUND_WALL || input->domain.sides == BT_BOUND_WALL;
+    const char *source = input->ice.field ? "ice.field" : "ice.outlines";
     const idle all[] = {
         {read, TOGETHER, "ice.concentration ice.shape ice.sides ice.aspect ice.size_law ice.size_spread ice.size_min "
                "ice.size_max ice.size_exponent ice.shake ice.extent.x_min ice.extent.x_max ice.extent.y_min "
                "ice.extent.y_max",
          source, "on ice that is read from a file"},
         {read && !sized, TOGETHER, "ice.size", source, "on ice that is read from a file"},
-        {c->ice.field, TOGETHER, "ice.thickness_law ice.thickness_spread", "ice.field",
+        {input->ice.field, TOGETHER, "ice.thickness_law ice.thickness_spread", "ice.field",
          "on the floes of a field file, which have thicknesses of their own"},
-        {c->ice.field && c->n_floes == 0, TOGETHER, "ice.thickness", "ice.field",
+        {input->ice.field && input->n_floes == 0, TOGETHER, "ice.thickness", "ice.field",
          "on the floes of a field file, which have thicknesses of their own"},
-        {c->ice.field, TOGETHER, "ice.x_min ice.x_max ice.y_min ice.y_max", "ice.field",
+        {input->ice.field, TOGETHER, "ice.x_min ice.x_max ice.y_min ice.y_max", "ice.field",
          "on a field file, which has its own ice region"},
-        {!c->ice.field && c->ice.thickness_law == BT_THICK_CONSTANT, TOGETHER, "ice.thickness_spread",
+        {!input->ice.field && input->ice.thickness_law == BT_THICK_CONSTANT, TOGETHER, "ice.thickness_spread",
          "ice.thickness_law", "with ice.thickness_law: constant"},
-        {!read && c->ice.size_law == BT_SIZE_SINGLE, TOGETHER, "ice.size_min ice.size_max", "ice.size_law",
+        {!read && input->ice.size_law == BT_SIZE_SINGLE, TOGETHER, "ice.size_min ice.size_max", "ice.size_law",
          "with ice.size_law: single"},
         {!read && !power, TOGETHER, "ice.size_exponent", "ice.size_law", "without ice.size_law: power"},
         {!read && power, TOGETHER, "ice.size ice.size_spread", "ice.size_law",
          "with ice.size_law: power, whose sizes follow from ice.size_min, size_max and size_exponent"},
-        {!read, TOGETHER, c->ice.shape == BT_ICE_RECTANGLES ? "ice.sides"
-                : c->ice.shape == BT_ICE_POLYGONS ? "ice.aspect"
-                                                  : "ice.sides ice.aspect",
+        {!read, TOGETHER, input->ice.shape == BT_ICE_RECTANGLES ? "ice.sides"
+                : input->ice.shape == BT_ICE_POLYGONS ? "ice.aspect"
+                                                      : "ice.sides ice.aspect",
          "ice.shape", "on floes of this ice.shape"},
-        {!(c->ice.crushing_pressure > 0), TOGETHER, "ice.crushing.least_length", "ice.crushing.pressure",
+        {!(input->ice.crushing_pressure > 0), TOGETHER, "ice.crushing.least_length", "ice.crushing.pressure",
          "on ice that is not crushed (ice.crushing.pressure)"},
-        {!(c->ice.splitting.toughness > 0), TOGETHER,
+        {!(input->ice.splitting.toughness > 0), TOGETHER,
          "ice.splitting.strength ice.splitting.least_size ice.splitting.generations ice.splitting.aspect "
          "ice.splitting.reserve ice.splitting.scatter",
          "ice.splitting.toughness", "on floes that do not split (ice.splitting.toughness)"},
-        {c->body.shape == BT_BODY_POLYGON, TOGETHER, "body.length body.width", "body.shape",
+        {input->body.shape == BT_BODY_POLYGON, TOGETHER, "body.length body.width", "body.shape",
          "on the waterline of body.vertices (body.shape: polygon)"},
-        {c->body.shape == BT_BODY_ABSENT, TOGETHER,
+        {input->body.shape == BT_BODY_ABSENT, TOGETHER,
          "body.length body.width body.x body.y body.yaw body.yaw_rate body.draft body.sail body.density "
          "body.mass body.added_mass body.added_inertia body.friction body.restitution body.drag.water_form "
          "body.drag.water_skin body.drag.air_form body.drag.air_skin body.drag.tangential",
          "body.shape", "without a towed body (body.shape: none)"},
-        {c->body.shape == BT_BODY_ABSENT, TOGETHER, "tow.ramp tow.direction impact.panels output.panels", "body.shape",
+        {input->body.shape == BT_BODY_ABSENT, TOGETHER, "tow.ramp tow.direction impact.panels output.panels",
+         "body.shape",
          "without a body that is towed (body.shape: none)"},
-        {c->body.shape != BT_BODY_ABSENT && c->tow.mode == BT_TOW_NONE, TOGETHER, "tow.ramp", "tow.mode",
+        {input->body.shape != BT_BODY_ABSENT && input->tow.mode == BT_TOW_NONE, TOGETHER, "tow.ramp", "tow.mode",
          "on a body that is not towed (tow.mode: none)"},
         {!line, TOGETHER, "tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y tow.line.type "
                 "tow.line.diameter tow.line.branches tow.line.breaking_load tow.line.weight " BRANCH2,
          "tow.mode", "without a line, which tow.mode: line and thrust have"},
-        {line && c->tow.line.branches < 2, TOGETHER, BRANCH2, "tow.line.branches",
+        {line && input->tow.line.branches < 2, TOGETHER, BRANCH2, "tow.line.branches",
          "on a single line (tow.line.branches)"},
-        {c->tow.mode != BT_TOW_THRUST, TOGETHER, "tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull "
-                                       "tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag "
-                                       "tow.vessel.lookahead",
+        {input->tow.mode != BT_TOW_THRUST, TOGETHER, "tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull "
+                                           "tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag "
+                                           "tow.vessel.lookahead",
          "tow.mode", "without a vessel, which tow.mode: thrust has"},
-        {c->lead.mode == BT_LEAD_NONE, TOGETHER, "lead.width lead.length lead.floe_size", "lead.mode",
+        {input->lead.mode == BT_LEAD_NONE, TOGETHER, "lead.width lead.length lead.floe_size", "lead.mode",
          "without a lead (lead.mode)"},
-        {c->lead.mode == BT_LEAD_CHANNEL, TOGETHER, "lead.floe_size", "lead.mode",
+        {input->lead.mode == BT_LEAD_CHANNEL, TOGETHER, "lead.floe_size", "lead.mode",
          "on a channel, in which no pieces are left"},
-        {!(c->water.tide.major > 0), TOGETHER, "water.tide.inclination water.tide.period water.tide.phase",
+        {!(input->water.tide.major > 0), TOGETHER, "water.tide.inclination water.tide.period water.tide.phase",
          "water.tide.major", "without a tide (water.tide.major)"},
         {!walls, TOGETHER, "domain.wall_friction domain.wall_restitution", "domain.ends domain.sides",
          "without walls (domain.ends, domain.sides)"},
-        {c->impact.conversion != BT_IMPACT_DURATION, TOGETHER, "impact.duration", "impact.conversion",
+        {input->impact.conversion != BT_IMPACT_DURATION, TOGETHER, "impact.duration", "impact.conversion",
          "without impact.conversion: duration"},
-        {c->impact.conversion != BT_IMPACT_CRUSHING, TOGETHER, "impact.pressure impact.corner impact.corner_angle",
+        {input->impact.conversion != BT_IMPACT_CRUSHING, TOGETHER, "impact.pressure impact.corner impact.corner_angle",
          "impact.conversion", "without impact.conversion: crushing"},
-        {c->impact.conversion == BT_IMPACT_NONE, TOGETHER, "impact.least_speed", "impact.conversion",
+        {input->impact.conversion == BT_IMPACT_NONE, TOGETHER, "impact.least_speed", "impact.conversion",
          "where collisions are not told apart (impact.conversion)"},
-        {c->domain.ends != BT_BOUND_WALL, ALWAYS, "domain.ends_closing", "domain.ends", "without a wall to move"},
-        {c->domain.sides != BT_BOUND_WALL, ALWAYS, "domain.sides_closing", "domain.sides", "without a wall to move"},
-        {c->tow.mode == BT_TOW_NONE, ALWAYS, "tow.programme tow.waypoints", "tow.mode", "with tow.mode: none"},
-        {c->tow.n_waypoints == 0, ALWAYS, "tow.turn_radius", "tow.waypoints", "without tow.waypoints"},
-        {line && c->tow.line.type == BT_ROPE_NUMBERS, ALWAYS, "tow.line.diameter", "tow.line.type",
+        {input->domain.ends != BT_BOUND_WALL, ALWAYS, "domain.ends_closing", "domain.ends", "without a wall to move"},
+        {input->domain.sides != BT_BOUND_WALL, ALWAYS, "domain.sides_closing", "domain.sides",
+         "without a wall to move"},
+        {input->tow.mode == BT_TOW_NONE, ALWAYS, "tow.programme tow.waypoints", "tow.mode", "with tow.mode: none"},
+        {input->tow.n_waypoints == 0, ALWAYS, "tow.turn_radius", "tow.waypoints", "without tow.waypoints"},
+        {line && input->tow.line.type == BT_ROPE_NUMBERS, ALWAYS, "tow.line.diameter", "tow.line.type",
          "without a named line"},
-        {c->water.tilt != BT_TILT_SLOPE, ALWAYS, "water.slope_x water.slope_y", "water.tilt",
+        {input->water.tilt != BT_TILT_SLOPE, ALWAYS, "water.slope_x water.slope_y", "water.tilt",
          "without water.tilt: slope"},
-        {c->water.table.n > 0, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
+        {input->water.table.n > 0, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
          "water.current_table", "beside water.current_table, which says it all"},
-        {c->air.table.n > 0, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
+        {input->air.table.n > 0, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
          "beside air.wind_table, which says it all"},
-        {!c->ice.outlines, ALWAYS, "ice.outlines_crs", "ice.outlines", "without ice.outlines"},
+        {!input->ice.outlines, ALWAYS, "ice.outlines_crs", "ice.outlines", "without ice.outlines"},
         {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that is made, whose floes are convex"},
     };
     _Static_assert(sizeof all == IDLE * sizeof *all, "count the rows");
@@ -137,25 +139,25 @@ static const bt_key *row_of(const char *key)
     return &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, key)];
 }
 
-static size_t size_of(const bt_key *k)
+static size_t size_of(const bt_key *key)
 {
-    return k->type == BT_KEY_REAL ? sizeof(double) : k->type == BT_KEY_INT ? sizeof(int64_t) : sizeof(int);
+    return key->type == BT_KEY_REAL ? sizeof(double) : key->type == BT_KEY_INT ? sizeof(int64_t) : sizeof(int);
 }
 
 /// A case with a key of a number or a choice at its default, all others as they are. No memory of its own.
-static bt_case with_default(const bt_case *c, const bt_key *k)
+static bt_case with_default(const bt_case *c, const bt_key *key)
 {
     bt_case d = *c;
-    bt_schema_preset(k, 1, &d);
+    bt_schema_preset(key, 1, &d);
     bt_case_fill(&d);
     return d;
 }
 
-bool bt_case_is_unused(const bt_case *c, const char *key)
+bool bt_case_is_unused(const bt_case *input, const char *key)
 {
     idle rules[IDLE];
     char name[BT_LONGEST_KEY];
-    list_idle(c, rules);
+    list_idle(input, rules);
     for (int i = 0; i < IDLE; i++)
         for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
             if (!strcmp(name, key)) return true;
@@ -174,37 +176,38 @@ bool bt_case_changed(const bt_case *c, const char *key)
 }
 
 /// Calls found for each key that is not used although its value is not the default.
-static void look(const bt_case *c, void (*found)(void *to, const char *key, const idle *r), void *to)
+static void look(const bt_case *input, void (*found)(void *to, const char *key, const idle *rule), void *to)
 {
     idle rules[IDLE];
     char name[BT_LONGEST_KEY];
-    list_idle(c, rules);
+    list_idle(input, rules);
     for (int i = 0; i < IDLE; i++)
         for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
-            if (bt_case_changed(c, name)) found(to, name, &rules[i]);
+            if (bt_case_changed(input, name)) found(to, name, &rules[i]);
 }
 
 /// Does the file in which the key stands have more than half of all keys? Nobody writes so many by hand.
-static bool says_all(const bt_check *k, const char *key)
+static bool says_all(const bt_check *check, const char *key)
 {
     int n = 0;
     for (int i = 0; i < bt_n_case_keys; i++)
-        n += k->from[i].line > 0 && !strcmp(bt_check_file(k, bt_case_keys[i].name), bt_check_file(k, key));
+        n += check->from[i].line > 0 && !strcmp(bt_check_file(check, bt_case_keys[i].name), bt_check_file(check, key));
     return 2 * n > bt_n_case_keys;
 }
 
-static void refuse(void *to, const char *key, const idle *r)
+static void refuse(void *to, const char *key, const idle *rule)
 {
-    const bt_check *k = to;
-    const bool always = r->refused == ALWAYS;
-    if (!bt_check_sound(k, key) || !bt_check_sound(k, r->cause) || (!always && (!k->from || says_all(k, key)))) return;
-    const char *causes = r->cause;
+    const bt_check *check = to;
+    const bool always = rule->refused == ALWAYS;
+    if (!bt_check_sound(check, key) || !bt_check_sound(check, rule->cause) ||
+        (!always && (!check->from || says_all(check, key)))) return;
+    const char *causes = rule->cause;
     char cause[BT_LONGEST_KEY];
     while (bt_next_name(&causes, cause))
-        if (!always && !bt_check_together(k, key, cause)) return;
-    causes = r->cause;
+        if (!always && !bt_check_together(check, key, cause)) return;
+    causes = rule->cause;
     bt_next_name(&causes, cause); // the first is the one to change
-    bt_check_fault(k, key, "has no effect %s; remove the key, or change %s", r->why, cause);
+    bt_check_fault(check, key, "has no effect %s; remove the key, or change %s", rule->why, cause);
 }
 
 /// Keys of one reason in a row, so that one warning says them.
@@ -220,29 +223,29 @@ static void put(warning *w)
     *w->names = 0;
 }
 
-static void gather(void *to, const char *key, const idle *r)
+static void gather(void *to, const char *key, const idle *rule)
 {
     warning *w = to;
-    if (w->why != r->why) put(w);
-    w->why = r->why;
+    if (w->why != rule->why) put(w);
+    w->why = rule->why;
     const size_t n = strlen(w->names);
     snprintf(w->names + n, sizeof w->names - n, "%s%s", n ? ", " : "", key);
 }
 
-void bt_case_warn_idle(const bt_case *c, bt_errors *warnings)
+void bt_case_warn_idle(const bt_case *input, bt_errors *warnings)
 {
     warning w = {.warnings = warnings};
-    look(c, gather, &w);
+    look(input, gather, &w);
     put(&w);
 }
 
-static void mark(void *to, const char *key, const idle *r)
+static void mark(void *to, const char *key, const idle *rule)
 {
-    (void)r;
+    (void)rule;
     ((bool *)to)[row_of(key) - bt_case_keys] = true;
 }
 
-void bt_case_mark_idle(const bt_case *c, bool *idle_key) { look(c, mark, idle_key); }
+void bt_case_mark_idle(const bt_case *input, bool *idle_key) { look(input, mark, idle_key); }
 
 void bt_case_put_default(bt_case *c, int key)
 {
@@ -274,38 +277,39 @@ enum { LIMITS = 63 };
 enum { TIDE_STEPS = 20 }; // a step takes the current of its middle: 1 - sinc(π/20) = 0.4 % of the mean over it
 
 /// Does the tow keep its place across x? Then what it leads through goes round a moving window as it is.
-static bool along_x(const bt_case *c)
+static bool along_x(const bt_case *input)
 {
-    bool along = fabs(bt_sin(c->tow.direction)) <= 1e-9;
-    for (int i = 0; i < c->tow.n_waypoints; i++)
-        along = along && fabs(c->tow.waypoints[2 * i + 1] - c->body.y) <= 1e-9 * c->domain.width;
+    bool along = fabs(bt_sin(input->tow.direction)) <= 1e-9;
+    for (int i = 0; i < input->tow.n_waypoints; i++)
+        along = along && fabs(input->tow.waypoints[2 * i + 1] - input->body.y) <= 1e-9 * input->domain.width;
     return along;
 }
 
-static void list_limits(const bt_case *c, limit out[LIMITS])
+static void list_limits(const bt_case *input, limit out[LIMITS])
 {
-    const double size_min = c->ice.size_min, size_max = c->ice.size_max, ahead = c->domain.ahead;
-    const bool read = bt_case_reads_field(c), made = bt_case_makes_ice(c), power = c->ice.size_law == BT_SIZE_POWER,
-               ordered = size_min < size_max || size_max == 0, splits = c->ice.splitting.toughness > 0,
-               lognormal = made && c->ice.size_law == BT_SIZE_LOGNORMAL && ordered;
-    const double slack = 1e-9 * (c->domain.length + c->domain.width), x0 = c->domain.x0 - slack,
-                 x1 = c->domain.x0 + c->domain.length + slack, y0 = c->domain.y0 - slack,
-                 y1 = c->domain.y0 + c->domain.width + slack;
+    const double size_min = input->ice.size_min, size_max = input->ice.size_max, ahead = input->domain.ahead;
+    const bool read = bt_case_reads_field(input), made = bt_case_makes_ice(input),
+               power = input->ice.size_law == BT_SIZE_POWER, ordered = size_min < size_max || size_max == 0,
+               splits = input->ice.splitting.toughness > 0,
+               lognormal = made && input->ice.size_law == BT_SIZE_LOGNORMAL && ordered;
+    const double slack = 1e-9 * (input->domain.length + input->domain.width), x0 = input->domain.x0 - slack,
+                 x1 = input->domain.x0 + input->domain.length + slack, y0 = input->domain.y0 - slack,
+                 y1 = input->domain.y0 + input->domain.width + slack;
     // a region without room is refused for that alone; so are sizes in the wrong order
-    const double room = bt_min(c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
+    const double room = bt_min(input->ice.x_max - input->ice.x_min, input->ice.y_max - input->ice.y_min);
     const bool roomy = made && room > 0 && ordered;
-    const double period = bt_min(bt_bound_wraps(c->domain.ends) ? c->domain.length : INFINITY,
-                                 bt_bound_wraps(c->domain.sides) ? c->domain.width : INFINITY);
-    const double largest = power ? size_max : c->ice.size;
-    const bool lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat), east = !isnan(c->ice.origin_east),
-               north = !isnan(c->ice.origin_north);
-    const bt_crs crs = c->ice.outlines_crs;
+    const double period = bt_min(bt_bound_wraps(input->domain.ends) ? input->domain.length : INFINITY,
+                                 bt_bound_wraps(input->domain.sides) ? input->domain.width : INFINITY);
+    const double largest = power ? size_max : input->ice.size;
+    const bool lon = !isnan(input->ice.origin_lon), lat = !isnan(input->ice.origin_lat),
+               east = !isnan(input->ice.origin_east), north = !isnan(input->ice.origin_north);
+    const bt_crs crs = input->ice.outlines_crs;
     const bool degrees = crs == BT_CRS_FILE || crs == BT_CRS_LONLAT, plane = crs == BT_CRS_FILE || crs == BT_CRS_PLANE;
-    const bool absent = c->body.shape == BT_BODY_ABSENT, polygon = c->body.shape == BT_BODY_POLYGON;
-    const bool thrust = c->tow.mode == BT_TOW_THRUST, line = c->tow.mode == BT_TOW_LINE || thrust;
-    const bool named = c->tow.line.type != BT_ROPE_NUMBERS, thick = c->tow.line.diameter > 0;
-    const bool driven = c->tow.mode == BT_TOW_SPEED, towed = !absent && c->tow.mode != BT_TOW_NONE;
-    const bool lead = c->lead.mode != BT_LEAD_NONE;
+    const bool absent = input->body.shape == BT_BODY_ABSENT, polygon = input->body.shape == BT_BODY_POLYGON;
+    const bool thrust = input->tow.mode == BT_TOW_THRUST, line = input->tow.mode == BT_TOW_LINE || thrust;
+    const bool named = input->tow.line.type != BT_ROPE_NUMBERS, thick = input->tow.line.diameter > 0;
+    const bool driven = input->tow.mode == BT_TOW_SPEED, towed = !absent && input->tow.mode != BT_TOW_NONE;
+    const bool lead = input->lead.mode != BT_LEAD_NONE;
     static const char *const empty = ": the ice region is empty; move one of them", *const inside = "; move it inside",
                       *const unit = "; check the unit", *const one = "; change one of them",
                       *const swap = "; swap them and turn the inclination by 90 deg",
@@ -319,26 +323,28 @@ static void list_limits(const bt_case *c, limit out[LIMITS])
         // a case built in memory can leave the two keys without default unset
         {true, NEEDED, "run.dt", "a run needs it", 0, "", "0.1 s"},
         {true, NEEDED, "run.duration", "a run needs it", 0, "", "450 s"},
-        {true, AT_MOST, "run.dt", "run.duration", c->run.duration, "", "; shorten the step or lengthen the run"},
-        {true, BELOW, "output.window_start", "run.duration", c->run.duration, "", "; give an earlier time"},
+        {true, AT_MOST, "run.dt", "run.duration", input->run.duration, "", "; shorten the step or lengthen the run"},
+        {true, BELOW, "output.window_start", "run.duration", input->run.duration, "", "; give an earlier time"},
 
-        {true, BELOW, "ice.x_min", "ice.x_max", c->ice.x_max, EXTENT, empty},
-        {true, BELOW, "ice.y_min", "ice.y_max", c->ice.y_max, EXTENT, empty},
+        {true, BELOW, "ice.x_min", "ice.x_max", input->ice.x_max, EXTENT, empty},
+        {true, BELOW, "ice.y_min", "ice.y_max", input->ice.y_max, EXTENT, empty},
         {true, AT_LEAST, "ice.x_min", "the low end of the domain", x0, EXTENT, inside},
         {true, AT_MOST, "ice.x_max", "the high end of the domain", x1, EXTENT, inside},
         {true, AT_LEAST, "ice.y_min", "the low end of the domain", y0, EXTENT, inside},
         {true, AT_MOST, "ice.y_max", "the high end of the domain", y1, EXTENT, inside},
-        {!read, AT_MOST, "ice.extent.x_min", "ice.x_min", c->ice.x_min + slack, "", cut},
-        {!read, AT_LEAST, "ice.extent.x_max", "ice.x_max", c->ice.x_max - slack, "", cut},
-        {!read, AT_MOST, "ice.extent.y_min", "ice.y_min", c->ice.y_min + slack, "", cut},
-        {!read, AT_LEAST, "ice.extent.y_max", "ice.y_max", c->ice.y_max - slack, "", cut},
+        {!read, AT_MOST, "ice.extent.x_min", "ice.x_min", input->ice.x_min + slack, "", cut},
+        {!read, AT_LEAST, "ice.extent.x_max", "ice.x_max", input->ice.x_max - slack, "", cut},
+        {!read, AT_MOST, "ice.extent.y_min", "ice.y_min", input->ice.y_min + slack, "", cut},
+        {!read, AT_LEAST, "ice.extent.y_max", "ice.y_max", input->ice.y_max - slack, "", cut},
 
         {true, AT_LEAST, "ice.thickness", NULL, BT_LEAST_THICKNESS, "", ", which is no ice; check the unit"},
-        {true, AT_MOST, "ice.density", "water.density", c->water.density, "", ": such ice sinks; correct one of them"},
-        {c->ice.rafting_kappa > 0, AT_LEAST, "ice.rafting.kappa", NULL, 2, "",
+        {true, AT_MOST, "ice.density", "water.density", input->water.density, "",
+         ": such ice sinks; correct one of them"},
+        {input->ice.rafting_kappa > 0, AT_LEAST, "ice.rafting.kappa", NULL, 2, "",
          ", the potential energy that the sheets gain: floes would gain energy by lying over each other; give 0 for "
          "none, or 10 to 34, twice the published ratios of work to energy"},
-        {c->ice.rafting_kappa > 0 && c->ice.density == c->water.density, REFUSED, "ice.rafting.kappa", NULL, 0,
+        {input->ice.rafting_kappa > 0 && input->ice.density == input->water.density, REFUSED, "ice.rafting.kappa", NULL,
+         0,
          "ice.density water.density",
          "cannot be used with ice as heavy as water: sheets that do not float bear nothing at their edges; give "
          "ice.density, or 0 for rigid floes"},
@@ -354,13 +360,14 @@ static void list_limits(const bt_case *c, limit out[LIMITS])
         {roomy && power, AT_MOST, "ice.size_max", "the short side of the ice region", room, MADE EXTENT, large},
         {roomy && !power, AT_MOST, "ice.size", "the short side of the ice region", room, MADE EXTENT, large},
         // else a run is refused by its seed
-        {roomy && c->ice.size_law != BT_SIZE_SINGLE && size_max <= room, BELOW, "ice.size_max",
+        {roomy && input->ice.size_law != BT_SIZE_SINGLE && size_max <= room, BELOW, "ice.size_max",
          "half the period of the domain", 0.5 * period, MADE EXTENT,
          ": two such floes have no room side by side as they turn; take smaller floes or a larger domain"},
-        {splits && c->domain.ends == BT_BOUND_MOVING, REFUSED, "ice.splitting.toughness", NULL, 0, "domain.ends",
+        {splits && input->domain.ends == BT_BOUND_MOVING, REFUSED, "ice.splitting.toughness", NULL, 0, "domain.ends",
          "floes that split are not supported with domain.ends: moving, where a floe that is left behind comes back "
          "ahead; set 0, or take another boundary and a domain as long as the tow"},
-        {splits && c->ice.splitting.scatter > 0, AT_LEAST, "ice.splitting.scatter", NULL, 2, "ice.splitting.toughness",
+        {splits && input->ice.splitting.scatter > 0, AT_LEAST, "ice.splitting.scatter", NULL, 2,
+         "ice.splitting.toughness",
          ": such a Weibull modulus leaves floes without strength; give at least 2, as in 10, or 0 for the same "
          "strength everywhere"},
         {splits, NEEDED, "ice.splitting.least_size", "has no default where ice.thickness is none", 0,
@@ -369,7 +376,7 @@ static void list_limits(const bt_case *c, limit out[LIMITS])
          "ice.splitting.toughness ice.thickness ice.size_law ice.size_min ice.size_exponent",
          ", so that no floe can split; give a smaller one, or ice.splitting.toughness: 0"},
 
-        {c->ice.field && c->ice.outlines, REFUSED, "ice.outlines", NULL, 0, "ice.field",
+        {input->ice.field && input->ice.outlines, REFUSED, "ice.outlines", NULL, 0, "ice.field",
          "the field is read from ice.field already; remove one of the two keys"},
         {lon != lat, REFUSED, lon ? "ice.origin_lon" : "ice.origin_lat", NULL, 0, "ice.origin_lon ice.origin_lat",
          alone},
@@ -377,22 +384,22 @@ static void list_limits(const bt_case *c, limit out[LIMITS])
          "ice.origin_east ice.origin_north", alone},
         {lon && east, REFUSED, "ice.origin_east", NULL, 0, "ice.origin_lon",
          "and ice.origin_lon both say where x = y = 0 is; keep those of the file's coordinates, metres or degrees"},
-        {c->ice.outlines && lon && !degrees, REFUSED, "ice.origin_lon", NULL, 0, "ice.outlines ice.outlines_crs",
+        {input->ice.outlines && lon && !degrees, REFUSED, "ice.origin_lon", NULL, 0, "ice.outlines ice.outlines_crs",
          "has no effect on outlines in metres; give ice.origin_east and ice.origin_north, or remove the origin"},
-        {east && (!c->ice.outlines || !plane), REFUSED, "ice.origin_east", NULL, 0, "ice.outlines ice.outlines_crs",
+        {east && (!input->ice.outlines || !plane), REFUSED, "ice.origin_east", NULL, 0, "ice.outlines ice.outlines_crs",
          "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
          "ice.outlines_crs: plane"},
 
-        {polygon && !c->body.n_vertices, REFUSED, "body.vertices", NULL, 0, "body.shape",
+        {polygon && !input->body.n_vertices, REFUSED, "body.vertices", NULL, 0, "body.shape",
          "is missing for shape polygon; give the corners as [[x, y], [x, y], ...]"},
-        {!polygon && c->body.n_vertices, REFUSED, "body.vertices", NULL, 0, "body.shape",
+        {!polygon && input->body.n_vertices, REFUSED, "body.vertices", NULL, 0, "body.shape",
          "is given but the shape is not polygon; set body.shape: polygon, or remove the corners"},
-        {c->body.shape == BT_BODY_SQUARE && c->body.width != c->body.length, REFUSED, "body.width", NULL, 0,
+        {input->body.shape == BT_BODY_SQUARE && input->body.width != input->body.length, REFUSED, "body.width", NULL, 0,
          "body.shape body.length",
          "differs from body.length, and the shape is square; remove the key or set body.shape: rectangle"},
-        {driven && c->body.vx != 0, REFUSED, "body.vx", NULL, 0, BODY, prescribed},
-        {driven && c->body.vy != 0, REFUSED, "body.vy", NULL, 0, BODY, prescribed},
-        {driven && c->body.yaw_rate != 0, REFUSED, "body.yaw_rate", NULL, 0, BODY, prescribed},
+        {driven && input->body.vx != 0, REFUSED, "body.vx", NULL, 0, BODY, prescribed},
+        {driven && input->body.vy != 0, REFUSED, "body.vy", NULL, 0, BODY, prescribed},
+        {driven && input->body.yaw_rate != 0, REFUSED, "body.yaw_rate", NULL, 0, BODY, prescribed},
 
         {line, NEEDED, "tow.line_length", "a tow by a line needs it", 0, "tow.mode", "5 m"},
         {line && named, NEEDED, "tow.line.diameter", "a named line needs a diameter", 0, "tow.mode tow.line.type",
@@ -402,65 +409,65 @@ static void list_limits(const bt_case *c, limit out[LIMITS])
         {thrust, NEEDED, "tow.vessel.mass", "tow.mode thrust needs it", 0, "tow.mode", "3000 t"},
         {thrust, NEEDED, "tow.vessel.bollard_pull", "tow.mode thrust needs it", 0, "tow.mode", "1 MN"},
         {thrust, NEEDED, "tow.vessel.free_speed", "tow.mode thrust needs it", 0, "tow.mode", "15 kn"},
-        {thrust, AT_MOST, "tow.vessel.free_resistance", "tow.vessel.bollard_pull", c->tow.vessel.bollard_pull,
+        {thrust, AT_MOST, "tow.vessel.free_resistance", "tow.vessel.bollard_pull", input->tow.vessel.bollard_pull,
          "tow.mode", ": thrust does not grow with speed; lower it"},
 
-        {c->water.tilt == BT_TILT_GEOSTROPHIC && c->water.latitude == 0, REFUSED, "water.tilt", NULL, 0,
+        {input->water.tilt == BT_TILT_GEOSTROPHIC && input->water.latitude == 0, REFUSED, "water.tilt", NULL, 0,
          "water.latitude", "geostrophic balance needs the Coriolis force; give water.latitude"},
-        {true, AT_MOST, "water.tide.minor", "water.tide.major", c->water.tide.major, "", swap},
-        {true, AT_LEAST, "water.tide.minor", "the opposite of water.tide.major", -c->water.tide.major,
+        {true, AT_MOST, "water.tide.minor", "water.tide.major", input->water.tide.major, "", swap},
+        {true, AT_LEAST, "water.tide.minor", "the opposite of water.tide.major", -input->water.tide.major,
          "water.tide.major", swap},
-        {c->water.tide.major > 0, AT_LEAST, "water.tide.period", "the time of 20 steps", TIDE_STEPS * c->run.dt,
+        {input->water.tide.major > 0, AT_LEAST, "water.tide.period", "the time of 20 steps", TIDE_STEPS * input->run.dt,
          "run.dt", ": they cannot follow it; a tide has hours, as in 12.42 h"},
 
         {lead && !towed, REFUSED, "lead.mode", NULL, 0, BODY,
          "a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode"},
         {lead && towed, NEEDED, "lead.width", "a lead needs it", 0, BODY, "20 m"},
         {lead && towed, NEEDED, "lead.length", "a lead needs it", 0, BODY, "500 m"},
-        {c->lead.mode == BT_LEAD_MANAGED && towed, NEEDED, "lead.floe_size",
+        {input->lead.mode == BT_LEAD_MANAGED && towed, NEEDED, "lead.floe_size",
          "a managed lead needs the size of its pieces", 0, BODY, "10 m"},
-        {lead && towed && c->domain.ends == BT_BOUND_MOVING && !along_x(c), AT_MOST, "lead.length", "domain.ahead",
-         ahead, BODY " domain.ends domain.length tow.direction tow.waypoints body.y",
+        {lead && towed && input->domain.ends == BT_BOUND_MOVING && !along_x(input), AT_MOST, "lead.length",
+         "domain.ahead", ahead, BODY " domain.ends domain.length tow.direction tow.waypoints body.y",
          ", and the tow leads away from the x axis: in a moving window the lead would come round beside it; shorten "
          "the lead, tow along x, or set domain.ends: periodic or open"},
 
-        {true, AT_LEAST, "estimate.kappa", "estimate.kappa_low", c->estimate.kappa_low, "", "; lower that too"},
-        {true, AT_MOST, "estimate.kappa", "estimate.kappa_high", c->estimate.kappa_high, "", "; raise that too"},
+        {true, AT_LEAST, "estimate.kappa", "estimate.kappa_low", input->estimate.kappa_low, "", "; lower that too"},
+        {true, AT_MOST, "estimate.kappa", "estimate.kappa_high", input->estimate.kappa_high, "", "; raise that too"},
     };
     _Static_assert(sizeof all == LIMITS * sizeof *all, "count the rows");
     memcpy(out, all, sizeof all);
 }
 
-static void refuse_limit(const bt_check *k, const limit *l)
+static void refuse_limit(const bt_check *check, const limit *l)
 {
     static const char *const broken[] = {[BELOW] = "not below", [AT_MOST] = "more than", [AT_LEAST] = "less than"};
     const bt_key *row = row_of(l->key);
     const bool is_key = l->of && !strchr(l->of, ' ');
     double value = 1;
-    if (row->type == BT_KEY_REAL) memcpy(&value, (const char *)k->c + row->offset, sizeof value);
+    if (row->type == BT_KEY_REAL) memcpy(&value, (const char *)check->c + row->offset, sizeof value);
     const bool bad[] = {[REFUSED] = true,
                         [NEEDED] = !(value > 0),
                         [BELOW] = value >= l->bound,
                         [AT_MOST] = value > l->bound,
                         [AT_LEAST] = value < l->bound};
-    if (!l->so || !bad[l->relation] || !bt_check_sound(k, l->key) || !bt_check_sound(k, l->beside) ||
-        (is_key && !bt_check_sound(k, l->of)))
+    if (!l->so || !bad[l->relation] || !bt_check_sound(check, l->key) || !bt_check_sound(check, l->beside) ||
+        (is_key && !bt_check_sound(check, l->of)))
         return;
     const char *unit = bt_units_symbol(row->unit), *blank = *unit ? " " : "";
-    if (l->relation == REFUSED) bt_check_fault(k, l->key, "%s", l->why);
+    if (l->relation == REFUSED) bt_check_fault(check, l->key, "%s", l->why);
     else if (l->relation == NEEDED && isnan(value))
-        bt_check_fault(k, l->key, "is not set, and %s; give it, as in %s", l->of, l->why);
+        bt_check_fault(check, l->key, "is not set, and %s; give it, as in %s", l->of, l->why);
     else if (l->relation == NEEDED)
-        bt_check_fault(k, l->key, "is %g%s%s and %s; give it, as in %s", value, blank, unit, l->of, l->why);
+        bt_check_fault(check, l->key, "is %g%s%s and %s; give it, as in %s", value, blank, unit, l->of, l->why);
     else
-        bt_check_fault(k, l->key, "%g%s%s is %s %s%s%g%s%s%s", value, blank, unit, broken[l->relation],
+        bt_check_fault(check, l->key, "%g%s%s is %s %s%s%g%s%s%s", value, blank, unit, broken[l->relation],
                        l->of ? l->of : "", l->of ? ", " : "", l->bound, blank, unit, l->why);
 }
 
-void bt_case_check_constraints(const bt_check *k)
+void bt_case_check_constraints(const bt_check *check)
 {
     limit limits[LIMITS];
-    look(k->c, refuse, (void *)k);
-    list_limits(k->c, limits);
-    for (int i = 0; i < LIMITS; i++) refuse_limit(k, &limits[i]);
+    look(check->c, refuse, (void *)check);
+    list_limits(check->c, limits);
+    for (int i = 0; i < LIMITS; i++) refuse_limit(check, &limits[i]);
 }

@@ -36,14 +36,14 @@ static const double VORONOI_CORNERS = 5.6;
 
 static const double RAFTING = 1.8; // time of a step of floes that raft / of rigid ones
 
-static double entries_of(const bt_case *c)
+static double entries_of(const bt_case *input)
 {
-    return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every));
+    return ceil((double)bt_case_steps(input) / bt_max(1, (double)input->output.sample_every));
 }
 
-double bt_cost_floe_step(const bt_case *c, double concentration)
+double bt_cost_floe_step(const bt_case *input, double concentration)
 {
-    const double x = bt_min(0.95, bt_max(0, concentration)), law = c->ice.rafting_kappa > 0 ? RAFTING : 1;
+    const double x = bt_min(0.95, bt_max(0, concentration)), law = input->ice.rafting_kappa > 0 ? RAFTING : 1;
     if (x < 0.5) return law * 0.4e-6 * bt_pow(2, (x - 0.2) / 0.3);
     if (x < 0.8) return law * 0.8e-6 * bt_pow(2.75, (x - 0.5) / 0.3);
     return law * 2.2e-6 * bt_pow(2.1, (x - 0.8) / 0.15);
@@ -57,60 +57,62 @@ static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 1.6e-
 // Of a convex part of a floe, and of a pair of parts of two floes that are near each other, each step, s.
 static const double PART = 0.05e-6, PAIR = 6e-9;
 
-double bt_cost_making(const bt_case *c, double floes)
+double bt_cost_making(const bt_case *input, double floes)
 {
-    if (!bt_case_makes_ice(c)) return 0;
-    const double x = c->ice.concentration;
+    if (!bt_case_makes_ice(input)) return 0;
+    const double x = input->ice.concentration;
     const double loose = bt_min(1, bt_max(0, (0.9 - x) / 0.3)); // 1 up to 60 %, 0 from 90 % on
-    const double shape = c->ice.shape == BT_ICE_RECTANGLES ? 0.75
-                         : c->ice.shape == BT_ICE_POLYGONS ? bt_min(2.2, bt_max(0.8, 7 * x - 0.6))
-                                                           : 1;
-    return 1e-3 * shape * (0.09 + 0.02 * c->ice.shake * (0.4 + 0.6 * loose)) * floes;
+    const double shape = input->ice.shape == BT_ICE_RECTANGLES ? 0.75
+                         : input->ice.shape == BT_ICE_POLYGONS ? bt_min(2.2, bt_max(0.8, 7 * x - 0.6))
+                                                               : 1;
+    return 1e-3 * shape * (0.09 + 0.02 * input->ice.shake * (0.4 + 0.6 * loose)) * floes;
 }
 
-double bt_cost_stepping(const bt_case *c, const bt_cost_ice *ice)
+double bt_cost_stepping(const bt_case *input, const bt_cost_ice *ice)
 {
     const double parts = PART * ice->parts +
                          (ice->split > 0 ? PAIR * ice->concentration * ice->parts * ice->parts / ice->split : 0);
-    return START + (double)bt_case_steps(c) * (STEP + ice->floes * bt_cost_floe_step(c, ice->concentration) + parts) +
-           ENTRY * entries_of(c) + bt_cost_frames(c) * (FRAME + FRAME_FLOE * ice->floes);
+    return START +
+           (double)bt_case_steps(input) * (STEP + ice->floes * bt_cost_floe_step(input, ice->concentration) + parts) +
+           ENTRY * entries_of(input) + bt_cost_frames(input) * (FRAME + FRAME_FLOE * ice->floes);
 }
 
-double bt_cost_seconds(const bt_case *c)
+double bt_cost_seconds(const bt_case *input)
 {
-    const bt_cost_ice ice = {.floes = bt_case_expected_floes(c) + c->n_floes + 1,
-                             .concentration = c->ice.concentration};
-    return bt_cost_making(c, bt_case_floes_made(c)) + bt_cost_stepping(c, &ice);
+    const bt_cost_ice ice = {.floes = bt_case_expected_floes(input) + input->n_floes + 1,
+                             .concentration = input->ice.concentration};
+    return bt_cost_making(input, bt_case_floes_made(input)) + bt_cost_stepping(input, &ice);
 }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
 /// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel
 /// (panel.h).
-static double steps_kept(const bt_case *c)
+static double steps_kept(const bt_case *input)
 {
-    const bool panels = c->body.shape != BT_BODY_ABSENT && c->impact.conversion != BT_IMPACT_NONE;
-    const double steps = (double)bt_case_steps(c), blocks = steps / (double)bt_stats_start_step(bt_case_steps(c));
-    return BYTES_PER_STEP * steps + (panels ? BT_COST_PANEL_BYTES * blocks * (double)c->impact.panels : 0);
+    const bool panels = input->body.shape != BT_BODY_ABSENT && input->impact.conversion != BT_IMPACT_NONE;
+    const double steps = (double)bt_case_steps(input),
+                 blocks = steps / (double)bt_stats_start_step(bt_case_steps(input));
+    return BYTES_PER_STEP * steps + (panels ? BT_COST_PANEL_BYTES * blocks * (double)input->impact.panels : 0);
 }
 
-double bt_cost_memory(const bt_case *c, double n_floes, double parts, int size, int ranks_here)
+double bt_cost_memory(const bt_case *input, double n_floes, double parts, int size, int ranks_here)
 {
     return (BASE_BYTES + (BYTES_PER_FLOE * n_floes + BYTES_PER_PART * parts) / size +
             FIELD_BYTES_PER_FLOE * n_floes) * ranks_here +
-           CHECKPOINT_BYTES_PER_FLOE * n_floes + GROWN * steps_kept(c) +
-           bt_min(MOST_OF_ENTRIES, BYTES_PER_ENTRY * entries_of(c)) +
-           bt_min(MOST_OF_FRAMES, BYTES_PER_FRAME * bt_cost_frames(c));
+           CHECKPOINT_BYTES_PER_FLOE * n_floes + GROWN * steps_kept(input) +
+           bt_min(MOST_OF_ENTRIES, BYTES_PER_ENTRY * entries_of(input)) +
+           bt_min(MOST_OF_FRAMES, BYTES_PER_FRAME * bt_cost_frames(input));
 }
 
-double bt_cost_corners(const bt_case *c, const bt_field *f, double n)
+double bt_cost_corners(const bt_case *input, const bt_field *field, double n)
 {
-    const double each = c->ice.shape == BT_ICE_RECTANGLES ? 4
-                        : c->ice.shape == BT_ICE_POLYGONS ? (double)c->ice.sides
-                                                          : VORONOI_CORNERS;
+    const double each = input->ice.shape == BT_ICE_RECTANGLES ? 4
+                        : input->ice.shape == BT_ICE_POLYGONS ? (double)input->ice.sides
+                                                              : VORONOI_CORNERS;
     double v[2 * BT_MAX_VERTICES],
-        corners = f && f->n > 0 ? (double)f->offsets[f->n] : each * bt_max(0, n - c->n_floes);
-    for (bt_idx i = 0; i < c->n_floes; i++) corners += bt_case_floe_outline(&c->floes[i], v);
+        corners = field && field->n > 0 ? (double)field->offsets[field->n] : each * bt_max(0, n - input->n_floes);
+    for (bt_idx i = 0; i < input->n_floes; i++) corners += bt_case_floe_outline(&input->floes[i], v);
     return corners;
 }
 
@@ -120,63 +122,64 @@ static double of_frame(double bytes, double left, bool packed)
     return packed && bytes > LEAST_PACKED ? bytes * left + INDEX : bytes;
 }
 
-double bt_cost_frames(const bt_case *c)
+double bt_cost_frames(const bt_case *input)
 {
-    if (c->output.frame_interval < 0) return 0;
-    const double steps = (double)bt_case_steps(c),
-                 due = c->output.frame_interval > 0 ? c->run.duration / c->output.frame_interval : 0,
+    if (input->output.frame_interval < 0) return 0;
+    const double steps = (double)bt_case_steps(input),
+                 due = input->output.frame_interval > 0 ? input->run.duration / input->output.frame_interval : 0,
                  whole = floor(due * (1 + 1e-12));
     return 1 + bt_min(steps, due - whole > 1e-9 * due ? whole + 1 : whole);
 }
 
-bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ranks)
+bt_cost_disk bt_cost_disk_of(const bt_case *input, double n, double corners, int ranks)
 {
-    const bool packed = ranks == 1, line = c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST;
-    const double frames = bt_cost_frames(c);
+    const bool packed = ranks == 1, line = input->tow.mode == BT_TOW_LINE || input->tow.mode == BT_TOW_THRUST;
+    const double frames = bt_cost_frames(input);
     const double pose = packed ? POSE_LEFT : 1, still = packed ? STILL_LEFT : 1;
     const double frame = n * (24 * pose + 32 * still) + of_frame(8 * corners, CORNER_LEFT, packed) +
                          2 * of_frame(4 * n, STILL_LEFT, packed) + 2 * of_frame(12 * n, STILL_LEFT, packed) +
                          FRAME_BASE + OTHERS_FRAME;
     const double outlines = 28 * n + 16 * corners + 4 * (corners + 2 * n);
-    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK,
-                 columns = BT_COST_SERIES + (c->output.panels ? 3 * (double)c->impact.panels : 0);
-    const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + steps_kept(c);
+    const double entries = ceil(entries_of(input) / SERIES_CHUNK) * SERIES_CHUNK,
+                 columns = BT_COST_SERIES + (input->output.panels ? 3 * (double)input->impact.panels : 0);
+    const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + steps_kept(input);
     const bool on_the_way =
-        (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
-        (c->output.checkpoint_wall > 0 &&
-         bt_cost_stepping(c, &(bt_cost_ice){.floes = n, .concentration = c->ice.concentration}) >
-             c->output.checkpoint_wall);
-    bt_cost_disk d = {.result = RESULT_BASE + outlines + frames * frame + 8 * entries * columns +
-                                8 * IMPACT_ROWS * IMPACT_COLUMNS,
-                      .checkpoints = on_the_way ? 2 * checkpoint : checkpoint,
-                      .texts = TEXTS + frames * (XDMF_FRAME + (line ? XDMF_LINE : 0))};
-    d.most = bt_cost_left(&d) + (on_the_way ? 2 * d.result + checkpoint : checkpoint);
-    return d;
+        (input->output.checkpoint_steps > 0 && input->output.checkpoint_steps < bt_case_steps(input)) ||
+        (input->output.checkpoint_wall > 0 &&
+         bt_cost_stepping(input, &(bt_cost_ice){.floes = n, .concentration = input->ice.concentration}) >
+             input->output.checkpoint_wall);
+    bt_cost_disk disk = {.result = RESULT_BASE + outlines + frames * frame + 8 * entries * columns +
+                                   8 * IMPACT_ROWS * IMPACT_COLUMNS,
+                         .checkpoints = on_the_way ? 2 * checkpoint : checkpoint,
+                         .texts = TEXTS + frames * (XDMF_FRAME + (line ? XDMF_LINE : 0))};
+    disk.most = bt_cost_left(&disk) + (on_the_way ? 2 * disk.result + checkpoint : checkpoint);
+    return disk;
 }
 
-double bt_cost_member(const bt_case *c, const bt_cost_disk *d)
+double bt_cost_member(const bt_case *input, const bt_cost_disk *disk)
 {
-    const double row = 3 * 8 * entries_of(c) + 8 * 300; // three series, as many numbers of the summary
-    return d->result + d->texts + row;
+    const double row = 3 * 8 * entries_of(input) + 8 * 300; // three series, as many numbers of the summary
+    return disk->result + disk->texts + row;
 }
 
 /// A run that would take longer than anybody waits, or fill any disk.
-void bt_case_check_cost(const bt_check *k)
+void bt_case_check_cost(const bt_check *check)
 {
-    const bt_case *c = k->c;
-    if (!bt_check_sound(k, "run.dt run.duration domain.length domain.width ice.concentration ice.size ice.size_law "
-                           "ice.size_min ice.size_max ice.size_spread ice.x_min ice.x_max "
-                           "ice.y_min ice.y_max output.frame_interval output.sample_every output.panels impact.panels"))
+    const bt_case *input = check->c;
+    if (!bt_check_sound(check, "run.dt run.duration domain.length domain.width ice.concentration ice.size ice.size_law "
+                               "ice.size_min ice.size_max ice.size_spread ice.x_min ice.x_max "
+                               "ice.y_min ice.y_max output.frame_interval output.sample_every output.panels "
+                               "impact.panels"))
         return;
-    const double n = bt_case_expected_floes(c) + c->n_floes, work = bt_cost_seconds(c),
-                 result = bt_cost_disk_of(c, n, bt_cost_corners(c, NULL, n), 2).result;
+    const double n = bt_case_expected_floes(input) + input->n_floes, work = bt_cost_seconds(input),
+                 result = bt_cost_disk_of(input, n, bt_cost_corners(input, NULL, n), 2).result;
     if (work > BT_MOST_CORE_SECONDS)
-        bt_check_fault(k, "run.duration",
+        bt_check_fault(check, "run.duration",
                        "about %.2g floes for %.2g steps need some %.2g s of one core, at most %g are begun; shorten "
                        "the run, lengthen run.dt, or take larger floes or a smaller region",
-                       n, (double)bt_case_steps(c), work, BT_MOST_CORE_SECONDS);
+                       n, (double)bt_case_steps(input), work, BT_MOST_CORE_SECONDS);
     if (result > BT_MOST_RESULT_BYTES)
-        bt_check_fault(k, "output.frame_interval",
+        bt_check_fault(check, "output.frame_interval",
                        "frames and series of about %.2g bytes, at most %g are written; lengthen output.frame_interval, "
                        "or raise output.sample_every",
                        result, BT_MOST_RESULT_BYTES);
@@ -197,15 +200,15 @@ double bt_cost_machine(void)
     return bytes;
 }
 
-bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err)
+bt_status bt_cost_fits(const bt_case *input, double n_floes, const bt_comm *comm, double machine, bt_errors *err)
 {
-    const double need = bt_cost_memory(c, n_floes, 0, comm->size, comm->ranks_here),
-                 result = bt_cost_disk_of(c, n_floes, bt_cost_corners(c, NULL, n_floes), 2).result;
+    const double need = bt_cost_memory(input, n_floes, 0, comm->size, comm->ranks_here),
+                 result = bt_cost_disk_of(input, n_floes, bt_cost_corners(input, NULL, n_floes), 2).result;
     if (result > BT_MOST_RESULT_BYTES) { // of a field that was read; of others the case is refused
         bt_errors_add(err,
                       "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g "
                       "are written; lengthen it, or raise output.sample_every",
-                      c->path ? c->path : "case", n_floes, result, BT_MOST_RESULT_BYTES);
+                      input->path ? input->path : "case", n_floes, result, BT_MOST_RESULT_BYTES);
         return BT_ERR_CASE;
     }
     if (need <= machine) return BT_OK;
@@ -213,6 +216,6 @@ bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, do
                   "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take "
                   "larger floes (ice.size), a smaller region, fewer steps (run.duration), "
                   "or more machines (mpirun)",
-                  c->path ? c->path : "case", n_floes, (double)bt_case_steps(c), need / 1e9, machine / 1e9);
+                  input->path ? input->path : "case", n_floes, (double)bt_case_steps(input), need / 1e9, machine / 1e9);
     return BT_ERR_CASE;
 }

@@ -43,34 +43,34 @@ static double power(double ratio, double e)
     return f;
 }
 
-static double factor(const bt_key *k, double ratio)
+static double factor(const bt_key *key, double ratio)
 {
     for (size_t i = 0; i < sizeof exceptions / sizeof *exceptions; i++)
-        if (!strcmp(k->name, exceptions[i].key)) return power(ratio, exceptions[i].exponent);
-    return power(ratio, bt_units_froude(k->unit));
+        if (!strcmp(key->name, exceptions[i].key)) return power(ratio, exceptions[i].exponent);
+    return power(ratio, bt_units_froude(key->unit));
 }
 
-static void refuse_range(const bt_case *c, const bt_key *k, double value, double ratio, bt_errors *err)
+static void refuse_range(const bt_case *input, const bt_key *key, double value, double ratio, bt_errors *err)
 {
     char why[BT_WHY];
     double one = 1; // of the unit of the range
-    bt_units_parse("1", k->unit, &one, why);
-    const char *unit = bt_units_bare(k->unit);
+    bt_units_parse("1", key->unit, &one, why);
+    const char *unit = bt_units_bare(key->unit);
     bt_errors_add(err, "%s: %s: becomes %g in the twin of scale %g, out of its range %s%s%s; take a scale nearer to 1",
-                  c->path ? c->path : "case", k->name, value / one, ratio, k->range, strcmp(unit, "-") ? " " : "",
-                  strcmp(unit, "-") ? unit : "");
+                  input->path ? input->path : "case", key->name, value / one, ratio, key->range,
+                  strcmp(unit, "-") ? " " : "", strcmp(unit, "-") ? unit : "");
 }
 
-static void scale_real(const bt_case *c, const bt_key *k, double *v, double ratio, bt_errors *err)
+static void scale_real(const bt_case *input, const bt_key *key, double *v, double ratio, bt_errors *err)
 {
     // A negative start of the window means that it is looked for.
-    const bool found = !strcmp(k->name, "output.window_start") || !strcmp(k->name, "output.frame_interval");
+    const bool found = !strcmp(key->name, "output.window_start") || !strcmp(key->name, "output.frame_interval");
     if (isnan(*v) || (found && *v < 0)) return; // a word such as auto, not a time
-    *v *= factor(k, ratio);
-    bt_range r;
-    bt_value_range(k, &r);
-    if ((r.lo_open ? *v > r.lo : *v >= r.lo) && (r.hi_open ? *v < r.hi : *v <= r.hi)) return;
-    refuse_range(c, k, *v, ratio, err);
+    *v *= factor(key, ratio);
+    bt_range range;
+    bt_value_range(key, &range);
+    if ((range.lo_open ? *v > range.lo : *v >= range.lo) && (range.hi_open ? *v < range.hi : *v <= range.hi)) return;
+    refuse_range(input, key, *v, ratio, err);
 }
 
 static bool is_plain(const char *name)
@@ -80,16 +80,16 @@ static bool is_plain(const char *name)
     return false;
 }
 
-static void scale_members(const bt_case *c, const bt_key *keys, int n, void *base, double ratio, bt_errors *err)
+static void scale_members(const bt_case *input, const bt_key *keys, int n, void *base, double ratio, bt_errors *err)
 {
     for (int i = 0; i < n; i++) {
-        const bt_key *k = &keys[i];
-        char *member = (char *)base + k->offset;
-        switch (k->type) {
+        const bt_key *key = &keys[i];
+        char *member = (char *)base + key->offset;
+        switch (key->type) {
         case BT_KEY_REAL: {
             double v;
             memcpy(&v, member, sizeof v);
-            scale_real(c, k, &v, ratio, err);
+            scale_real(input, key, &v, ratio, err);
             memcpy(member, &v, sizeof v);
             break;
         }
@@ -97,18 +97,18 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
             double *p;
             int count;
             memcpy(&p, member, sizeof p);
-            memcpy(&count, (char *)base + k->offset_count, sizeof count);
-            const bt_key column[2] = {bt_schema_column(k, 0), bt_schema_column(k, 1)};
-            for (int j = 0; j < 2 * count; j++) scale_real(c, &column[j % 2], &p[j], ratio, err);
+            memcpy(&count, (char *)base + key->offset_count, sizeof count);
+            const bt_key column[2] = {bt_schema_column(key, 0), bt_schema_column(key, 1)};
+            for (int j = 0; j < 2 * count; j++) scale_real(input, &column[j % 2], &p[j], ratio, err);
             break;
         }
         case BT_KEY_TEXT: {
             const char *text;
             memcpy(&text, member, sizeof text);
-            if (text && ratio != 1 && !is_plain(k->name))
+            if (text && ratio != 1 && !is_plain(key->name))
                 bt_errors_add(
                     err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
-                    c->path ? c->path : "case", k->name, text);
+                    input->path ? input->path : "case", key->name, text);
             break;
         }
         case BT_KEY_INT:
@@ -119,34 +119,35 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
     }
 }
 
-bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
+bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err)
 {
     const size_t before = err->n;
     bool *was = bt_alloc((size_t)bt_n_case_keys, sizeof *was), *now = bt_alloc((size_t)bt_n_case_keys, 1);
-    bt_case_mark_idle(c, was);
-    scale_members(c, bt_case_keys, bt_n_case_keys, c, ratio, err);
-    for (bt_idx i = 0; i < c->n_floes; i++) scale_members(c, bt_floe_keys, bt_n_floe_keys, &c->floes[i], ratio, err);
+    bt_case_mark_idle(input, was);
+    scale_members(input, bt_case_keys, bt_n_case_keys, input, ratio, err);
+    for (bt_idx i = 0; i < input->n_floes; i++)
+        scale_members(input, bt_floe_keys, bt_n_floe_keys, &input->floes[i], ratio, err);
     if (err->n > before) {
         free(was);
         free(now);
         return BT_ERR_CASE;
     }
     // EA and strength of a rope grow with d², those of the twin with L³: it has the numbers, and no name.
-    c->tow.line.type = BT_ROPE_NUMBERS;
-    c->tow.line.diameter = 0;
+    input->tow.line.type = BT_ROPE_NUMBERS;
+    input->tow.line.diameter = 0;
     // A default without effect that was scaled would look like a value that somebody gave.
     for (bool more = true; more;) { // the default of one may follow from another's
         more = false;
         memset(now, 0, (size_t)bt_n_case_keys * sizeof *now);
-        bt_case_mark_idle(c, now);
+        bt_case_mark_idle(input, now);
         for (int i = 0; i < bt_n_case_keys; i++)
-            if (now[i] && !was[i]) bt_case_put_default(c, i), more = true;
+            if (now[i] && !was[i]) bt_case_put_default(input, i), more = true;
     }
     free(was);
     free(now);
     // It follows from where the body is, which without one is a default again.
-    if (c->domain.ends != BT_BOUND_MOVING) c->domain.ahead = bt_case_window_ahead(c);
-    return bt_case_finish(c, err);
+    if (input->domain.ends != BT_BOUND_MOVING) input->domain.ahead = bt_case_window_ahead(input);
+    return bt_case_finish(input, err);
 }
 
 char *bt_case_scaled_text(const bt_case *twin, double ratio)

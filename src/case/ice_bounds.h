@@ -29,7 +29,7 @@ typedef enum { BT_ICE_THICKNESS, BT_ICE_POSE, BT_ICE_OUTLINE, BT_ICE_AREA } bt_i
 /// Why it cannot be a floe, in words that complete "floe 7: ", and which part of it, or NULL. Thickness, place and
 /// extent are held against the ranges of ice.thickness, domain.x0 and domain.length in the table of keys. That the
 /// outline is one, convex or in convex parts, has been seen before. part: may be NULL.
-const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice_part *part);
+const char *bt_ice_floe_fault(const bt_ice_floe *floe, char why[BT_ICE_WHY], bt_ice_part *part);
 
 /// Why these floes together cannot be an ice field, or NULL: mean size (diameter of the circle of equal area) below
 /// BT_LEAST_SIZE or beyond ice.size, area of the ice without a meaning, concentration below BT_LEAST_CONCENTRATION or
@@ -39,21 +39,21 @@ const char *bt_ice_field_fault(bool kept, int64_t n, double sum_size, double sum
                                char why[BT_ICE_WHY]);
 
 /// The same of a field, and of its floes in the domain of a case: mean size and ice area no larger than that.
-const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT_ICE_WHY]);
+const char *bt_ice_domain_fault(const bt_case *input, const bt_field *field, char why[BT_ICE_WHY]);
 
 /// Concentration to which closing walls bring ice of this area, all floes, by the end of the run: INFINITY where the
 /// body takes all of the room; 0 where none close, or ice can leave, raft or be crushed.
-double bt_ice_closed(const bt_case *c, double area);
+double bt_ice_closed(const bt_case *input, double area);
 
 /// Warn of walls that pack it (estimate.phi_j).
-void bt_ice_warn_closed(const bt_case *c, double area, bt_errors *warnings);
+void bt_ice_warn_closed(const bt_case *input, double area, bt_errors *warnings);
 
 /// Warn of walls that close so slowly that floes of this mean size, m, which share it out among themselves, take it for
 /// rest: a contact may close by the tolerance of the solver.
-void bt_ice_warn_slow(const bt_case *c, double size, bt_errors *warnings);
+void bt_ice_warn_slow(const bt_case *input, double size, bt_errors *warnings);
 
 /// Warn of a mean thickness that looks like one in centimetres, and of one at which floes do not split. size,
 /// thickness: of the mean floe, m.
-void bt_ice_warn(const bt_case *c, double size, double thickness, bt_errors *warnings);
+void bt_ice_warn(const bt_case *input, double size, double thickness, bt_errors *warnings);
 
 #endif

@@ -56,12 +56,12 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
     return all;
 }
 
-void bt_keys_get(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own)
+void bt_keys_get(const bt_case *input, const char *section, const bt_law_key *keys, int n, double *own)
 {
     for (int k = 0; k < n; k++) {
         char name[128];
         snprintf(name, sizeof name, "%s.%s", section, keys[k].name);
         const bt_key *key = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
-        memcpy(&own[k], (const char *)c + key->offset, sizeof own[k]);
+        memcpy(&own[k], (const char *)input + key->offset, sizeof own[k]);
     }
 }

@@ -584,33 +584,33 @@ static bool is_key(const char *key)
     return strcmp(section, "base") && strcmp(section, "floes") && bt_is_name(section, 60) && bt_is_name(dot + 1, 60);
 }
 
-int bt_schema_add(const bt_key *k, bt_errors *err)
+int bt_schema_add(const bt_key *key, bt_errors *err)
 {
     const int place = bt_schema_added();
-    const size_t before = err->n, length = strlen(k->name);
-    bt_key row = *k;
-    bt_range r;
+    const size_t before = err->n, length = strlen(key->name);
+    bt_key row = *key;
+    bt_range range;
     char why[BT_WHY];
     row.type = BT_KEY_REAL;
     row.offset = offsetof(bt_case, extra) + (size_t)place * sizeof(double);
     if (place >= BT_EXTRA_KEYS)
-        bt_errors_add(err, "%s: there is no room for more than %d added keys; raise BT_EXTRA_KEYS", k->name,
+        bt_errors_add(err, "%s: there is no room for more than %d added keys; raise BT_EXTRA_KEYS", key->name,
                       BT_EXTRA_KEYS);
-    else if (length > 60 || !is_key(k->name))
+    else if (length > 60 || !is_key(key->name))
         bt_errors_add(err,
                       "%s: a key is SECTION.NAME, of lower-case letters, digits and _, of at most 60 characters, and "
                       "no section is base or floes",
-                      k->name);
-    else if (bt_schema_find(bt_case_keys, bt_n_case_keys, k->name) >= 0)
-        bt_errors_add(err, "%s: this key is there; choose another name", k->name);
-    else if (section_is_closed(k->name))
-        bt_errors_add(err, "%s: its section has keys of the program; choose a section of its own", k->name);
-    else if (!k->range || !bt_value_range(&row, &r))
-        bt_errors_add(err, "%s: the range must be \"[least, most]\" or with ( and )", k->name);
-    else if (!k->preset || k->preset[0] == '=' || !bt_value_read(&row, &(bt_case){0}, k->preset, true, why))
-        bt_errors_add(err, "%s: the default must be a number within the range, or none", k->name);
-    else if (!k->doc || strlen(k->doc) < 8 || !is_line(k->doc))
-        bt_errors_add(err, "%s: say in a sentence, in one line, what it is", k->name);
+                      key->name);
+    else if (bt_schema_find(bt_case_keys, bt_n_case_keys, key->name) >= 0)
+        bt_errors_add(err, "%s: this key is there; choose another name", key->name);
+    else if (section_is_closed(key->name))
+        bt_errors_add(err, "%s: its section has keys of the program; choose a section of its own", key->name);
+    else if (!key->range || !bt_value_range(&row, &range))
+        bt_errors_add(err, "%s: the range must be \"[least, most]\" or with ( and )", key->name);
+    else if (!key->preset || key->preset[0] == '=' || !bt_value_read(&row, &(bt_case){0}, key->preset, true, why))
+        bt_errors_add(err, "%s: the default must be a number within the range, or none", key->name);
+    else if (!key->doc || strlen(key->doc) < 8 || !is_line(key->doc))
+        bt_errors_add(err, "%s: say in a sentence, in one line, what it is", key->name);
     if (err->n > before) return -1;
     bt_case_keys[bt_n_case_keys++] = row;
     return place;
@@ -669,12 +669,12 @@ void bt_schema_preset(const bt_key *keys, int n, void *base)
 {
     char why[BT_WHY];
     for (int i = 0; i < n; i++) {
-        const bt_key *k = &keys[i];
-        if (k->type == BT_KEY_POINTS) continue;
-        char *member = (char *)base + k->offset;
+        const bt_key *key = &keys[i];
+        if (key->type == BT_KEY_POINTS) continue;
+        char *member = (char *)base + key->offset;
         // Every preset is read without complaint: tests/unit/test_case.c. NaN stands for "not given" in a real.
-        if (k->preset && k->preset[0] != '=') bt_value_read(k, base, k->preset, true, why);
-        else if (k->type == BT_KEY_REAL) memcpy(member, &(double){NAN}, sizeof(double));
+        if (key->preset && key->preset[0] != '=') bt_value_read(key, base, key->preset, true, why);
+        else if (key->type == BT_KEY_REAL) memcpy(member, &(double){NAN}, sizeof(double));
     }
 }
 

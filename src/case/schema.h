@@ -46,7 +46,7 @@ extern const int bt_n_study_keys;
 /// Add a key with a real value to bt_case_keys, before any case is read: the member bt_case.extra[its result] holds the
 /// value. The texts stay the caller's and must outlive every case. offset and type are set here. −1 with the reason in
 /// err: no room, or the name, its section, preset, range or sentence will not do.
-int bt_schema_add(const bt_key *k, bt_errors *err);
+int bt_schema_add(const bt_key *key, bt_errors *err);
 /// How many have been added, and: the last of them are taken back until so many are left.
 int bt_schema_added(void);
 void bt_schema_take_back(int added);
@@ -86,16 +86,16 @@ typedef struct bt_range {
 } bt_range;
 
 /// The range of a key from its text. False when the text is malformed.
-bool bt_value_range(const bt_key *k, bt_range *r);
+bool bt_value_range(const bt_key *key, bt_range *range);
 
 /// Read a scalar into the member of the key under base. plain: not quoted, so that none means "no value". On refusal
 /// the member keeps its value and why says reason and remedy. Not for points.
-bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, char why[BT_WHY]);
+bool bt_value_read(const bt_key *key, void *base, const char *text, bool plain, char why[BT_WHY]);
 
 /// Read the coordinate of a point, with the key's unit and range.
-bool bt_value_read_coordinate(const bt_key *k, const char *text, double *value, char why[BT_WHY]);
+bool bt_value_read_coordinate(const bt_key *key, const char *text, double *value, char why[BT_WHY]);
 
 /// Write the member as a YAML scalar (or flow list of points) that reads back to the same bits.
-void bt_value_write(const bt_key *k, const void *base, FILE *out);
+void bt_value_write(const bt_key *key, const void *base, FILE *out);
 
 #endif

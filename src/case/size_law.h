@@ -24,10 +24,10 @@ typedef struct bt_sizes {
 } bt_sizes;
 
 /// The law of a case; BT_ERR_CASE, with a message, where its keys leave no sizes.
-bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err);
+bt_status bt_sizes_init(bt_sizes *sizes, const bt_case *input, bt_errors *err);
 
-double bt_sizes_moment(const bt_sizes *s, int k); ///< E[d^k] of what is drawn, m^k
-double bt_sizes_mean(const bt_sizes *s);          ///< E[d], m
-double bt_sizes_mean_area(const bt_sizes *s);     ///< (π/4) E[d²], m²
+double bt_sizes_moment(const bt_sizes *sizes, int k); ///< E[d^k] of what is drawn, m^k
+double bt_sizes_mean(const bt_sizes *sizes);          ///< E[d], m
+double bt_sizes_mean_area(const bt_sizes *sizes);     ///< (π/4) E[d²], m²
 
 #endif

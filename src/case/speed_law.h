@@ -16,15 +16,15 @@ typedef struct bt_speed_law {
 } bt_speed_law;
 
 /// m/s at time t; where there is no ramp, the speed itself from the start on.
-double bt_speed_law_at(const bt_speed_law *l, double t);
+double bt_speed_law_at(const bt_speed_law *law, double t);
 
 /// Way after time t ≥ 0, m.
-double bt_speed_law_way(const bt_speed_law *l, double t);
+double bt_speed_law_way(const bt_speed_law *law, double t);
 
 /// Time after which the way is s, s; latest: a time by which it is.
-double bt_speed_law_time(const bt_speed_law *l, double way, double latest);
+double bt_speed_law_time(const bt_speed_law *law, double way, double latest);
 
 /// Way after n steps of dt, each at the speed of its end: Σ Δt v(kΔt), m. On a rise that is v Δt/2 more than s(t).
-double bt_speed_law_led(const bt_speed_law *l, int64_t n, double dt);
+double bt_speed_law_led(const bt_speed_law *law, int64_t n, double dt);
 
 #endif

@@ -12,82 +12,83 @@
 
 #define MOST_POINTS 20000.0 // of a track whose wake is sought: each is compared with all before
 
-static double between(const bt_track *t, int64_t i, int64_t j)
+static double between(const bt_track *track, int64_t i, int64_t j)
 {
-    return bt_hypot(t->x[j] - t->x[i], t->y[j] - t->y[i]);
+    return bt_hypot(track->x[j] - track->x[i], track->y[j] - track->y[i]);
 }
 
-double bt_track_speed(const bt_track *t)
+double bt_track_speed(const bt_track *track)
 {
     double most = 0;
-    for (int64_t i = 1; i < t->n; i++)
-        most = bt_max(most, between(t, i - 1, i) / (t->time[i] - t->time[i - 1]));
+    for (int64_t i = 1; i < track->n; i++)
+        most = bt_max(most, between(track, i - 1, i) / (track->time[i] - track->time[i - 1]));
     return most;
 }
 
 /// The largest way along the sign of the tow, and by how much it falls behind that.
-static double farthest(const bt_case *c, const bt_track *t, double *fall)
+static double farthest(const bt_case *input, const bt_track *track, double *fall)
 {
-    const double sign = bt_case_tow_sign(c);
+    const double sign = bt_case_tow_sign(input);
     double most = 0;
     *fall = 0;
-    for (int64_t i = 0; i < t->n; i++) {
-        const double way = sign * (t->x[i] - t->x[0]);
+    for (int64_t i = 0; i < track->n; i++) {
+        const double way = sign * (track->x[i] - track->x[0]);
         most = bt_max(most, way);
         *fall = bt_max(*fall, most - way);
     }
     return most;
 }
 
-double bt_track_laps(const bt_case *c, const bt_track *t)
+double bt_track_laps(const bt_case *input, const bt_track *track)
 {
     double fall;
-    return farthest(c, t, &fall) / c->domain.length;
+    return farthest(input, track, &fall) / input->domain.length;
 }
 
-double bt_track_fall(const bt_case *c, const bt_track *t)
+double bt_track_fall(const bt_case *input, const bt_track *track)
 {
     double fall;
-    farthest(c, t, &fall);
+    farthest(input, track, &fall);
     return fall;
 }
 
 /// d less whole periods, as near to 0 as that gets.
 static double nearest(double d, double period) { return period > 0 ? d - period * nearbyint(d / period) : d; }
 
-/// First point that lies less than `size` from an earlier one, around a period; t->n without. Of a track that is
+/// First point that lies less than `size` from an earlier one, around a period; track->n without. Of a track that is
 /// thinned out to an eighth of that, against one of half of it.
-static int64_t first_in_wake(const bt_track *t, const double period[2], double size)
+static int64_t first_in_wake(const bt_track *track, const double period[2], double size)
 {
-    if (!(period[0] > 0 || period[1] > 0)) return t->n;
+    if (!(period[0] > 0 || period[1] > 0)) return track->n;
     double way = 0;
-    for (int64_t i = 1; i < t->n; i++) way += isnan(t->x[i - 1]) ? 0 : between(t, i - 1, i);
+    for (int64_t i = 1; i < track->n; i++) way += isnan(track->x[i - 1]) ? 0 : between(track, i - 1, i);
     const double apart = bt_max(0.5 * size, way / MOST_POINTS);
-    int64_t *kept = bt_alloc((size_t)(way / apart) + 2, sizeof *kept), n = 0, last = 0, found = t->n;
-    for (int64_t i = 0; i < t->n && found == t->n; i++) {
-        if (isnan(t->x[i]) || (n > 0 && between(t, last, i) < 0.25 * apart)) continue;
+    int64_t *kept = bt_alloc((size_t)(way / apart) + 2, sizeof *kept), n = 0, last = 0, found = track->n;
+    for (int64_t i = 0; i < track->n && found == track->n; i++) {
+        if (isnan(track->x[i]) || (n > 0 && between(track, last, i) < 0.25 * apart)) continue;
         last = i;
-        for (int64_t k = 0; k < n && found == t->n; k++) {
-            const double dx = t->x[i] - t->x[kept[k]], dy = t->y[i] - t->y[kept[k]], x = nearest(dx, period[0]),
-                         y = nearest(dy, period[1]);
+        for (int64_t k = 0; k < n && found == track->n; k++) {
+            const double dx = track->x[i] - track->x[kept[k]], dy = track->y[i] - track->y[kept[k]],
+                         x = nearest(dx, period[0]), y = nearest(dy, period[1]);
             if ((x != dx || y != dy) && bt_hypot(x, y) < size) found = i;
         }
-        if (n == 0 || between(t, kept[n - 1], i) >= apart) kept[n++] = i;
+        if (n == 0 || between(track, kept[n - 1], i) >= apart) kept[n++] = i;
     }
     free(kept);
     return found;
 }
 
-/// The last of the points after which the body is out of the ice; t->n where it is in it at the end, or never was.
+/// The last of the points after which the body is out of the ice; track->n where it is in it at the end, or never was.
 /// Where ice that does not fill a period comes again with it, the last before the first gap: then *gap, which comes in
 /// as false.
-static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size, bool *gap)
+static int64_t last_in_ice(const bt_case *input, const bt_track *track, double size, bool *gap)
 {
-    const bt_bound kind[2] = {c->domain.ends, c->domain.sides};
-    const double first[2] = {c->domain.x0, c->domain.y0}, extent[2] = {c->domain.length, c->domain.width};
+    const bt_bound kind[2] = {input->domain.ends, input->domain.sides};
+    const double first[2] = {input->domain.x0, input->domain.y0},
+                 extent[2] = {input->domain.length, input->domain.width};
     double low[2], high[2], period[2] = {0};
-    bt_case_ice_region(c, low, high);
-    for (int k = 0; k < 2 && t->region; k++) low[k] = t->region[k], high[k] = t->region[2 + k];
+    bt_case_ice_region(input, low, high);
+    for (int k = 0; k < 2 && track->region; k++) low[k] = track->region[k], high[k] = track->region[2 + k];
     for (int k = 0; k < 2; k++) {
         // up to a wall, which holds ice that drifts, and the body
         const bool wall = kind[k] == BT_BOUND_WALL, wraps = bt_bound_wraps(kind[k]);
@@ -96,41 +97,41 @@ static int64_t last_in_ice(const bt_case *c, const bt_track *t, double size, boo
         if (filled || (wall && high[k] > first[k] + extent[k] - size)) high[k] = INFINITY;
         if (wraps && !filled) period[k] = extent[k];
     }
-    int64_t last = t->n;
-    for (int64_t i = 0; i < t->n; i++) {
-        const double at[2] = {t->x[i], t->y[i]};
+    int64_t last = track->n;
+    for (int64_t i = 0; i < track->n; i++) {
+        const double at[2] = {track->x[i], track->y[i]};
         bool in = true;
         for (int k = 0; k < 2; k++) {
             const double past = at[k] - low[k];
             const bool within = period[k] > 0 ? past - period[k] * floor(past / period[k]) <= high[k] - low[k]
                                               : past >= 0 && at[k] <= high[k];
             in = in && within;
-            *gap = *gap || (!within && period[k] > 0 && last < t->n);
+            *gap = *gap || (!within && period[k] > 0 && last < track->n);
         }
         if (*gap) return last;
         if (in) last = i;
     }
-    return last + 1 < t->n ? last : t->n;
+    return last + 1 < track->n ? last : track->n;
 }
 
-void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings)
+void bt_track_warn(const bt_case *input, const bt_track *track, bt_errors *warnings)
 {
     double v[2 * BT_MAX_VERTICES];
-    const int corners = bt_case_waterline(c, v);
-    if (t->n < 2 || corners == 0 || (!(c->ice.concentration > 0) && !bt_case_reads_field(c))) return;
+    const int corners = bt_case_waterline(input, v);
+    if (track->n < 2 || corners == 0 || (!(input->ice.concentration > 0) && !bt_case_reads_field(input))) return;
     const double size = sqrt(4 / BT_PI * bt_shape_moments(corners, v).area);
-    const double period[2] = {c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
-                              c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0};
+    const double period[2] = {input->domain.ends == BT_BOUND_PERIODIC ? input->domain.length : 0,
+                              input->domain.sides == BT_BOUND_PERIODIC ? input->domain.width : 0};
     bool gap = false;
-    const int64_t wake = first_in_wake(t, period, size), last = last_in_ice(c, t, size, &gap);
-    if (wake < t->n)
+    const int64_t wake = first_in_wake(track, period, size), last = last_in_ice(input, track, size, &gap);
+    if (wake < track->n)
         bt_warn(warnings, BT_WARN_OWN_WAKE,
                       "from %.4g s on the body meets ice that it has opened before, a period of the domain on: take a "
                       "larger domain, set domain.ends: moving, or end the run before",
-                      t->time[wake]);
-    if (last < t->n)
+                      track->time[wake]);
+    if (last < track->n)
         bt_warn(warnings, BT_WARN_LEAVES_ICE,
-                      "the body leaves the ice at %.4g s, %s, or end the run before", t->time[last],
+                      "the body leaves the ice at %.4g s, %s, or end the run before", track->time[last],
                       gap ? "and comes into open water, for it does not fill the domain: leave ice.x_min, ice.x_max, "
                             "ice.y_min and ice.y_max out"
                           : "and is in open water from then on: take a longer domain, set domain.ends: moving");

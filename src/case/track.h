@@ -24,13 +24,13 @@ typedef struct bt_track {
 } bt_track;
 
 /// Largest speed from one point to the next, m/s.
-double bt_track_speed(const bt_track *t);
+double bt_track_speed(const bt_track *track);
 
 /// Way along the tow's direction of x, in lengths of the domain; how far it falls back from that at most, m.
-double bt_track_laps(const bt_case *c, const bt_track *t);
-double bt_track_fall(const bt_case *c, const bt_track *t);
+double bt_track_laps(const bt_case *input, const bt_track *track);
+double bt_track_fall(const bt_case *input, const bt_track *track);
 
 /// Report a body that comes to its own wake, or out of the ice. Nothing in open water.
-void bt_track_warn(const bt_case *c, const bt_track *t, bt_errors *warnings);
+void bt_track_warn(const bt_case *input, const bt_track *track, bt_errors *warnings);
 
 #endif

@@ -12,50 +12,51 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void *member_of(const bt_key *k, void *base) { return (char *)base + k->offset; }
+static void *member_of(const bt_key *key, void *base) { return (char *)base + key->offset; }
 
-bool bt_value_range(const bt_key *k, bt_range *r)
+bool bt_value_range(const bt_key *key, bt_range *range)
 {
-    *r = (bt_range){.lo = -INFINITY, .hi = INFINITY};
-    if (!k->range) return true;
+    *range = (bt_range){.lo = -INFINITY, .hi = INFINITY};
+    if (!key->range) return true;
     char text[64], why[BT_WHY];
-    size_t n = strlen(k->range);
+    size_t n = strlen(key->range);
     if (n < 5 || n >= sizeof text) return false;
-    memcpy(text, k->range, n + 1);
+    memcpy(text, key->range, n + 1);
     char *comma = strchr(text, ',');
     if (!comma || !strchr("[(", text[0]) || !strchr("])", text[n - 1])) return false;
-    r->lo_open = text[0] == '(';
-    r->hi_open = text[n - 1] == ')';
+    range->lo_open = text[0] == '(';
+    range->hi_open = text[n - 1] == ')';
     *comma = text[n - 1] = 0;
-    return bt_units_parse(text + 1, k->unit, &r->lo, why) && bt_units_parse(comma + 1, k->unit, &r->hi, why) &&
-           r->lo < r->hi;
+    return bt_units_parse(text + 1, key->unit, &range->lo, why) &&
+           bt_units_parse(comma + 1, key->unit, &range->hi, why) && range->lo < range->hi;
 }
 
 /// A ratio of 2 and more that would do as a percentage is taken for one; 1.2 is as well a slip of 0.12.
-static void suggest_percent(const bt_key *k, const bt_range *r, double value, const char *text, char meant[80])
+static void suggest_percent(const bt_key *key, const bt_range *range, double value, const char *text, char meant[80])
 {
     const double tenths = value / 10;
-    const bool chart = !strcmp(k->name, "ice.concentration") && value >= 1 && value <= 10 && !strchr(text, '%');
-    if (chart && tenths <= r->hi)
+    const bool chart = !strcmp(key->name, "ice.concentration") && value >= 1 && value <= 10 && !strchr(text, '%');
+    if (chart && tenths <= range->hi)
         snprintf(meant, 80, "did you mean %g (ice charts count tenths) or %g %%? ", tenths, value);
     else if (chart) snprintf(meant, 80, "ice charts count tenths, and %g of them are %g; ", value, tenths);
     if (chart) return;
     const double ratio = value / 100;
-    if (k->unit != BT_UNIT_RATIO || strchr(text, '%')) return;
-    if (value < 2 || value > 100 || ratio < r->lo || ratio > r->hi) return;
+    if (key->unit != BT_UNIT_RATIO || strchr(text, '%')) return;
+    if (value < 2 || value > 100 || ratio < range->lo || ratio > range->hi) return;
     snprintf(meant, 80, "did you mean %g or %g %%? ", ratio, value);
 }
 
-static bool in_range(const bt_key *k, double value, const char *text, char *why)
+static bool in_range(const bt_key *key, double value, const char *text, char *why)
 {
-    bt_range r;
-    bt_value_range(k, &r);
-    if ((r.lo_open ? value > r.lo : value >= r.lo) && (r.hi_open ? value < r.hi : value <= r.hi)) return true;
-    const char *bare = bt_units_bare(k->unit);
+    bt_range range;
+    bt_value_range(key, &range);
+    if ((range.lo_open ? value > range.lo : value >= range.lo) &&
+        (range.hi_open ? value < range.hi : value <= range.hi)) return true;
+    const char *bare = bt_units_bare(key->unit);
     bool plain = !strcmp(bare, "-");
     char meant[80] = "";
-    suggest_percent(k, &r, value, text, meant);
-    snprintf(why, BT_WHY, "%.40s is out of range; %sgive a value in %s%s%s", text, meant, k->range, plain ? "" : " ",
+    suggest_percent(key, &range, value, text, meant);
+    snprintf(why, BT_WHY, "%.40s is out of range; %sgive a value in %s%s%s", text, meant, key->range, plain ? "" : " ",
              plain ? "" : bare);
     return false;
 }
@@ -83,15 +84,15 @@ static bool is_utf8(const char *text, size_t n)
     return true;
 }
 
-static bool read_real(const bt_key *k, void *base, const char *text, char *why)
+static bool read_real(const bt_key *key, void *base, const char *text, char *why)
 {
     double v;
-    if (!bt_value_read_coordinate(k, text, &v, why)) return false;
-    memcpy(member_of(k, base), &v, sizeof v);
+    if (!bt_value_read_coordinate(key, text, &v, why)) return false;
+    memcpy(member_of(key, base), &v, sizeof v);
     return true;
 }
 
-static bool read_int(const bt_key *k, void *base, const char *text, char *why)
+static bool read_int(const bt_key *key, void *base, const char *text, char *why)
 {
     const char *digits = text + (*text == '-' || *text == '+');
     size_t n = strspn(digits, "0123456789");
@@ -102,47 +103,47 @@ static bool read_int(const bt_key *k, void *base, const char *text, char *why)
     errno = 0;
     int64_t v = strtoll(text, NULL, 10);
     if (errno == ERANGE) {
-        snprintf(why, BT_WHY, "%.40s is too large; give a value in %s", text, k->range);
+        snprintf(why, BT_WHY, "%.40s is too large; give a value in %s", text, key->range);
         return false;
     }
-    if (!in_range(k, (double)v, text, why)) return false;
-    memcpy(member_of(k, base), &v, sizeof v);
+    if (!in_range(key, (double)v, text, why)) return false;
+    memcpy(member_of(key, base), &v, sizeof v);
     return true;
 }
 
-static bool read_bool(const bt_key *k, void *base, const char *text, char *why)
+static bool read_bool(const bt_key *key, void *base, const char *text, char *why)
 {
     static const char *const yes[] = {"true", "yes", "on"}, *const no[] = {"false", "no", "off"};
     for (int i = 0; i < 3; i++)
         if (!strcmp(text, yes[i]) || !strcmp(text, no[i])) {
             bool v = !strcmp(text, yes[i]);
-            memcpy(member_of(k, base), &v, sizeof v);
+            memcpy(member_of(key, base), &v, sizeof v);
             return true;
         }
     snprintf(why, BT_WHY, "\"%.40s\" is neither true nor false; give one of them", text);
     return false;
 }
 
-static bool read_choice(const bt_key *k, void *base, const char *text, char *why)
+static bool read_choice(const bt_key *key, void *base, const char *text, char *why)
 {
-    for (int i = 0; k->choices[i]; i++)
-        if (!strcmp(text, k->choices[i])) {
+    for (int i = 0; key->choices[i]; i++)
+        if (!strcmp(text, key->choices[i])) {
             // gcc gives an enum without negative members the type unsigned int
             _Static_assert(sizeof(bt_bound) == sizeof(unsigned) && sizeof(bt_body_shape) == sizeof(unsigned),
                            "enums are unsigned int");
-            memcpy(member_of(k, base), &(unsigned){(unsigned)i}, sizeof(unsigned));
+            memcpy(member_of(key, base), &(unsigned){(unsigned)i}, sizeof(unsigned));
             return true;
         }
     char list[128] = "";
-    for (int i = 0; k->choices[i]; i++)
-        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", k->choices[i]);
-    const char *near = bt_suggest(text, k->choices);
+    for (int i = 0; key->choices[i]; i++)
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", key->choices[i]);
+    const char *near = bt_suggest(text, key->choices);
     if (near) snprintf(why, BT_WHY, "\"%.40s\" is not one of %s; did you mean %s?", text, list, near);
     else snprintf(why, BT_WHY, "\"%.40s\" is not known; give one of %s", text, list);
     return false;
 }
 
-static bool read_text(const bt_key *k, void *base, const char *text, char *why)
+static bool read_text(const bt_key *key, void *base, const char *text, char *why)
 {
     size_t n = strlen(text);
     if (n > BT_MAX_TEXT || !is_utf8(text, n)) {
@@ -154,44 +155,44 @@ static bool read_text(const bt_key *k, void *base, const char *text, char *why)
     }
     char *old, *copy = bt_alloc(n + 1, 1);
     memcpy(copy, text, n);
-    memcpy(&old, member_of(k, base), sizeof old);
+    memcpy(&old, member_of(key, base), sizeof old);
     free(old);
-    memcpy(member_of(k, base), &copy, sizeof copy);
+    memcpy(member_of(key, base), &copy, sizeof copy);
     return true;
 }
 
-bool bt_value_read_coordinate(const bt_key *k, const char *text, double *value, char why[BT_WHY])
+bool bt_value_read_coordinate(const bt_key *key, const char *text, double *value, char why[BT_WHY])
 {
     double v;
-    if (!bt_units_parse(text, k->unit, &v, why) || !in_range(k, v, text, why)) return false;
+    if (!bt_units_parse(text, key->unit, &v, why) || !in_range(key, v, text, why)) return false;
     *value = v;
     return true;
 }
 
-bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, char why[BT_WHY])
+bool bt_value_read(const bt_key *key, void *base, const char *text, bool plain, char why[BT_WHY])
 {
     if (plain && (!*text || !strcmp(text, "~") || !strcmp(text, "null"))) {
         snprintf(why, BT_WHY, "has no value; give one or remove the key");
         return false;
     }
-    bool absent = plain && !strcmp(text, "none") && k->preset &&
-                  (k->preset[0] == '=' || k->at_sea || !strcmp(k->preset, "none"));
-    switch (k->type) {
+    bool absent = plain && !strcmp(text, "none") && key->preset &&
+                  (key->preset[0] == '=' || key->at_sea || !strcmp(key->preset, "none"));
+    switch (key->type) {
     case BT_KEY_REAL:
-        if (!absent) return read_real(k, base, text, why);
-        memcpy(member_of(k, base), &(double){NAN}, sizeof(double));
+        if (!absent) return read_real(key, base, text, why);
+        memcpy(member_of(key, base), &(double){NAN}, sizeof(double));
         return true;
     case BT_KEY_TEXT: {
-        if (!absent) return read_text(k, base, text, why);
+        if (!absent) return read_text(key, base, text, why);
         char *old;
-        memcpy(&old, member_of(k, base), sizeof old);
+        memcpy(&old, member_of(key, base), sizeof old);
         free(old);
-        memset(member_of(k, base), 0, sizeof old);
+        memset(member_of(key, base), 0, sizeof old);
         return true;
     }
-    case BT_KEY_INT: return read_int(k, base, text, why);
-    case BT_KEY_BOOL: return read_bool(k, base, text, why);
-    case BT_KEY_CHOICE: return read_choice(k, base, text, why);
+    case BT_KEY_INT: return read_int(key, base, text, why);
+    case BT_KEY_BOOL: return read_bool(key, base, text, why);
+    case BT_KEY_CHOICE: return read_choice(key, base, text, why);
     case BT_KEY_POINTS:
     case BT_KEY_MAP: break;
     }
@@ -219,15 +220,15 @@ static void write_text(const char *text, FILE *out)
     fputc('"', out);
 }
 
-void bt_value_write(const bt_key *k, const void *base, FILE *out)
+void bt_value_write(const bt_key *key, const void *base, FILE *out)
 {
-    const char *member = (const char *)base + k->offset;
+    const char *member = (const char *)base + key->offset;
     char number[64];
-    switch (k->type) {
+    switch (key->type) {
     case BT_KEY_REAL: {
         double v;
         memcpy(&v, member, sizeof v);
-        bt_units_format(v, k->unit, number, sizeof number);
+        bt_units_format(v, key->unit, number, sizeof number);
         fputs(number, out);
         break;
     }
@@ -246,7 +247,7 @@ void bt_value_write(const bt_key *k, const void *base, FILE *out)
     case BT_KEY_CHOICE: {
         unsigned v;
         memcpy(&v, member, sizeof v);
-        fputs(k->choices[v], out);
+        fputs(key->choices[v], out);
         break;
     }
     case BT_KEY_TEXT: {
@@ -261,12 +262,12 @@ void bt_value_write(const bt_key *k, const void *base, FILE *out)
         const double *p;
         int n;
         memcpy(&p, member, sizeof p);
-        memcpy(&n, (const char *)base + k->offset_count, sizeof n);
+        memcpy(&n, (const char *)base + key->offset_count, sizeof n);
         if (!n) fputs("none", out);
         for (int i = 0; i < n; i++) {
             fputs(i ? ", [" : "[[", out);
             for (int j = 0; j < 2; j++) {
-                bt_units_format(p[2 * i + j], bt_schema_column(k, j).unit, number, sizeof number);
+                bt_units_format(p[2 * i + j], bt_schema_column(key, j).unit, number, sizeof number);
                 fprintf(out, "%s%s", j ? ", " : "", number);
             }
             fputs(i == n - 1 ? "]]" : "]", out);

@@ -25,7 +25,7 @@ static bool next_word(const char **list, char word[32])
 }
 
 /// Values of a text, as members of the object that is open: each conversion takes the argument that printf takes.
-static void put_values(bt_json *j, const char *names, const char *text, va_list ap)
+static void put_values(bt_json *json, const char *names, const char *text, va_list ap)
 {
     char name[32];
     for (const char *at = strchr(text, '%'); at; at = strchr(at, '%')) {
@@ -37,13 +37,13 @@ static void put_values(bt_json *j, const char *names, const char *text, va_list 
         const bool wanted = next_word(&names, name) && strcmp(name, "-") != 0;
         if (conversion == 's') {
             const char *value = va_arg(ap, const char *);
-            if (wanted) bt_json_string(j, name, value);
+            if (wanted) bt_json_string(json, name, value);
         } else if (conversion == 'd') {
             const int64_t value = longs > 1 ? va_arg(ap, long long) : longs ? va_arg(ap, long) : va_arg(ap, int);
-            if (wanted) bt_json_int(j, name, value);
+            if (wanted) bt_json_int(json, name, value);
         } else {
             const double value = va_arg(ap, double);
-            if (wanted) bt_json_number(j, name, value);
+            if (wanted) bt_json_number(json, name, value);
         }
     }
 }
@@ -94,25 +94,25 @@ void bt_warn_name(bt_errors *list, const char *name, const char *value)
     join(list, &one);
 }
 
-void bt_warnings_json(bt_json *j, const char *key, const bt_errors *list)
+void bt_warnings_json(bt_json *json, const char *key, const bt_errors *list)
 {
-    bt_json_open(j, key, '[');
+    bt_json_open(json, key, '[');
     for (size_t i = 0; i < list->n; i++) {
-        bt_json_open(j, NULL, '{');
-        j->flat = true;
-        bt_json_string(j, "code", list->note[i].code);
-        bt_json_string(j, "text", list->text[i]);
-        bt_json_raw(j, "values", list->note[i].values ? list->note[i].values : "{}");
-        bt_json_close(j, '}');
-        j->flat = false;
+        bt_json_open(json, NULL, '{');
+        json->flat = true;
+        bt_json_string(json, "code", list->note[i].code);
+        bt_json_string(json, "text", list->text[i]);
+        bt_json_raw(json, "values", list->note[i].values ? list->note[i].values : "{}");
+        bt_json_close(json, '}');
+        json->flat = false;
     }
-    bt_json_close(j, ']');
+    bt_json_close(json, ']');
 }
 
 char *bt_warnings_text(const bt_errors *list)
 {
-    bt_text t;
-    bt_text_begin(&t);
-    for (size_t i = 0; i < list->n; i++) fprintf(t.out, "%s%s", i ? "; " : "", list->text[i]);
-    return bt_text_end(&t);
+    bt_text text;
+    bt_text_begin(&text);
+    for (size_t i = 0; i < list->n; i++) fprintf(text.out, "%s%s", i ? "; " : "", list->text[i]);
+    return bt_text_end(&text);
 }

@@ -132,7 +132,7 @@ void bt_warn_number(bt_errors *list, const char *name, double value);
 void bt_warn_name(bt_errors *list, const char *name, const char *value);
 
 /// An array of {"code", "text", "values"}, one a line; "code" is null of what has none.
-void bt_warnings_json(bt_json *j, const char *key, const bt_errors *list);
+void bt_warnings_json(bt_json *json, const char *key, const bt_errors *list);
 /// All texts as one, "; " between them; the caller frees it.
 char *bt_warnings_text(const bt_errors *list);
 

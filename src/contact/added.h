@@ -14,34 +14,34 @@
 bool bt_added_add(const bt_contact_law *law);
 
 /// False of a law that the world is without.
-bool bt_added_on(const bt_params *p, int law);
-bool bt_added_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
+bool bt_added_on(const bt_params *par, int law);
+bool bt_added_applies(const bt_world *world, int law, bt_idx a, bt_idx b);
 
-/// Bounds of contact j of cell t; overlap that the law gives is no gap.
-void bt_added_bound(const bt_world *w, int law, bt_cell *t, bt_idx j, const bt_pair *p);
+/// Bounds of contact j of the cell; overlap that the law gives is no gap.
+void bt_added_bound(const bt_world *world, int law, bt_cell *cell, bt_idx j, const bt_pair *pair);
 
 /// Is point i at the bound of this law?
-static inline bool bt_added_gives_way(const bt_contact *u, const bt_limit *l, int i, int law)
+static inline bool bt_added_gives_way(const bt_contact *contact, const bt_limit *limit, int i, int law)
 {
-    return l->by[i] == law && u->ln[i] >= l->cap[i];
+    return limit->by[i] == law && contact->ln[i] >= limit->cap[i];
 }
 
 /// Point i is at the law's bound and approaches: its work.
-void bt_added_give_way(const bt_world *w, int law, const bt_cell *t, bt_idx j, int i, bt_totals *totals);
+void bt_added_give_way(const bt_world *world, int law, const bt_cell *cell, bt_idx j, int i, bt_totals *totals);
 
 /// After the solve: what the pair of contact j remembers.
-void bt_added_remember(const bt_world *w, int law, bt_cell *t, bt_idx j, bt_totals *totals);
+void bt_added_remember(const bt_world *world, int law, bt_cell *cell, bt_idx j, bt_totals *totals);
 
 /// A record into the numbers that are a state.
-void bt_added_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
+void bt_added_count(const bt_world *world, const bt_memory *memory, bt_totals *totals);
 
 /// How many sums they have, before those of the program's own laws.
 int bt_added_sums(void);
 
 /// Their sums into the numbers of the step.
-void bt_added_stats(bt_step_stats *st, const bt_totals *t);
+void bt_added_stats(bt_step_stats *st, const bt_totals *totals);
 
 /// For a world of a case: those that there are now, and their numbers.
-void bt_added_setup(const bt_case *c, bt_params *p);
+void bt_added_setup(const bt_case *input, bt_params *par);
 
 #endif

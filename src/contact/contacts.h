@@ -39,31 +39,31 @@ typedef struct bt_manifold {
 
 /// Collective. Largest of the speeds at velocities v and v2 in each cell and around it into cells->bound, at least what
 /// it was with `keep`; returns the largest of all, m/s.
-double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep);
+double bt_contacts_bound(bt_world *world, const bt_vel *v, const bt_vel *v2, bool keep);
 
 /// Collective. Has the bound grown beyond what the last detection was made for?
-bool bt_contacts_outrun(const bt_world *w);
+bool bt_contacts_outrun(const bt_world *world);
 
 /// Collective. Find this step's contacts at the present poses in the cells that are active under cells->bound. Impulses
 /// are those of the same feature in the step before, or 0. `again`: only where the margin has grown since the last
 /// call.
-void bt_contacts_detect(bt_world *w, bool again);
+void bt_contacts_detect(bt_world *world, bool again);
 
 /// Collective. Deepest overlap of the state after a step, m: what the next step would find before it solves anything,
 /// in the cells that have moved, crushed ice left out. Poses and velocities stay; contacts, labels, storage and marks
 /// of crushing that have come apart do not, so the state must have been saved.
-double bt_contacts_overlap(bt_world *w);
+double bt_contacts_overlap(bt_world *world);
 
 /// Manifold of one convex part of each body (bt_pair.part) at the present poses; false when the gap exceeds margin.
 /// reference_before (0: edge of a, 1: of b, −1: none) settles ties between nearly equal reference edges. axes: what is
 /// known of the pair from its last search, on return from this one, with which the result is the same; or NULL.
-bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
-                       int reference_before, bt_manifold *m, bt_axes *axes);
+bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
+                       int reference_before, bt_manifold *manifold, bt_axes *axes);
 
 /// Of the manifolds man [n], in the order of gids and parts, those of bodies that are not convex and of shores: points
 /// that another part of the same pair of bodies, or another piece of a shore with the same body, has as well are taken
 /// out. What has no point left has n_points = 0.
-void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n);
+void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n);
 
 // --- pairs that pass -------------------------------------------------------------------------------------------------
 
@@ -87,6 +87,6 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n);
 
 /// Collective. After a solve that converged: release rows (if so), and give released pairs that meet their rows again.
 /// Returns how many rows have changed, or with `release` false would have: then the step has to be solved again.
-int64_t bt_passing_review(bt_world *w, bool release);
+int64_t bt_passing_review(bt_world *world, bool release);
 
 #endif

@@ -42,27 +42,27 @@ static const bt_law_total totals[] = {
               .description = "most of them at once"},
 };
 
-static void setup(const bt_case *c, double own[BT_MAX_CONTACT_OWN])
+static void setup(const bt_case *input, double own[BT_MAX_CONTACT_OWN])
 {
-    own[BT_CRUSH_PRESSURE] = c->ice.crushing_pressure;
-    own[BT_CRUSH_LEAST] = c->ice.crushing_least;
+    own[BT_CRUSH_PRESSURE] = input->ice.crushing_pressure;
+    own[BT_CRUSH_LEAST] = input->ice.crushing_least;
 }
 
 static bool on(const double *own) { return own[BT_CRUSH_PRESSURE] > 0; }
 
-static char *check(const bt_case *c, double thickness, double size)
+static char *check(const bt_case *input, double thickness, double size)
 {
-    if (!(c->ice.crushing_pressure > 0)) return NULL;
-    const double line = c->ice.crushing_pressure * thickness;
+    if (!(input->ice.crushing_pressure > 0)) return NULL;
+    const double line = input->ice.crushing_pressure * thickness;
     return bt_text_of(
         "crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n",
-        line, line * c->ice.crushing_least * thickness, line * size);
+        line, line * input->ice.crushing_least * thickness, line * size);
 }
 
-static char *result(const bt_case *c, const bt_total_value *total, double ice_area)
+static char *result(const bt_case *input, const bt_total_value *total, double ice_area)
 {
     (void)ice_area;
-    if (!(c->ice.crushing_pressure > 0)) return NULL;
+    if (!(input->ice.crushing_pressure > 0)) return NULL;
     return bt_text_of(
         "  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n",
         total[WORK].real, (long long)total[STEPS].whole, total[MOST].real, total[DEPTH].real);
@@ -79,26 +79,29 @@ static void warn(const bt_total_value *total, double size, bt_errors *warnings)
 }
 
 /// Thickness that is crushed when a and b are pressed together, m; 0 = neither is ice.
-static double thickness_of(const bt_bodies *s, bt_idx a, bt_idx b)
+static double thickness_of(const bt_bodies *bodies, bt_idx a, bt_idx b)
 {
-    const double ha = s->thickness[a], hb = s->thickness[b];
+    const double ha = bodies->thickness[a], hb = bodies->thickness[b];
     return ha > 0 && hb > 0 ? bt_min(ha, hb) : bt_max(ha, hb);
 }
 
-static bool applies(const bt_world *w, bt_idx a, bt_idx b) { return thickness_of(&w->bodies, a, b) > 0; }
+static bool applies(const bt_world *world, bt_idx a, bt_idx b) { return thickness_of(&world->bodies, a, b) > 0; }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
 enum { UNSEEN = 2 }; // value[UNSEEN + i]: 1 = point i was not found when the record was written: as deep as before
 
-static bool keeps(const bt_world *w, bt_memory *r) { return bt_law_near(w, r); }
+static bool keeps(const bt_world *world, bt_memory *memory) { return bt_law_near(world, memory); }
 
-static double depth_of(const bt_memory *r) { return bt_max(r->value[0], r->n_points > 1 ? r->value[1] : 0); }
-
-static double count(const bt_world *w, const bt_memory *r, bt_sum *number)
+static double depth_of(const bt_memory *memory)
 {
-    (void)w, (void)number;
-    return depth_of(r);
+    return bt_max(memory->value[0], memory->n_points > 1 ? memory->value[1] : 0);
+}
+
+static double count(const bt_world *world, const bt_memory *memory, bt_sum *number)
+{
+    (void)world, (void)number;
+    return depth_of(memory);
 }
 
 static int by_bodies(const void *p, const void *q)
@@ -111,27 +114,27 @@ static int by_bodies(const void *p, const void *q)
 /// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on
 /// from part to part is sliding. So is a point that comes back into sight: meanwhile they may have crushed each other
 /// deeper under another name.
-static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold *m, bt_limit *l)
+static void inherit(const bt_cell *cell, const bt_memory *names, const bt_manifold *manifold, bt_limit *limit)
 {
-    if (t->laws.n_memory == 0) return;
-    const bt_memory *any = bsearch(names, t->laws.memory, (size_t)t->laws.n_memory, sizeof *names, by_bodies);
+    if (cell->laws.n_memory == 0) return;
+    const bt_memory *any = bsearch(names, cell->laws.memory, (size_t)cell->laws.n_memory, sizeof *names, by_bodies);
     if (!any) return;
     const bt_memory *end = any + 1, *own = NULL;
-    while (any > t->laws.memory && by_bodies(any - 1, names) == 0) any--;
-    while (end < t->laws.memory + t->laws.n_memory && by_bodies(end, names) == 0) end++;
+    while (any > cell->laws.memory && by_bodies(any - 1, names) == 0) any--;
+    while (end < cell->laws.memory + cell->laws.n_memory && by_bodies(end, names) == 0) end++;
     double deepest = 0;
-    for (const bt_memory *s = any; s < end; s++) {
-        if (s->law != BT_LAW_CRUSHING) continue;
-        deepest = bt_max(deepest, depth_of(s));
-        if (bt_memory_by_names(s, names) == 0) own = s;
+    for (const bt_memory *memory = any; memory < end; memory++) {
+        if (memory->law != BT_LAW_CRUSHING) continue;
+        deepest = bt_max(deepest, depth_of(memory));
+        if (bt_memory_by_names(memory, names) == 0) own = memory;
     }
-    if (own) l->record[BT_LAW_CRUSHING] = (int32_t)(own - t->laws.memory);
-    for (int i = 0; i < m->n_points; i++) {
-        l->rise->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
+    if (own) limit->record[BT_LAW_CRUSHING] = (int32_t)(own - cell->laws.memory);
+    for (int i = 0; i < manifold->n_points; i++) {
+        limit->rise->depth[i] = bt_min(deepest, bt_max(0, -manifold->p[i].gap));
         for (int j = 0; own && j < own->n_points; j++)
-            if (own->feature[j] == m->p[i].feature)
-                l->rise->depth[i] =
-                    own->value[UNSEEN + j] > 0 ? bt_max(own->value[j], l->rise->depth[i]) : own->value[j];
+            if (own->feature[j] == manifold->p[i].feature)
+                limit->rise->depth[i] =
+                    own->value[UNSEEN + j] > 0 ? bt_max(own->value[j], limit->rise->depth[i]) : own->value[j];
     }
 }
 
@@ -145,9 +148,10 @@ typedef struct {
     double mean;               ///< E(way)/way, N
 } resistance;
 
-static double work_to(const resistance *r, double y)
+static double work_to(const resistance *ice, double y)
 {
-    return y <= r->kink ? y * (r->touch + 0.5 * r->ramp * y) : r->work + y * (r->force + 0.5 * r->slope * y);
+    return y <= ice->kink ? y * (ice->touch + 0.5 * ice->ramp * y)
+                          : ice->work + y * (ice->force + 0.5 * ice->slope * y);
 }
 
 /// Of lengths at the depths `slop` and `way`, and areas of the overlap there; line: p h.
@@ -159,184 +163,191 @@ static resistance resistance_of(const double length[2], const double area[2], do
 {
     const double last = bt_max(length[0], length[1]);
     const double first = bt_max(0, length[0] - (last - length[0]) * slop / (way - slop)), rise = last - first;
-    resistance r = {.touch = line * bt_max(first, least), .kink = INFINITY};
-    r.mean = r.touch;
-    if (!(last > bt_max(first, least))) return r;
+    resistance ice = {.touch = line * bt_max(first, least), .kink = INFINITY};
+    ice.mean = ice.touch;
+    if (!(last > bt_max(first, least))) return ice;
     const double before = bt_max(0, area[0] - 0.5 * slop * (first + length[0]));
     const double share = bt_max(0.5, bt_min(1, (area[1] - before - first * way) / (rise * way))); // 1/q
     const double slope = rise / way * (1 / share - 1), at = last - slope * way;
     const bool blunt = at < least; // the second line meets the least length
-    r.kink = blunt ? (least - at) / slope : (1 - share) * way;
-    r.force = line * at, r.slope = line * slope;
-    if (!blunt && r.kink > 0) r.ramp = bt_max(0, r.force + r.slope * r.kink - r.touch) / r.kink;
-    r.work = r.kink * (r.touch - r.force + 0.5 * (r.ramp - r.slope) * r.kink);
-    r.mean = bt_max(r.touch, work_to(&r, way) / way);
-    return r;
+    ice.kink = blunt ? (least - at) / slope : (1 - share) * way;
+    ice.force = line * at, ice.slope = line * slope;
+    if (!blunt && ice.kink > 0) ice.ramp = bt_max(0, ice.force + ice.slope * ice.kink - ice.touch) / ice.kink;
+    ice.work = ice.kink * (ice.touch - ice.force + 0.5 * (ice.ramp - ice.slope) * ice.kink);
+    ice.mean = bt_max(ice.touch, work_to(&ice, way) / way);
+    return ice;
 }
 
 /// Ends of a lone collision, of both points at once, in turns: how far each goes in, m/s, and whether that is a stop.
-static void collide(const bt_mass *m, const bt_hit h[2], const double place[2], const resistance r[2], int n, double dt,
-                    double in[2])
+static void collide(const bt_mass *m, const bt_hit hit[2], const double place[2], const resistance ice[2], int n,
+                    double dt, double in[2])
 {
     enum { TURNS = 2 };
     double impulse[2] = {0};
     // Where both are driven in alike the impulses are as the lengths.
     for (int i = 0; i < n; i++) {
-        const double all = m->w[i] + (n > 1 && r[i].mean > 0 ? m->w12 * r[1 - i].mean / r[i].mean : 0);
-        const double w = all > 0.1 * m->w[i] ? all : m->w[i], free = h[i].before + w * h[i].load;
-        impulse[i] = bt_max(0, (free - place[i] - bt_hit_end(&h[i], place[i], free, w)) / w);
+        const double all = m->w[i] + (n > 1 && ice[i].mean > 0 ? m->w12 * ice[1 - i].mean / ice[i].mean : 0);
+        const double w = all > 0.1 * m->w[i] ? all : m->w[i], free = hit[i].before + w * hit[i].load;
+        impulse[i] = bt_max(0, (free - place[i] - bt_hit_end(&hit[i], place[i], free, w)) / w);
     }
     for (int turn = 0; turn < (n > 1 ? TURNS : 1); turn++)
         for (int i = 0; i < n; i++) {
-            const double other = n > 1 ? m->w12 * (impulse[1 - i] - h[1 - i].load) : 0;
-            const double free = h[i].before + m->w[i] * h[i].load - other;
-            in[i] = h[i].before > place[i] ? bt_hit_end(&h[i], place[i], free, m->w[i]) : 0;
+            const double other = n > 1 ? m->w12 * (impulse[1 - i] - hit[1 - i].load) : 0;
+            const double free = hit[i].before + m->w[i] * hit[i].load - other;
+            in[i] = hit[i].before > place[i] ? bt_hit_end(&hit[i], place[i], free, m->w[i]) : 0;
             impulse[i] = bt_max(0, (free - place[i] - in[i]) * m->mn[i]);
-            if (!(in[i] > 0)) impulse[i] = bt_min(impulse[i], dt * r[i].touch);
+            if (!(in[i] > 0)) impulse[i] = bt_min(impulse[i], dt * ice[i].touch);
         }
 }
 
 /// Approaches before the step, and the loads: W load = what the free velocities have more.
-static void approach_of(const bt_world *w, const bt_contact *u, const bt_mass *m, bt_hit h[2])
+static void approach_of(const bt_world *world, const bt_contact *contact, const bt_mass *m, bt_hit hit[2])
 {
-    const bt_bodies *s = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     double gain[2] = {0};
-    for (int i = 0; i < u->n; i++) {
-        h[i].before = -bt_normal_velocity(u, i, &s->vel_start[u->a], &s->vel_start[u->b]);
-        gain[i] = -bt_normal_velocity(u, i, &s->vel_free[u->a], &s->vel_free[u->b]) - h[i].before;
+    for (int i = 0; i < contact->n; i++) {
+        hit[i].before = -bt_normal_velocity(contact, i, &bodies->vel_start[contact->a], &bodies->vel_start[contact->b]);
+        gain[i] = -bt_normal_velocity(contact, i, &bodies->vel_free[contact->a], &bodies->vel_free[contact->b]) -
+                  hit[i].before;
     }
-    for (int i = 0; i < u->n; i++) {
-        h[i].load = m->per_det > 0 ? (m->w[1 - i] * gain[i] - m->w12 * gain[1 - i]) * m->per_det : gain[i] * m->mn[i];
-        if (u->n > 1 && !(m->per_det > 0)) h[i].load *= 0.5;
+    for (int i = 0; i < contact->n; i++) {
+        hit[i].load = m->per_det > 0 ? (m->w[1 - i] * gain[i] - m->w12 * gain[1 - i]) * m->per_det : gain[i] * m->mn[i];
+        if (contact->n > 1 && !(m->per_det > 0)) hit[i].load *= 0.5;
     }
 }
 
 /// The same of the ice, over a step.
-static void take_resistance(bt_hit *h, const resistance *r, double dt)
+static void take_resistance(bt_hit *hit, const resistance *ice, double dt)
 {
-    h->touch = dt * r->touch, h->ramp = dt * dt * r->ramp, h->kink = r->kink / dt;
-    h->force = dt * r->force, h->slope = dt * dt * r->slope, h->work = r->work;
+    hit->touch = dt * ice->touch, hit->ramp = dt * dt * ice->ramp, hit->kink = ice->kink / dt;
+    hit->force = dt * ice->force, hit->slope = dt * dt * ice->slope, hit->work = ice->work;
 }
 
 /// Work of crushing is the energy lost. What the loads give is borne without a way.
-static void bound_hit(bt_limit *l, int i, const bt_hit *h, double place, double most)
+static void bound_hit(bt_limit *limit, int i, const bt_hit *hit, double place, double most)
 {
-    l->flat[i] = bt_min(l->flat[i], bt_max(0, h->load * (h->before - place) / (h->before + place)));
-    l->most[i] = bt_min(l->most[i], most);
-    l->rise->hit[i] = *h;
+    limit->flat[i] = bt_min(limit->flat[i], bt_max(0, hit->load * (hit->before - place) / (hit->before + place)));
+    limit->most[i] = bt_min(limit->most[i], most);
+    limit->rise->hit[i] = *hit;
 }
 
 /// The mean force over the way.
-static void bound_push(bt_limit *l, int i, const resistance *r, double way, double dt)
+static void bound_push(bt_limit *limit, int i, const resistance *ice, double way, double dt)
 {
-    const double flat = dt * r->touch;
-    l->flat[i] = bt_min(l->flat[i], flat);
-    l->most[i] = bt_min(l->most[i], dt * r->mean);
-    l->rise->base[i] = bt_min(l->flat[i], flat);
-    l->rise->slope[i] = dt * dt * (r->mean - r->touch) / way;
+    const double flat = dt * ice->touch;
+    limit->flat[i] = bt_min(limit->flat[i], flat);
+    limit->most[i] = bt_min(limit->most[i], dt * ice->mean);
+    limit->rise->base[i] = bt_min(limit->flat[i], flat);
+    limit->rise->slope[i] = dt * dt * (ice->mean - ice->touch) / way;
 }
 
-static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
     enum { LOOKS = 4 };
-    const bt_bodies *s = &w->bodies;
-    const bt_contact *u = &t->contacts[j];
-    bt_gaps *g = &t->gaps[j];
-    bt_limit *l = &t->laws.limits[j];
-    const double h = thickness_of(s, m->a, m->b), dt = w->par.dt, *own = w->par.law_own[BT_LAW_CRUSHING];
-    const double line = own[BT_CRUSH_PRESSURE] * h, slop = w->par.slop;
-    const bt_mass mass = bt_mass_of(u, s->inv);
-    const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
+    const bt_bodies *bodies = &world->bodies;
+    const bt_contact *contact = &cell->contacts[j];
+    bt_gaps *gaps = &cell->gaps[j];
+    bt_limit *limit = &cell->laws.limits[j];
+    const double h = thickness_of(bodies, manifold->a, manifold->b), dt = world->par.dt,
+                 *own = world->par.law_own[BT_LAW_CRUSHING];
+    const double line = own[BT_CRUSH_PRESSURE] * h, slop = world->par.slop;
+    const bt_mass mass = bt_mass_of(contact, bodies->inv);
+    const bt_memory names = bt_law_names(world, pair, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
-    const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
-    if (!rafts) inherit(t, &names, m, l);
-    for (int i = 0; i < m->n_points; i++) g->gap[i] += l->rise->depth[i];
-    const bt_closing c = bt_law_closing(w, t, j, m);
-    const double least = own[BT_CRUSH_LEAST] * h / c.n, least_way = bt_max(LEAST_WAY * w->par.size, 2 * slop);
+    const bool rafts = limit->record[BT_LAW_RAFTING] >= 0;
+    if (!rafts) inherit(cell, &names, manifold, limit);
+    for (int i = 0; i < manifold->n_points; i++) gaps->gap[i] += limit->rise->depth[i];
+    const bt_closing closing = bt_law_closing(world, cell, j, manifold);
+    const double least = own[BT_CRUSH_LEAST] * h / closing.n, least_way = bt_max(LEAST_WAY * world->par.size, 2 * slop);
     bt_hit hits[2] = {0};
     double place[2] = {0}, in[2] = {0};
     bool strikes[2] = {false};
-    approach_of(w, u, &mass, hits);
-    for (int i = 0; i < m->n_points; i++) {
-        place[i] = bt_max(g->gap[i], 0) / dt;
-        strikes[i] = !rafts && !(bt_pair_restitution(s, m->a, m->b) > 0) && c.point[i] &&
-                     hits[i].before > bt_max(place[i], w->par.rest_speed);
+    approach_of(world, contact, &mass, hits);
+    for (int i = 0; i < manifold->n_points; i++) {
+        place[i] = bt_max(gaps->gap[i], 0) / dt;
+        strikes[i] = !rafts && !(bt_pair_restitution(bodies, manifold->a, manifold->b) > 0) && closing.point[i] &&
+                     hits[i].before > bt_max(place[i], world->par.rest_speed);
     }
     double area[2];
-    const bt_patch now = bt_law_patch(w, p->part, m, c.gap + slop, &area[0]);
-    const double free_way = bt_max(dt * c.approach - c.gap, least_way);
+    const bt_patch now = bt_law_patch(world, pair->part, manifold, closing.gap + slop, &area[0]);
+    const double free_way = bt_max(dt * closing.approach - closing.gap, least_way);
     double way = free_way;
-    resistance r[2], found[2];
+    resistance ice[2], found[2];
     for (int look = 0; look < LOOKS; look++) {
-        const bt_patch then = bt_law_patch(w, p->part, m, c.gap + way, &area[1]);
+        const bt_patch then = bt_law_patch(world, pair->part, manifold, closing.gap + way, &area[1]);
         double length[2][2], all = now.length + then.length;
-        for (int i = 0; i < m->n_points; i++) {
-            const double share = bt_law_share(m, i, now, &c);
-            length[i][0] = now.length * share, length[i][1] = then.length * bt_law_share(m, i, then, &c);
+        for (int i = 0; i < manifold->n_points; i++) {
+            const double share = bt_law_share(manifold, i, now, &closing);
+            length[i][0] = now.length * share, length[i][1] = then.length * bt_law_share(manifold, i, then, &closing);
             const double part = all > 0 ? (length[i][0] + length[i][1]) / all : 0, first = area[0] * share;
             found[i] = resistance_of(length[i], (double[2]){first, first + (area[1] - area[0]) * part}, least, line,
                                      slop, way);
-            if (look == 0) r[i] = found[i];
+            if (look == 0) ice[i] = found[i];
             take_resistance(&hits[i], &found[i], dt);
         }
         if ((!strikes[0] && !strikes[1]) || !(way > least_way / NEAR)) break;
-        collide(&mass, hits, place, found, m->n_points, dt, in);
+        collide(&mass, hits, place, found, manifold->n_points, dt, in);
         double deep = least_way;
-        for (int i = 0; i < m->n_points; i++)
+        for (int i = 0; i < manifold->n_points; i++)
             if (strikes[i]) deep = bt_max(deep, isinf(found[i].kink) ? way : dt * in[i]);
         if (!(deep < NEAR * way)) break;
         way = deep;
     }
-    for (int i = 0; i < m->n_points; i++) {
+    for (int i = 0; i < manifold->n_points; i++) {
         // Loads beyond the limit drive the point in ever faster: no stop to find the energy of.
         if (strikes[i] && hits[i].load * hits[i].before < bt_hit_work(&hits[i], hits[i].before - place[i]))
-            bound_hit(l, i, &hits[i], place[i], dt * r[i].mean);
-        else bound_push(l, i, &r[i], free_way, dt);
+            bound_hit(limit, i, &hits[i], place[i], dt * ice[i].mean);
+        else bound_push(limit, i, &ice[i], free_way, dt);
     }
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-static bool gives_way(const bt_contact *u, const bt_limit *l, int i) { return u->ln[i] >= l->flat[i]; }
-
-static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
+static bool gives_way(const bt_contact *contact, const bt_limit *limit, int i)
 {
-    t->laws.limits[j].rise->depth[i] += t->laws.limits[j].grown[i];
-    bt_sum_add(&number[CRUSHED_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
+    return contact->ln[i] >= limit->flat[i];
+}
+
+static void give_way(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *number)
+{
+    cell->laws.limits[j].rise->depth[i] += cell->laws.limits[j].grown[i];
+    bt_sum_add(&number[CRUSHED_WORK], -bt_contacts_normal_work(world, &cell->contacts[j], i));
     bt_sum_add(&number[CRUSHING], 1);
 }
 
 /// Where there is room, and the record does not have that feature yet.
-static void keep_depth(bt_memory *r, uint32_t feature, double depth, bool unseen)
+static void keep_depth(bt_memory *memory, uint32_t feature, double depth, bool unseen)
 {
-    for (int i = 0; i < r->n_points; i++)
-        if (r->feature[i] == feature) return;
-    if (r->n_points == 2) return;
-    r->feature[r->n_points] = feature, r->value[r->n_points] = depth, r->value[UNSEEN + r->n_points] = unseen;
-    r->n_points++;
+    for (int i = 0; i < memory->n_points; i++)
+        if (memory->feature[i] == feature) return;
+    if (memory->n_points == 2) return;
+    memory->feature[memory->n_points] = feature, memory->value[memory->n_points] = depth,
+    memory->value[UNSEEN + memory->n_points] = unseen;
+    memory->n_points++;
 }
 
-static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
+static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 {
     (void)number;
-    const bt_contact *u = &t->contacts[j];
-    const bt_limit *l = &t->laws.limits[j];
-    const bt_idx at = l->record[BT_LAW_CRUSHING];
-    if (l->record[BT_LAW_RAFTING] >= 0) return;
+    const bt_contact *contact = &cell->contacts[j];
+    const bt_limit *limit = &cell->laws.limits[j];
+    const bt_idx at = limit->record[BT_LAW_CRUSHING];
+    if (limit->record[BT_LAW_RAFTING] >= 0) return;
     double deepest = 0;
-    for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->rise->depth[i]);
+    for (int i = 0; i < contact->n; i++) deepest = bt_max(deepest, limit->rise->depth[i]);
     if (deepest == 0) return;
-    const uint32_t *feature = t->gaps[j].feature;
-    bt_memory r = bt_law_names(w, &t->search.pairs[u->pair], BT_LAW_CRUSHING);
+    const uint32_t *feature = cell->gaps[j].feature;
+    bt_memory memory = bt_law_names(world, &cell->search.pairs[contact->pair], BT_LAW_CRUSHING);
     // What is crushed or touches; then crushed points that were not found, as deep as before; then the rest.
-    for (int i = 0; i < u->n; i++)
-        if (l->rise->depth[i] > 0 || t->gaps[j].gap[i] <= 0) keep_depth(&r, feature[i], l->rise->depth[i], false);
-    for (int i = 0; at >= 0 && i < t->laws.memory[at].n_points; i++) {
-        const bt_memory *before = &t->laws.memory[at];
-        if (before->value[i] > 0) keep_depth(&r, before->feature[i], before->value[i], true);
+    for (int i = 0; i < contact->n; i++)
+        if (limit->rise->depth[i] > 0 || cell->gaps[j].gap[i] <= 0)
+            keep_depth(&memory, feature[i], limit->rise->depth[i], false);
+    for (int i = 0; at >= 0 && i < cell->laws.memory[at].n_points; i++) {
+        const bt_memory *before = &cell->laws.memory[at];
+        if (before->value[i] > 0) keep_depth(&memory, before->feature[i], before->value[i], true);
     }
-    for (int i = 0; i < u->n; i++) keep_depth(&r, feature[i], l->rise->depth[i], false);
-    bt_law_put(t, at, &r);
+    for (int i = 0; i < contact->n; i++) keep_depth(&memory, feature[i], limit->rise->depth[i], false);
+    bt_law_put(cell, at, &memory);
 }
 
 const bt_law bt_crush_law = {.name = "crushing",

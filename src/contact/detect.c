@@ -52,20 +52,20 @@ static bool same_place(const touch *p, int i, const touch *q, int j, double reac
     return fabs(p->m->nx * dy - p->m->ny * dx) <= reach; // along the surface: their heights differ by half of the gaps
 }
 
-static void drop(bt_manifold *m, int i)
+static void drop(bt_manifold *manifold, int i)
 {
-    if (i + 1 < m->n_points) m->p[i] = m->p[i + 1];
-    m->n_points--;
+    if (i + 1 < manifold->n_points) manifold->p[i] = manifold->p[i + 1];
+    manifold->n_points--;
 }
 
 /// Points that p and q have both: those of q stay, unless that of p is deeper by more than the slop.
-static void settle(const bt_world *w, const touch *p, const touch *q)
+static void settle(const bt_world *world, const touch *p, const touch *q)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     bt_manifold *m = p->m, *o = q->m;
-    const double reach = PLACE * bt_min(bt_min(b->radius[m->a], b->radius[m->b]),
-                                        bt_min(b->radius[o->a], b->radius[o->b])),
-                 deeper = w->par.slop;
+    const double reach = PLACE * bt_min(bt_min(bodies->radius[m->a], bodies->radius[m->b]),
+                                        bt_min(bodies->radius[o->a], bodies->radius[o->b])),
+                 deeper = world->par.slop;
     for (int i = m->n_points - 1; i >= 0; i--)
         for (int j = o->n_points - 1; j >= 0; j--) {
             if (!same_place(p, i, q, j, reach)) continue;
@@ -79,16 +79,16 @@ static void settle(const bt_world *w, const touch *p, const touch *q)
 }
 
 /// The contacts t[n] of one body with the polygons of one outline.
-static void unite(const bt_world *w, const touch *t, size_t n)
+static void unite(const bt_world *world, const touch *t, size_t n)
 {
     // Edges that lie on each other know more than single points: those go first, whatever their order.
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
             if (i != j && t[i].m->n_points == 1 && (t[j].m->n_points == 2 || (t[j].m->n_points == 1 && j < i)))
-                settle(w, &t[i], &t[j]);
+                settle(world, &t[i], &t[j]);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < i; j++)
-            if (t[i].n_points == 2 && t[j].n_points == 2) settle(w, &t[i], &t[j]);
+            if (t[i].n_points == 2 && t[j].n_points == 2) settle(world, &t[i], &t[j]);
 }
 
 static int by_body(const void *p, const void *q)
@@ -97,27 +97,27 @@ static int by_body(const void *p, const void *q)
     return a->body != b->body ? (a->body < b->body ? -1 : 1) : a->place < b->place ? -1 : a->place > b->place;
 }
 
-void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
+void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     touch *t = bt_alloc(n, sizeof *t);
     size_t on_shore = 0;
     for (size_t k = 0, end; k < n; k = end) {
-        const bool shore_a = bt_shore_holds(w, man[k].a), shore_b = bt_shore_holds(w, man[k].b);
+        const bool shore_a = bt_shore_holds(world, man[k].a), shore_b = bt_shore_holds(world, man[k].b);
         end = k + 1;
         if (shore_a || shore_b) {
-            t[on_shore++] = (touch){&man[k], b->gid[shore_a ? man[k].b : man[k].a], k, man[k].n_points, shore_a};
+            t[on_shore++] = (touch){&man[k], bodies->gid[shore_a ? man[k].b : man[k].a], k, man[k].n_points, shore_a};
             continue;
         }
         touch *of_pair = t + on_shore; // until the next one comes
         for (; end < n && man[end].a == man[k].a && man[end].b == man[k].b; end++) {}
         for (size_t i = k; i < end; i++) of_pair[i - k] = (touch){.m = &man[i], .n_points = man[i].n_points};
-        if (end > k + 1) unite(w, of_pair, end - k);
+        if (end > k + 1) unite(world, of_pair, end - k);
     }
     if (on_shore > 0) qsort(t, on_shore, sizeof *t, by_body);
     for (size_t k = 0, end; k < on_shore; k = end) {
         for (end = k + 1; end < on_shore && t[end].body == t[k].body; end++) {}
-        if (end > k + 1) unite(w, t + k, end - k);
+        if (end > k + 1) unite(world, t + k, end - k);
     }
     free(t);
 }
@@ -125,112 +125,115 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
 // --- detection -------------------------------------------------------------------------------------------------------
 
 /// A speed whose margin is the slop, for bodies that may lie deeper than that at rest.
-static double stir(const bt_world *w) { return 0.4 * w->par.slop / w->par.dt; }
+static double stir(const bt_world *world) { return 0.4 * world->par.slop / world->par.dt; }
 
 /// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
-static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
+static void raise(bt_cells *cells, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
-    const bool open = !t->wrap_x && !t->wrap_y; // then the box of the cells is all there is
+    const bool open = !cells->wrap_x && !cells->wrap_y; // then the box of the cells is all there is
     x0 -= 2, x1 += 1, y0 -= 2, y1 += 1;
     if (open) {
-        x0 = x0 > t->low_x ? x0 : t->low_x, x1 = x1 < t->low_x + t->n_x ? x1 : t->low_x + t->n_x - 1;
-        y0 = y0 > t->low_y ? y0 : t->low_y, y1 = y1 < t->low_y + t->n_y ? y1 : t->low_y + t->n_y - 1;
+        x0 = x0 > cells->low_x ? x0 : cells->low_x, x1 = x1 < cells->low_x + cells->n_x
+                                                         ? x1 : cells->low_x + cells->n_x - 1;
+        y0 = y0 > cells->low_y ? y0 : cells->low_y, y1 = y1 < cells->low_y + cells->n_y
+                                                         ? y1 : cells->low_y + cells->n_y - 1;
     }
     for (int32_t y = y0; y <= y1; y++)
         for (int32_t x = x0; x <= x1; x++) {
-            const bt_idx k = open ? t->at[(int64_t)(y - t->low_y) * t->n_x + (x - t->low_x)]
-                                  : bt_cells_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
-            if (k < 0 || !(s > t->bound[k])) continue; // a bound above 0 has woken it
-            bt_cells_wake(t, k);
-            t->bound[k] = s;
+            const bt_idx k = open ? cells->at[(int64_t)(y - cells->low_y) * cells->n_x + (x - cells->low_x)]
+                                  : bt_cells_at(cells, cells->wrap_x == 1 ? 0 : x, cells->wrap_y == 1 ? 0 : y);
+            if (k < 0 || !(s > cells->bound[k])) continue; // a bound above 0 has woken it
+            bt_cells_wake(cells, k);
+            cells->bound[k] = s;
         }
 }
 
 /// Speed s of cell (x, y) into the bounds of the cells it matters to.
-static void spread(bt_cells *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
+static void spread(bt_cells *cells, int32_t x, int32_t y, double s) { raise(cells, x, x, y, y, s); }
 
 /// What a large body that moves, or can be moved, asks of the cells under it and beside it.
-static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
+static double spread_large(bt_world *world, const bt_vel *v, const bt_vel *v2)
 {
-    bt_cells *t = w->cells;
-    const bt_bodies *b = &w->bodies;
+    bt_cells *cells = world->cells;
+    const bt_bodies *bodies = &world->bodies;
     double fastest = 0;
     bool movable = false;
-    for (bt_idx l = t->n_in_cells; l < b->n; l++) {
-        double s = bt_max(bt_bodies_speed(w, l, &v[l]), bt_bodies_speed(w, l, &v2[l]));
-        if (b->disturbed[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, stir(w));
-        movable = movable || b->motion[l] == BT_DYNAMIC;
+    for (bt_idx l = cells->n_in_cells; l < bodies->n; l++) {
+        double s = bt_max(bt_bodies_speed(world, l, &v[l]), bt_bodies_speed(world, l, &v2[l]));
+        if (bodies->disturbed[l] && bodies->motion[l] == BT_DYNAMIC) s = bt_max(s, stir(world));
+        movable = movable || bodies->motion[l] == BT_DYNAMIC;
         if (s == 0) continue;
         fastest = bt_max(fastest, s);
-        const bt_cell_range r = bt_pairs_range(w, l, bt_margin_for(w, s) + t->reach + t->allowance);
-        raise(t, r.x0, r.x1, r.y0, r.y1, s);
+        const bt_cell_range range = bt_pairs_range(world, l, bt_margin_for(world, s) + cells->reach + cells->allowance);
+        raise(cells, range.x0, range.x1, range.y0, range.y1, s);
     }
     return movable ? fastest : 0;
 }
 
 /// Of cell k at both velocities.
-static void find_speed(bt_world *w, bt_idx k, const void *velocities, bt_totals *none)
+static void find_speed(bt_world *world, bt_idx k, const void *velocities, bt_totals *none)
 {
     (void)none;
-    bt_cells *t = w->cells;
+    bt_cells *cells = world->cells;
     const bt_vel *const *v = velocities;
-    const double least = stir(w);
+    const double least = stir(world);
     double s = 0;
-    if (k == t->n - 1) return;
-    const bt_idx end = bt_cells_moves(t, k) ? t->cell[k].end : t->cell[k].first;
-    for (bt_idx i = t->cell[k].first; i < end; i++) {
+    if (k == cells->n - 1) return;
+    const bt_idx end = bt_cells_moves(cells, k) ? cells->cell[k].end : cells->cell[k].first;
+    for (bt_idx i = cells->cell[k].first; i < end; i++) {
         // most floes of a cell that moves rest
-        if (!bt_bodies_drift(w, &v[0][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[0][i]));
-        if (v[1] != v[0] && !bt_bodies_drift(w, &v[1][i])) s = bt_max(s, bt_bodies_speed(w, i, &v[1][i]));
-        if (w->bodies.disturbed[i]) s = bt_max(s, least);
+        if (!bt_bodies_drift(world, &v[0][i])) s = bt_max(s, bt_bodies_speed(world, i, &v[0][i]));
+        if (v[1] != v[0] && !bt_bodies_drift(world, &v[1][i])) s = bt_max(s, bt_bodies_speed(world, i, &v[1][i]));
+        if (world->bodies.disturbed[i]) s = bt_max(s, least);
     }
-    t->speed[k] = s;
+    cells->speed[k] = s;
 }
 
-double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep)
+double bt_contacts_bound(bt_world *world, const bt_vel *v, const bt_vel *v2, bool keep)
 {
-    bt_cells *t = w->cells;
-    const bt_bodies *b = &w->bodies;
-    const bt_idx n = t->n - 1;
+    bt_cells *cells = world->cells;
+    const bt_bodies *bodies = &world->bodies;
+    const bt_idx n = cells->n - 1;
     if (!keep) {
-        for (bt_idx j = 0; j < t->n_busy; j++) {
-            t->bound[t->busy[j]] = 0;
-            t->awake[t->busy[j]] = 0;
+        for (bt_idx j = 0; j < cells->n_busy; j++) {
+            cells->bound[cells->busy[j]] = 0;
+            cells->awake[cells->busy[j]] = 0;
         }
     }
-    const bt_idx n_busy = t->n_busy; // others rest
+    const bt_idx n_busy = cells->n_busy; // others rest
     bt_totals none = {0};
-    bt_phases_busy(w, find_speed, (const bt_vel *const[2]){v, v2}, &none);
+    bt_phases_busy(world, find_speed, (const bt_vel *const[2]){v, v2}, &none);
     double fastest = 0;
     for (bt_idx j = 0; j < n_busy; j++) {
-        const bt_idx k = t->busy[j];
-        if (!(t->speed[k] > 0) || !t->cell[k].own) continue;
-        fastest = bt_max(fastest, t->speed[k]);
-        spread(t, t->cell[k].x, t->cell[k].y, t->speed[k]);
+        const bt_idx k = cells->busy[j];
+        if (!(cells->speed[k] > 0) || !cells->cell[k].own) continue;
+        fastest = bt_max(fastest, cells->speed[k]);
+        spread(cells, cells->cell[k].x, cells->cell[k].y, cells->speed[k]);
     }
-    bt_domain_tell_cells(w, t->speed, spread);
-    const double large = spread_large(w, v, v2);
-    bt_cells_sort_busy(t);
+    bt_domain_tell_cells(world, cells->speed, spread);
+    const double large = spread_large(world, v, v2);
+    bt_cells_sort_busy(cells);
     // The last cell meets floes anywhere: it is made for the fastest of them all.
     bool movable = false;
-    for (bt_idx l = t->n_in_cells; l < b->n; l++) movable = movable || b->motion[l] == BT_DYNAMIC;
+    for (bt_idx l = cells->n_in_cells; l < bodies->n; l++) movable = movable || bodies->motion[l] == BT_DYNAMIC;
     fastest = bt_max(fastest, large);
-    bt_domain_maxima(w, &fastest, 1);
-    if (movable) t->bound[n] = bt_max(t->bound[n], fastest);
+    bt_domain_maxima(world, &fastest, 1);
+    if (movable) cells->bound[n] = bt_max(cells->bound[n], fastest);
     return fastest;
 }
 
-bool bt_contacts_outrun(const bt_world *w)
+bool bt_contacts_outrun(const bt_world *world)
 {
-    const bt_cells *t = w->cells;
+    const bt_cells *cells = world->cells;
     double any = 0;
-    for (bt_idx j = 0; j < t->n_busy && any == 0; j++) {
-        const bt_idx k = t->busy[j];
-        const bt_cell *cell = &t->cell[k];
-        any = cell->own && t->bound[k] > 0 && (!cell->active || !bt_margin_holds(w, cell->margin, t->bound[k]) ||
-                                               2 * w->par.dt * t->bound[k] > bt_margin_most(w));
+    for (bt_idx j = 0; j < cells->n_busy && any == 0; j++) {
+        const bt_idx k = cells->busy[j];
+        const bt_cell *cell = &cells->cell[k];
+        any = cell->own && cells->bound[k] > 0 &&
+              (!cell->active || !bt_margin_holds(world, cell->margin, cells->bound[k]) ||
+                                                   2 * world->par.dt * cells->bound[k] > bt_margin_most(world));
     }
-    bt_domain_maxima(w, &any, 1);
+    bt_domain_maxima(world, &any, 1);
     return any > 0;
 }
 
@@ -240,142 +243,144 @@ typedef struct {
 } thread_scratch;
 
 /// Contacts that several parts of a floe, or pieces of a shore, have found are one.
-static void merge(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
+static void merge(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch)
 {
-    bt_merge_parts(w, s->man, s->n);
+    bt_merge_parts(world, scratch->man, scratch->n);
     size_t kept = 0;
-    for (size_t k = 0; k < s->n; k++) {
-        if (s->man[k].n_points == 0) {
-            t->search.pairs[s->pair[k]].contact = -1;
+    for (size_t k = 0; k < scratch->n; k++) {
+        if (scratch->man[k].n_points == 0) {
+            cell->search.pairs[scratch->pair[k]].contact = -1;
             continue;
         }
-        s->man[kept] = s->man[k];
-        s->pair[kept++] = s->pair[k];
+        scratch->man[kept] = scratch->man[k];
+        scratch->pair[kept++] = scratch->pair[k];
     }
-    s->n = kept;
+    scratch->n = kept;
 }
 
 /// Contacts that a law makes of pairs with a record, in place of those of the outlines, and after them.
-static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
+static void replace(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch)
 {
-    const size_t n = s->n;
+    const size_t n = scratch->n;
     for (int law = 0; law < BT_LAWS; law++) {
-        if (!bt_laws[law]->contact || !bt_law_on(&w->par, law)) continue;
+        if (!bt_laws[law]->contact || !bt_law_on(&world->par, law)) continue;
         for (size_t k = 0; k < n; k++) {
-            bt_pair *p = &t->search.pairs[s->pair[k]];
-            const bt_memory names = bt_law_names(w, p, law);
-            const bt_idx at = bt_law_find(t, &names);
+            bt_pair *pair = &cell->search.pairs[scratch->pair[k]];
+            const bt_memory names = bt_law_names(world, pair, law);
+            const bt_idx at = bt_law_find(cell, &names);
             if (at < 0) continue;
-            bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
-            if (bt_laws[law]->contact(w, p, &t->laws.memory[at], &edge, sheets)) {
-                s->man[k] = edge;
-                s->n++;
+            bt_manifold edge, *sheets = bt_pack_next(scratch, scratch->pair[k]);
+            if (bt_laws[law]->contact(world, pair, &cell->laws.memory[at], &edge, sheets)) {
+                scratch->man[k] = edge;
+                scratch->n++;
             } else {
-                s->man[k] = *sheets;
-                p->contact = -1;
+                scratch->man[k] = *sheets;
+                pair->contact = -1;
             }
         }
     }
 }
 
-static void narrow_phase(bt_world *w, bt_idx k, const void *scratch, bt_totals *none)
+static void narrow_phase(bt_world *world, bt_idx k, const void *scratch, bt_totals *none)
 {
     (void)none;
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     thread_scratch *s = &(*(thread_scratch *const *)scratch)[omp_get_thread_num()];
-    bt_cell *t = &w->cells->cell[k];
-    if (t->laws.n_memory > 0) bt_laws_prune(w, t);
-    bt_pairs_update(w, k, t, t->margin, &s->pairs);
-    bt_pack_begin(&s->pack, 2 * (size_t)t->search.n_pairs); // a pair may have a second contact (replace)
+    bt_cell *cell = &world->cells->cell[k];
+    if (cell->laws.n_memory > 0) bt_laws_prune(world, cell);
+    bt_pairs_update(world, k, cell, cell->margin, &s->pairs);
+    bt_pack_begin(&s->pack, 2 * (size_t)cell->search.n_pairs); // a pair may have a second contact (replace)
     bool several = false; // polygons of one outline
-    const bool near = bt_pairs_near(w, k, t, t->margin);
-    const double far = t->margin + bt_pairs_near_gap(w);
-    for (bt_idx j = 0, n = near ? t->search.n_near : t->search.n_pairs; j < n; j++) {
-        const bt_idx i = near ? t->search.near[j] : j;
-        bt_pair *p = &t->search.pairs[i];
-        const double paths = b->path[p->a] + b->path[p->b];
-        if (paths + t->margin < p->axes.reach) {
-            p->contact = -1;
-            if (!near && !(paths + far < p->axes.reach)) bt_pairs_add_near(t, i);
+    const bool near = bt_pairs_near(world, k, cell, cell->margin);
+    const double far = cell->margin + bt_pairs_near_gap(world);
+    for (bt_idx j = 0, n = near ? cell->search.n_near : cell->search.n_pairs; j < n; j++) {
+        const bt_idx i = near ? cell->search.near[j] : j;
+        bt_pair *pair = &cell->search.pairs[i];
+        const double paths = bodies->path[pair->a] + bodies->path[pair->b];
+        if (paths + cell->margin < pair->axes.reach) {
+            pair->contact = -1;
+            if (!near && !(paths + far < pair->axes.reach)) bt_pairs_add_near(cell, i);
             continue;
         }
-        if (!near) bt_pairs_add_near(t, i);
-        bt_manifold *m = bt_pack_next(&s->pack, i);
-        const int reference_before = p->contact >= 0 ? (int)(t->gaps[p->contact].feature[0] >> 31) : -1;
-        if (!bt_contacts_parts(w, p->a, p->b, p->part, t->margin, reference_before, m, &p->axes)) {
-            p->contact = -1;
+        if (!near) bt_pairs_add_near(cell, i);
+        bt_manifold *manifold = bt_pack_next(&s->pack, i);
+        const int reference_before = pair->contact >= 0 ? (int)(cell->gaps[pair->contact].feature[0] >> 31) : -1;
+        if (!bt_contacts_parts(world, pair->a, pair->b, pair->part, cell->margin, reference_before, manifold,
+                               &pair->axes)) {
+            pair->contact = -1;
             continue;
         }
         s->pack.n++;
-        several = several || p->part[0] || p->part[1] || bt_shore_holds(w, p->a) || bt_shore_holds(w, p->b);
+        several = several || pair->part[0] || pair->part[1] || bt_shore_holds(world, pair->a) ||
+                  bt_shore_holds(world, pair->b);
     }
     if (several) {
-        merge(w, t, &s->pack);
-        t->news = BT_NEW_CONTACTS; // a contact may have given way to one that is farther off
+        merge(world, cell, &s->pack);
+        cell->news = BT_NEW_CONTACTS; // a contact may have given way to one that is farther off
     }
-    if (t->laws.n_memory > 0) replace(w, t, &s->pack);
-    bt_pack_contacts(w, k, &s->pack);
+    if (cell->laws.n_memory > 0) replace(world, cell, &s->pack);
+    bt_pack_contacts(world, k, &s->pack);
 }
 
-static void wake_body(bt_world *w, bt_idx i)
+static void wake_body(bt_world *world, bt_idx i)
 {
-    bt_cells *t = w->cells;
-    if (w->bodies.large[i]) return;
-    const bt_idx k = bt_cells_at(t, w->bodies.cell[i][0], w->bodies.cell[i][1]);
-    t->awake[k] = 1;
-    bt_cells_wake(t, k);
+    bt_cells *cells = world->cells;
+    if (world->bodies.large[i]) return;
+    const bt_idx k = bt_cells_at(cells, world->bodies.cell[i][0], world->bodies.cell[i][1]);
+    cells->awake[k] = 1;
+    bt_cells_wake(cells, k);
 }
 
 /// Cells with bodies that contacts, here or on other ranks, may move; none of a step falls asleep when it is detected
 /// again.
-static void find_awake(bt_world *w)
+static void find_awake(bt_world *world)
 {
-    bt_cells *t = w->cells;
-    for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_cell *cell = &t->cell[t->order[i]];
+    bt_cells *cells = world->cells;
+    for (bt_idx i = 0; i < cells->n_order; i++) {
+        const bt_cell *cell = &cells->cell[cells->order[i]];
         if (cell->phase == BT_COLOURS) {
             for (bt_idx j = 0; j < cell->n_contacts; j++)
-                wake_body(w, cell->contacts[j].a), wake_body(w, cell->contacts[j].b);
+                wake_body(world, cell->contacts[j].a), wake_body(world, cell->contacts[j].b);
             continue;
         }
-        const bt_idx block[4] = {t->order[i], cell->right, cell->above, cell->diagonal};
+        const bt_idx block[4] = {cells->order[i], cell->right, cell->above, cell->diagonal};
         for (int j = 0; j < 4; j++) {
             if (block[j] < 0) continue;
-            t->awake[block[j]] = 1;
-            bt_cells_wake(t, block[j]);
+            cells->awake[block[j]] = 1;
+            bt_cells_wake(cells, block[j]);
         }
     }
-    bt_domain_moved_elsewhere(w, wake_body);
-    bt_cells_sort_busy(t);
+    bt_domain_moved_elsewhere(world, wake_body);
+    bt_cells_sort_busy(cells);
 }
 
-void bt_contacts_detect(bt_world *w, bool again)
+void bt_contacts_detect(bt_world *world, bool again)
 {
     enum { FEW = 8 }; // a cell takes some ten microseconds
-    bt_cells *t = w->cells;
-    t->beside = bt_laws_on(&w->par) ? w->par.slop : 0; // contact/law.h, bt_closing
-    bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
-    for (bt_idx j = 0; j < t->n_busy; j++) {
-        const bt_idx k = t->busy[j];
-        bt_cell *cell = &t->cell[k];
+    bt_cells *cells = world->cells;
+    cells->beside = bt_laws_on(&world->par) ? world->par.slop : 0; // contact/law.h, bt_closing
+    bt_idx *due = bt_alloc((size_t)cells->n_busy, sizeof *due), n_due = 0;
+    for (bt_idx j = 0; j < cells->n_busy; j++) {
+        const bt_idx k = cells->busy[j];
+        bt_cell *cell = &cells->cell[k];
         cell->news = BT_SAME_CONTACTS;
         if (!cell->own) continue;
-        const bool active = t->bound[k] > 0;
+        const bool active = cells->bound[k] > 0;
         if (!active) {
             if (cell->search.pairs || cell->n_contacts) bt_cells_idle(cell);
             cell->active = false;
             continue;
         }
-        if (again && cell->active && bt_margin_holds(w, cell->margin, t->bound[k])) continue;
+        if (again && cell->active && bt_margin_holds(world, cell->margin, cells->bound[k])) continue;
         cell->active = true;
-        cell->margin = bt_margin_for(w, t->bound[k]);
+        cell->margin = bt_margin_for(world, cells->bound[k]);
         cell->news = again ? BT_MORE_CONTACTS : BT_NEW_CONTACTS;
         due[n_due++] = k;
     }
     // within a team of the caller the pass is that one thread's, which keeps its number
     const int team = omp_get_num_threads(), most = omp_get_max_threads(), threads = team > most ? team : most;
     thread_scratch *scratch = bt_alloc((size_t)threads, sizeof *scratch);
-    bt_phases_listed(w, due, n_due, FEW, narrow_phase, &scratch, &(bt_totals){0});
+    bt_phases_listed(world, due, n_due, FEW, narrow_phase, &scratch, &(bt_totals){0});
     for (int i = 0; i < threads; i++) {
         bt_pair_scratch_free(&scratch[i].pairs);
         bt_pack_scratch_free(&scratch[i].pack);
@@ -383,81 +388,83 @@ void bt_contacts_detect(bt_world *w, bool again)
     free(scratch);
     free(due);
     const double t0 = bt_clock();
-    bt_phases_order(w);
-    w->stats.phases.colour += bt_clock() - t0;
-    bt_domain_select(w);
-    find_awake(w);
-    bt_cells_leave(t);
+    bt_phases_order(world);
+    world->stats.phases.colour += bt_clock() - t0;
+    bt_domain_select(world);
+    find_awake(world);
+    bt_cells_leave(cells);
 }
 
-double bt_contacts_overlap(bt_world *w)
+double bt_contacts_overlap(bt_world *world)
 {
-    bt_cells_begin(w); // from here on and again below, bodies may lie elsewhere
-    if (bt_cells_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false))))
-        bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
-    bt_contacts_detect(w, false);
-    const bt_cells *t = w->cells;
+    bt_cells_begin(world); // from here on and again below, bodies may lie elsewhere
+    if (bt_cells_update(world,
+                        bt_margin_for(world, bt_contacts_bound(world, world->bodies.vel, world->bodies.vel, false))))
+        bt_contacts_bound(world, world->bodies.vel, world->bodies.vel, false);
+    bt_contacts_detect(world, false);
+    const bt_cells *cells = world->cells;
     double deepest = 0;
-    for (bt_idx k = 0; k < t->n; k++)
-        if (t->cell[k].own) deepest = bt_max(deepest, t->cell[k].overlap);
-    bt_domain_maxima(w, &deepest, 1);
+    for (bt_idx k = 0; k < cells->n; k++)
+        if (cells->cell[k].own) deepest = bt_max(deepest, cells->cell[k].overlap);
+    bt_domain_maxima(world, &deepest, 1);
     return deepest;
 }
 
 /// The deeper of two; of equals the one with the lower ids, so that no order of threads is seen.
-static void deeper(bt_overlaps *to, const bt_overlaps *o)
+static void deeper(bt_overlaps *to, const bt_overlaps *overlaps)
 {
-    to->pairs += o->pairs;
-    const bool same = o->deepest == to->deepest, first = o->a < to->a || (o->a == to->a && o->b < to->b);
-    if (!(o->deepest > to->deepest || (same && o->pairs > 0 && first))) return;
-    to->deepest = o->deepest;
-    to->a = o->a, to->b = o->b;
+    to->pairs += overlaps->pairs;
+    const bool same = overlaps->deepest == to->deepest, first = overlaps->a < to->a ||
+                                                                (overlaps->a == to->a && overlaps->b < to->b);
+    if (!(overlaps->deepest > to->deepest || (same && overlaps->pairs > 0 && first))) return;
+    to->deepest = overlaps->deepest;
+    to->a = overlaps->a, to->b = overlaps->b;
 }
 
 /// Overlaps in the pairs of one cell. A body of several parts is one body.
-static bt_overlaps overlaps_of(const bt_world *w, const bt_cell *t, double allowed)
+static bt_overlaps overlaps_of(const bt_world *world, const bt_cell *cell, double allowed)
 {
     bt_overlaps all = {0}, pair = {0};
-    for (bt_idx i = 0; i < t->search.n_pairs; i++) {
-        const bt_pair *q = &t->search.pairs[i];
-        const bt_gid a = w->bodies.gid[q->a], b = w->bodies.gid[q->b];
+    for (bt_idx i = 0; i < cell->search.n_pairs; i++) {
+        const bt_pair *q = &cell->search.pairs[i];
+        const bt_gid a = world->bodies.gid[q->a], b = world->bodies.gid[q->b];
         if (pair.a != a || pair.b != b) {
             deeper(&all, &pair);
             pair = (bt_overlaps){.a = a, .b = b};
         }
-        bt_manifold m;
-        if (!bt_contacts_parts(w, q->a, q->b, q->part, 0, -1, &m, NULL)) continue;
-        for (int j = 0; j < m.n_points; j++) pair.deepest = bt_max(pair.deepest, 0 - m.p[j].gap);
+        bt_manifold manifold;
+        if (!bt_contacts_parts(world, q->a, q->b, q->part, 0, -1, &manifold, NULL)) continue;
+        for (int j = 0; j < manifold.n_points; j++) pair.deepest = bt_max(pair.deepest, 0 - manifold.p[j].gap);
         pair.pairs = pair.deepest > allowed;
     }
     deeper(&all, &pair);
     return all;
 }
 
-bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
+bt_overlaps bt_world_overlaps(bt_world *world, double allowed)
 {
-    bt_cells_begin(w);
-    bt_cells_update(w, w->par.slop);
-    const bt_cells *t = w->cells;
+    bt_cells_begin(world);
+    bt_cells_update(world, world->par.slop);
+    const bt_cells *cells = world->cells;
     bt_overlaps all = {0};
     // On lists of its own, a cell at a time: neither the contacts of the step nor the memory for all lists at once.
-#pragma omp parallel if (BT_MANY(t->n, BT_FEW_CELLS))
+#pragma omp parallel if (BT_MANY(cells->n, BT_FEW_CELLS))
     {
-        bt_pair_scratch s = {0};
+        bt_pair_scratch scratch = {0};
 #pragma omp for schedule(dynamic, 4)
-        for (bt_idx k = 0; k < t->n; k++) {
-            if (!t->cell[k].own) continue;
-            bt_cell own = t->cell[k];
+        for (bt_idx k = 0; k < cells->n; k++) {
+            if (!cells->cell[k].own) continue;
+            bt_cell own = cells->cell[k];
             own.search.pairs = NULL;
             own.search.n_pairs = own.search.cap_pairs = 0;
             own.search.listed = false;
-            bt_pairs_update(w, k, &own, 0, &s);
-            const bt_overlaps here = overlaps_of(w, &own, allowed);
+            bt_pairs_update(world, k, &own, 0, &scratch);
+            const bt_overlaps here = overlaps_of(world, &own, allowed);
 #pragma omp critical
             deeper(&all, &here);
             free(own.search.pairs);
         }
-        bt_pair_scratch_free(&s);
+        bt_pair_scratch_free(&scratch);
     }
     return all;
 }

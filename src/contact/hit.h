@@ -20,15 +20,16 @@ typedef struct bt_hit {
 } bt_hit;
 
 /// E(s), J.
-static inline double bt_hit_work(const bt_hit *h, double s)
+static inline double bt_hit_work(const bt_hit *hit, double s)
 {
-    return s <= h->kink ? s * (h->touch + 0.5 * h->ramp * s) : h->work + s * (h->force + 0.5 * h->slope * s);
+    return s <= hit->kink ? s * (hit->touch + 0.5 * hit->ramp * s)
+                          : hit->work + s * (hit->force + 0.5 * hit->slope * s);
 }
 
 /// L at u = place + s, N s.
-static inline double bt_hit_bound(const bt_hit *h, double place, double s)
+static inline double bt_hit_bound(const bt_hit *hit, double place, double s)
 {
-    return h->load + 2 * (bt_hit_work(h, s) - h->load * (place + s)) / (h->before + place + s);
+    return hit->load + 2 * (bt_hit_work(hit, s) - hit->load * (place + s)) / (hit->before + place + s);
 }
 
 /// The larger root of a s² + b s = k, 0 where there is none above 0.
@@ -40,13 +41,13 @@ static inline double bt_hit_root(double a, double b, double k)
 }
 
 /// s at which L and (free − u)/w meet, m/s; 0 where the point does not come in.
-static inline double bt_hit_end(const bt_hit *h, double place, double free, double w)
+static inline double bt_hit_end(const bt_hit *hit, double place, double free, double w)
 {
-    const double sum = h->before + place, to = (free - place) / w - h->load;
-    const double b = sum / w - to - 2 * h->load, k = to * sum + 2 * h->load * place;
-    const double held = bt_hit_root(1 / w + h->ramp, b + 2 * h->touch, k);
-    if (held <= h->kink) return held;
-    return bt_hit_root(1 / w + h->slope, b + 2 * h->force, k - 2 * h->work);
+    const double sum = hit->before + place, to = (free - place) / w - hit->load;
+    const double b = sum / w - to - 2 * hit->load, k = to * sum + 2 * hit->load * place;
+    const double held = bt_hit_root(1 / w + hit->ramp, b + 2 * hit->touch, k);
+    if (held <= hit->kink) return held;
+    return bt_hit_root(1 / w + hit->slope, b + 2 * hit->force, k - 2 * hit->work);
 }
 
 #endif

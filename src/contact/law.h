@@ -104,7 +104,7 @@ typedef struct bt_law {
     const char *keys;  ///< section of the case, NULL = none
     const char *what;  ///< one sentence for people
     /// own[] from the case: bt_params.law_own. Not of the rigid law, as all that follows
-    void (*setup)(const bt_case *c, double own[BT_MAX_CONTACT_OWN]);
+    void (*setup)(const bt_case *input, double own[BT_MAX_CONTACT_OWN]);
     bool (*on)(const double *own);
     bool rises; ///< some bounds have a rising part: contacts with them are not swept in batches (src/solve/batch.h)
     const bt_law_number *numbers; ///< [n_numbers]
@@ -112,29 +112,30 @@ typedef struct bt_law {
     const bt_law_total *totals;   ///< [n_totals], in the order of the summary
     int n_totals;
     /// To this pair?
-    bool (*applies)(const bt_world *w, bt_idx a, bt_idx b);
-    /// What touches instead of the outlines for a pair with record r: an edge, if true, and sheets (contact/raft.h).
+    bool (*applies)(const bt_world *world, bt_idx a, bt_idx b);
+    /// What touches instead of the outlines for a pair with the record: an edge, if true, and sheets (contact/raft.h).
     /// NULL = the outlines.
-    bool (*contact)(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets);
-    /// Narrow the bounds of contact j of cell t, made from manifold m of pair p; its gaps become those between the
-    /// surfaces that are left.
-    void (*bound)(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
+    bool (*contact)(const bt_world *world, const bt_pair *pair, const bt_memory *memory, bt_manifold *edge,
+                    bt_manifold *sheets);
+    /// Narrow the bounds of contact j of the cell, made from the manifold of the pair; its gaps become those between
+    /// the surfaces that are left.
+    void (*bound)(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
     /// Brings the record up to date with the poses; does it stay?
-    bool (*keeps)(const bt_world *w, bt_memory *r);
+    bool (*keeps)(const bt_world *world, bt_memory *memory);
     /// Is point i of the contact at the bound of this law?
-    bool (*gives_way)(const bt_contact *u, const bt_limit *l, int i);
+    bool (*gives_way)(const bt_contact *contact, const bt_limit *limit, int i);
     /// It is, and approaches: limits[j].grown[i] has been set.
     /// number, here and below: [n_numbers] the sums of the law's numbers.
-    void (*give_way)(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number);
+    void (*give_way)(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *number);
     /// After the solve: into the records of the cell.
-    void (*remember)(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number);
+    void (*remember)(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number);
     /// A record into the sums; returns what the law wants the largest of. Of all records, also where nothing moves.
-    double (*count)(const bt_world *w, const bt_memory *r, bt_sum *number);
+    double (*count)(const bt_world *world, const bt_memory *memory, bt_sum *number);
     // texts in new memory, or NULL for nothing to say
     /// A line of `bergtow check`: what the law means for floes of this thickness and mean size, m.
-    char *(*check)(const bt_case *c, double thickness, double size);
+    char *(*check)(const bt_case *input, double thickness, double size);
     /// A line of the table at the end of a run: total [n_totals], area of all ice, m².
-    char *(*result)(const bt_case *c, const bt_total_value *total, double ice_area);
+    char *(*result)(const bt_case *input, const bt_total_value *total, double ice_area);
     /// A doubt about these numbers; size: mean of the floes, m.
     void (*warn)(const bt_total_value *total, double size, bt_errors *warnings);
 } bt_law;
@@ -150,36 +151,36 @@ int bt_law_first_number(int law);
 /// And their totals.
 int bt_law_first_total(int law);
 /// Numbers of the laws from a case.
-void bt_laws_setup(const bt_case *c, bt_params *p);
+void bt_laws_setup(const bt_case *input, bt_params *par);
 
 /// Is a law on whose bounds rise?
-bool bt_laws_rise(const bt_params *p);
+bool bt_laws_rise(const bt_params *par);
 
 /// Does any law bound contacts in this world?
-bool bt_laws_on(const bt_params *p);
+bool bt_laws_on(const bt_params *par);
 /// Does the law of this number bound contacts in this world? False where there is none of it.
-bool bt_law_on(const bt_params *p, int law);
+bool bt_law_on(const bt_params *par, int law);
 /// And those of this pair?
-bool bt_law_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
+bool bt_law_applies(const bt_world *world, int law, bt_idx a, bt_idx b);
 
-/// At the start of a detection: forget what cell t need not remember any more.
-void bt_laws_prune(const bt_world *w, bt_cell *t);
+/// At the start of a detection: forget what the cell need not remember any more.
+void bt_laws_prune(const bt_world *world, bt_cell *cell);
 
 /// Room for the bounds of the contacts of a cell.
-void bt_laws_reserve(bt_cell *t);
+void bt_laws_reserve(bt_cell *cell);
 
-/// Bounds of contact j of cell t, made from manifold m of pair p.
-void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
+/// Bounds of contact j of the cell, made from the manifold of the pair.
+void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
 
 /// Collective. After the solve: what gives way, into the records; work, numbers and depths into stats.
-void bt_laws_grow(bt_world *w);
+void bt_laws_grow(bt_world *world);
 
 /// A flat bound c of this law on point i, whatever bounds it now, N s.
-static inline void bt_law_narrow(bt_limit *l, int i, double c, int law)
+static inline void bt_law_narrow(bt_limit *limit, int i, double c, int law)
 {
-    if (c < l->cap[i]) l->cap[i] = c, l->by[i] = (uint8_t)law;
-    l->flat[i] = bt_min(l->flat[i], c);
-    l->most[i] = bt_min(l->most[i], c);
+    if (c < limit->cap[i]) limit->cap[i] = c, limit->by[i] = (uint8_t)law;
+    limit->flat[i] = bt_min(limit->flat[i], c);
+    limit->most[i] = bt_min(limit->most[i], c);
 }
 
 #endif

@@ -7,13 +7,13 @@
 #include "contact/law.h"
 
 /// Is the pair of a record still near: at most BT_LAW_MEMORY mean floe sizes apart?
-bool bt_law_near(const bt_world *w, const bt_memory *r);
+bool bt_law_near(const bt_world *world, const bt_memory *memory);
 
-/// Record of the pair of names.a, b, part, law in cell t, −1 = none.
-bt_idx bt_law_find(const bt_cell *t, const bt_memory *names);
+/// Record of the pair of names.a, b, part, law in the cell, −1 = none.
+bt_idx bt_law_find(const bt_cell *cell, const bt_memory *names);
 
-/// Write record r: over the one at `at`, or, −1, as a new one; new ones are in their order after bt_laws_grow.
-void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r);
+/// Write the record: over the one at `at`, or, −1, as a new one; new ones are in their order after bt_laws_grow.
+void bt_law_put(bt_cell *cell, bt_idx at, const bt_memory *memory);
 
 /// Points of a contact that take part in this step: those that close by the velocities before the contacts, and those
 /// that are no more than a slop farther than the nearest one, whatever closes them.
@@ -24,13 +24,16 @@ typedef struct bt_closing {
     double approach; ///< the fastest of those that take part, at least 0, m/s
 } bt_closing;
 
-/// Those of contact j of cell t, made from manifold m, by its gaps as they are now. Any other point is there or not as
-/// the margin of the search has it, and with it the speeds of bodies nearby: what a contact bears must not depend on
+/// Those of contact j of the cell, made from the manifold, by its gaps as they are now. Any other point is there or not
+/// as the margin of the search has it, and with it the speeds of bodies nearby: what a contact bears must not depend on
 /// it.
-bt_closing bt_law_closing(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m);
+bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold);
 
 /// Place of point i along the tangent, from the centroid of a, m.
-static inline double bt_law_along(const bt_manifold *m, int i) { return m->nx * m->p[i].ra[1] - m->ny * m->p[i].ra[0]; }
+static inline double bt_law_along(const bt_manifold *manifold, int i)
+{
+    return manifold->nx * manifold->p[i].ra[1] - manifold->ny * manifold->p[i].ra[0];
+}
 
 /// Part of the tangent line that a contact bears on.
 typedef struct bt_patch {
@@ -39,29 +42,31 @@ typedef struct bt_patch {
 
 /// Where a and b overlap when b has come nearer by `way` along the normal, seen along the tangent; *area: of the
 /// overlap, m².
-bt_patch bt_law_patch(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way, double *area);
+bt_patch bt_law_patch(const bt_world *world, const uint16_t part[2], const bt_manifold *manifold, double way,
+                      double *area);
 
 /// Share of a patch that falls to point i of the manifold, of those that take part: uniform pressure on it, as forces
 /// at the points. NaN: to each alike.
-double bt_law_share(const bt_manifold *m, int i, bt_patch p, const bt_closing *c);
+double bt_law_share(const bt_manifold *manifold, int i, bt_patch patch, const bt_closing *closing);
 
-/// Names of the record that a law has, or would have, of pair p.
-static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int law)
+/// Names of the record that a law has, or would have, of the pair.
+static inline bt_memory bt_law_names(const bt_world *world, const bt_pair *pair, int law)
 {
-    const bt_gid *gid = w->bodies.gid;
-    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .law = (uint16_t)law};
+    const bt_gid *gid = world->bodies.gid;
+    return (bt_memory){.a = gid[pair->a], .b = gid[pair->b], .part = {pair->part[0], pair->part[1]},
+                       .law = (uint16_t)law};
 }
 
-/// Work of the impulses of contact u in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
+/// Work of the impulses of the contact in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
 /// the work of prescribed motion. w* is the velocity without contacts, with the tow line's impulse: of two impulses
 /// that act at once the line's comes first, or the pull of the line into the ice would count as work of the ice.
-double bt_contacts_work(const bt_world *w, const bt_contact *u);
+double bt_contacts_work(const bt_world *world, const bt_contact *contact);
 
 /// The part of it of the normal impulse of point i, J.
-double bt_contacts_normal_work(const bt_world *w, const bt_contact *u, int i);
+double bt_contacts_normal_work(const bt_world *world, const bt_contact *contact, int i);
 
-/// The most that contact u can have given in a step whose residual this is, m/s, J: of an exact solution λ·w <= 0, and
-/// λᵀ½(w* + w2) = λᵀw2 − ½ λᵀWλ <= Σ |λ| residual.
-double bt_contacts_unsolved_work(const bt_contact *u, double residual);
+/// The most that the contact can have given in a step whose residual this is, m/s, J: of an exact solution λ·w <= 0,
+/// and λᵀ½(w* + w2) = λᵀw2 − ½ λᵀWλ <= Σ |λ| residual.
+double bt_contacts_unsolved_work(const bt_contact *contact, double residual);
 
 #endif

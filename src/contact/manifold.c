@@ -38,21 +38,21 @@ typedef struct {
     double x, y;         ///< centroid in the frame of body a
 } polygon;
 
-static polygon polygon_of(const bt_bodies *b, bt_idx i, int part, double x, double y)
+static polygon polygon_of(const bt_bodies *bodies, bt_idx i, int part, double x, double y)
 {
-    int64_t first = b->offset[i] + part;
+    int64_t first = bodies->offset[i] + part;
     // The whole of a convex body without a look at its marks: they would be one more line of memory in every pair.
-    const int count = part == 0 ? (int)(b->offset[i + 1] - first) : b->mark[first].count;
-    return (polygon){b->outline + 2 * first, b->per_length + first, count, x, y};
+    const int count = part == 0 ? (int)(bodies->offset[i + 1] - first) : bodies->mark[first].count;
+    return (polygon){bodies->outline + 2 * first, bodies->per_length + first, count, x, y};
 }
 
 /// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a
 /// floe's memory.
-BT_INLINE void edge_normal(const polygon *p, int i, double *nx, double *ny)
+BT_INLINE void edge_normal(const polygon *shape, int i, double *nx, double *ny)
 {
-    const double *v = p->v + 2 * i, *next = p->v + 2 * (i + 1 < p->count ? i + 1 : 0);
-    *nx = (next[1] - v[1]) * p->per_length[i];
-    *ny = (v[0] - next[0]) * p->per_length[i];
+    const double *v = shape->v + 2 * i, *next = shape->v + 2 * (i + 1 < shape->count ? i + 1 : 0);
+    *nx = (next[1] - v[1]) * shape->per_length[i];
+    *ny = (v[0] - next[0]) * shape->per_length[i];
 }
 
 /// An edge: how far it separates the other polygon from its own, and its outward unit normal.
@@ -63,15 +63,15 @@ typedef struct { double s, nx, ny; int i; } edge;
 /// it rules out two edges of three.
 BT_INLINE edge edge_of(const polygon *p, int i, const polygon *q, double floor)
 {
-    edge e = {.i = i};
-    edge_normal(p, i, &e.nx, &e.ny);
-    e.s = e.nx * (q->x - p->x - p->v[2 * i]) + e.ny * (q->y - p->y - p->v[2 * i + 1]);
-    if (e.s < floor) return e;
+    edge side = {.i = i};
+    edge_normal(p, i, &side.nx, &side.ny);
+    side.s = side.nx * (q->x - p->x - p->v[2 * i]) + side.ny * (q->y - p->y - p->v[2 * i + 1]);
+    if (side.s < floor) return side;
     const double *v = q->v, *end = v + 2 * q->count;
-    double least = e.nx * v[0] + e.ny * v[1];
-    for (v += 2; v < end; v += 2) least = bt_min(e.nx * v[0] + e.ny * v[1], least);
-    e.s += least;
-    return e;
+    double least = side.nx * v[0] + side.ny * v[1];
+    for (v += 2; v < end; v += 2) least = bt_min(side.nx * v[0] + side.ny * v[1], least);
+    side.s += least;
+    return side;
 }
 
 /// The edge of p that separates q most, exact if it does so by `floor`, and its lead on any other edge; stops at the
@@ -81,9 +81,9 @@ BT_INLINE edge best_edge(const polygon *p, const polygon *q, double enough, doub
     edge best = {.s = -INFINITY};
     double second = -INFINITY;
     for (int i = 0; i < p->count && !(best.s > enough); i++) {
-        const edge e = edge_of(p, i, q, floor);
-        second = bt_max(second, bt_min(e.s, best.s));
-        if (e.s > best.s) best = e;
+        const edge side = edge_of(p, i, q, floor);
+        second = bt_max(second, bt_min(side.s, best.s));
+        if (side.s > best.s) best = side;
     }
     *lead = best.s < floor ? 0 : best.s - second;
     return best;
@@ -98,10 +98,10 @@ static double point_segment(const double *x, const double *e, const double *f, d
     return rx * rx + ry * ry;
 }
 
-static void world_vertex(const polygon *p, int i, double out[2])
+static void world_vertex(const polygon *shape, int i, double out[2])
 {
-    out[0] = p->v[2 * i] + p->x;
-    out[1] = p->v[2 * i + 1] + p->y;
+    out[0] = shape->v[2 * i] + shape->x;
+    out[1] = shape->v[2 * i + 1] + shape->y;
 }
 
 /// Nearest features of two separated polygons, by trying every vertex against every edge. Returns true when two
@@ -133,34 +133,34 @@ static bool nearest_features(const polygon *p, const polygon *q, int *ip, int *i
     return corners;
 }
 
-static void set_point(bt_manifold *m, double x, double y, double gap, double dx, double dy, uint32_t feature)
+static void set_point(bt_manifold *manifold, double x, double y, double gap, double dx, double dy, uint32_t feature)
 {
     // (x, y): the point midway between the surfaces, in the frame of a; (dx, dy): centroid of b.
-    bt_point *p = &m->p[m->n_points++];
+    bt_point *p = &manifold->p[manifold->n_points++];
     *p = (bt_point){.gap = gap, .ra = {x, y}, .rb = {x - dx, y - dy}, .feature = feature};
 }
 
-BT_INLINE double cosine(const polygon *q, int j, const edge *e)
+BT_INLINE double cosine(const polygon *shape, int j, const edge *side)
 {
     double nx, ny;
-    edge_normal(q, j, &nx, &ny);
-    return e->nx * nx + e->ny * ny;
+    edge_normal(shape, j, &nx, &ny);
+    return side->nx * nx + side->ny * ny;
 }
 
-/// Edge of q that faces another one most squarely. It is the guess, unless that is -1, if the edges beside it face it
-/// less so: normals turn one way around an outline.
-BT_INLINE int facing_edge(const polygon *q, const edge *e, int guess)
+/// Edge of `shape` that faces another one most squarely. It is the guess, unless that is -1, if the edges beside it
+/// face it less so: normals turn one way around an outline.
+BT_INLINE int facing_edge(const polygon *shape, const edge *side, int guess)
 {
     if (guess >= 0) {
-        const double d = cosine(q, guess, e) + 1e-9;
-        if (d < cosine(q, guess > 0 ? guess - 1 : q->count - 1, e) &&
-            d < cosine(q, guess + 1 < q->count ? guess + 1 : 0, e))
+        const double d = cosine(shape, guess, side) + 1e-9;
+        if (d < cosine(shape, guess > 0 ? guess - 1 : shape->count - 1, side) &&
+            d < cosine(shape, guess + 1 < shape->count ? guess + 1 : 0, side))
             return guess;
     }
     int facing = 0;
     double least = INFINITY;
-    for (int j = 0; j < q->count; j++) {
-        const double d = cosine(q, j, e);
+    for (int j = 0; j < shape->count; j++) {
+        const double d = cosine(shape, j, side);
         if (d < least) least = d, facing = j;
     }
     return facing;
@@ -170,15 +170,15 @@ BT_INLINE int facing_edge(const polygon *q, const edge *e, int guess)
 /// nearer one, however near that is to the margin (contact/law.h, bt_closing).
 typedef struct { double margin, beside; } bounds;
 
-static bounds bounds_of(const bt_world *w, double margin) { return (bounds){margin, w->cells->beside}; }
+static bounds bounds_of(const bt_world *world, double margin) { return (bounds){margin, world->cells->beside}; }
 
 /// Points of the incident polygon, of its edge `facing`, that face the reference edge, or what counts of it on a shore
 /// (shown, or NULL); `flip` when the reference is b.
-BT_INLINE void clip_points(const polygon *ref, const edge *e, const bt_face *shown, const polygon *inc, int facing,
-                        bool flip, const double d[2], bounds most, bt_manifold *m)
+BT_INLINE void clip_points(const polygon *ref, const edge *side, const bt_face *shown, const polygon *inc, int facing,
+                        bool flip, const double d[2], bounds most, bt_manifold *manifold)
 {
-    const double nx = e->nx, ny = e->ny;
-    const int i = e->i;
+    const double nx = side->nx, ny = side->ny;
+    const int i = side->i;
     const double tx = -ny, ty = nx; // along the edge: outlines run anticlockwise
     double r[2], rn[2];
     world_vertex(ref, i, r);
@@ -192,9 +192,9 @@ BT_INLINE void clip_points(const polygon *ref, const edge *e, const bt_face *sho
     const double tp = tx * (p[0] - r[0]) + ty * (p[1] - r[1]), tq = tx * (q[0] - r[0]) + ty * (q[1] - r[1]);
     const double gp = nx * (p[0] - r[0]) + ny * (p[1] - r[1]), gq = nx * (q[0] - r[0]) + ny * (q[1] - r[1]);
 
-    m->nx = flip ? -nx : nx;
-    m->ny = flip ? -ny : ny;
-    m->flush = 0;
+    manifold->nx = flip ? -nx : nx;
+    manifold->ny = flip ? -ny : ny;
+    manifold->flush = 0;
     const uint32_t base = ((uint32_t)flip << 31) | ((uint32_t)i << 20);
     struct { double t, gap; uint32_t id; } ends[2] = {
         {tp, gp, (uint32_t)facing << 1}, {tq, gq, (uint32_t)other << 1}};
@@ -219,25 +219,25 @@ BT_INLINE void clip_points(const polygon *ref, const edge *e, const bt_face *sho
     if (depth > most.margin) return;
     if (n == 2 && most.beside > 0) {
         const double tilt = fabs(ends[0].gap - ends[1].gap);
-        m->flush = fabs(ends[0].t - ends[1].t) * (tilt > most.beside ? most.beside / tilt : 1);
+        manifold->flush = fabs(ends[0].t - ends[1].t) * (tilt > most.beside ? most.beside / tilt : 1);
     }
     for (int k = 0; k < n; k++)
         if (ends[k].gap <= bt_max(most.margin, depth + most.beside)) ends[kept++] = ends[k];
     // Both points on one line along the edge, half-way into the smaller gap: their tangential rows are then the same,
     // and the solver can treat the friction of the pair as one. The normal rows do not depend on that height.
     for (int k = 0; k < kept; k++)
-        set_point(m, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny, ends[k].gap,
-                  d[0], d[1], base | ends[k].id);
+        set_point(manifold, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny,
+                  ends[k].gap, d[0], d[1], base | ends[k].id);
 }
 
 /// The deepest vertex of inc below the reference edge as the only point.
-static void deepest_point(const polygon *ref, const edge *e, const polygon *inc, bool flip, const double d[2],
-                          bt_manifold *m)
+static void deepest_point(const polygon *ref, const edge *side, const polygon *inc, bool flip, const double d[2],
+                          bt_manifold *manifold)
 {
-    const double nx = e->nx, ny = e->ny;
+    const double nx = side->nx, ny = side->ny;
     double r[2], x[2], least = INFINITY;
     int deepest = 0;
-    world_vertex(ref, e->i, r);
+    world_vertex(ref, side->i, r);
     for (int j = 0; j < inc->count; j++) {
         world_vertex(inc, j, x);
         double g = nx * (x[0] - r[0]) + ny * (x[1] - r[1]);
@@ -247,26 +247,26 @@ static void deepest_point(const polygon *ref, const edge *e, const polygon *inc,
         }
     }
     world_vertex(inc, deepest, x);
-    m->nx = flip ? -nx : nx;
-    m->ny = flip ? -ny : ny;
-    set_point(m, x[0] - 0.5 * least * nx, x[1] - 0.5 * least * ny, least, d[0], d[1],
-              ((uint32_t)flip << 31) | ((uint32_t)e->i << 20) | (uint32_t)deepest << 1);
+    manifold->nx = flip ? -nx : nx;
+    manifold->ny = flip ? -ny : ny;
+    set_point(manifold, x[0] - 0.5 * least * nx, x[1] - 0.5 * least * ny, least, d[0], d[1],
+              ((uint32_t)flip << 31) | ((uint32_t)side->i << 20) | (uint32_t)deepest << 1);
 }
 
 /// Two corners, ca of a and cb of b, as the only point: the normal is along the line that joins them. False beyond the
 /// margin.
 static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, const double d[2], double margin,
-                         bt_manifold *m)
+                         bt_manifold *manifold)
 {
     double x[2], y[2];
     world_vertex(a, ca, x);
     world_vertex(b, cb, y);
     const double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
     if (gap > margin || gap == 0) return false;
-    m->flush = 0;
-    m->nx = (y[0] - x[0]) / gap;
-    m->ny = (y[1] - x[1]) / gap;
-    set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],
+    manifold->flush = 0;
+    manifold->nx = (y[0] - x[0]) / gap;
+    manifold->ny = (y[1] - x[1]) / gap;
+    set_point(manifold, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],
               0x7ff00000u | (uint32_t)ca << 10 | (uint32_t)cb);
     return true;
 }
@@ -286,87 +286,96 @@ BT_INLINE bool reference_is_b(const edge *a, const edge *b, double tie, int befo
 }
 
 /// 1 % of the smaller floe's radius.
-static double tie_of(const bt_bodies *b, bt_idx i, bt_idx j) { return 0.01 * bt_min(b->radius[i], b->radius[j]); }
+static double tie_of(const bt_bodies *bodies, bt_idx i, bt_idx j)
+{
+    return 0.01 * bt_min(bodies->radius[i], bodies->radius[j]);
+}
 
 /// Of a yaw that is no number, or as good as none, any: guards end such a run.
 BT_INLINE uint16_t turn_of(double yaw) { return fabs(yaw) < 1e9 ? (uint16_t)(int64_t)(yaw * (1 / UNIT)) : 0; }
 
 /// Where bodies i and j are: axes that are not known.
-BT_INLINE bt_axes place_of(const bt_bodies *b, bt_idx i, bt_idx j, const double d[2])
+BT_INLINE bt_axes place_of(const bt_bodies *bodies, bt_idx i, bt_idx j, const double d[2])
 {
     return (bt_axes){.x = (float)d[0], .y = (float)d[1], .room = -1, .edge = {-1, -1},
-                     .turn = {turn_of(b->pose[i].yaw), turn_of(b->pose[j].yaw)}};
+                     .turn = {turn_of(bodies->pose[i].yaw), turn_of(bodies->pose[j].yaw)}};
 }
 
-/// No separation by an edge has changed by more than this from k to `now`; radius: the larger one.
-BT_INLINE float motion(const bt_axes *k, const bt_axes *now, float radius)
+/// No separation by an edge has changed by more than this from `axes` to `now`; radius: the larger one.
+BT_INLINE float motion(const bt_axes *axes, const bt_axes *now, float radius)
 {
-    const int turn = abs((int16_t)(now->turn[0] - k->turn[0])) + abs((int16_t)(now->turn[1] - k->turn[1])) + ROUNDED;
-    const float arm = fabsf(k->x) + fabsf(k->y) + radius;
-    return fabsf(now->x - k->x) + fabsf(now->y - k->y) + (float)turn * (float)UNIT * arm;
+    const int turn = abs((int16_t)(now->turn[0] - axes->turn[0])) + abs((int16_t)(now->turn[1] - axes->turn[1])) +
+                     ROUNDED;
+    const float arm = fabsf(axes->x) + fabsf(axes->y) + radius;
+    return fabsf(now->x - axes->x) + fabsf(now->y - axes->y) + (float)turn * (float)UNIT * arm;
 }
 
-/// The edges e of a and b that separate the two most. False as soon as one separates by more than the margin. Those of
-/// the last search usually do so again, or are the best for certain (motion). Where not, an edge that separates by less
-/// than they, and by more than the tie, is neither the best nor in question. An edge that does not count has s = -∞.
+/// The edges `side` of a and b that separate the two most. False as soon as one separates by more than the margin.
+/// Those of the last search usually do so again, or are the best for certain (motion). Where not, an edge that
+/// separates by less than they, and by more than the tie, is neither the best nor in question. An edge that does not
+/// count has s = -∞.
 BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius,
-                         const bt_axes *now, bt_axes *k, edge e[2])
+                         const bt_axes *now, bt_axes *axes, edge side[2])
 {
-    e[0] = k->edge[0] >= 0 ? edge_of(a, k->edge[0], b, -INFINITY) : (edge){-INFINITY, .i = -1};
-    e[1] = k->edge[1] >= 0 ? edge_of(b, k->edge[1], a, -INFINITY) : (edge){-INFINITY, .i = -1};
-    const double known = bt_max(e[0].s, e[1].s);
+    side[0] = axes->edge[0] >= 0 ? edge_of(a, axes->edge[0], b, -INFINITY) : (edge){-INFINITY, .i = -1};
+    side[1] = axes->edge[1] >= 0 ? edge_of(b, axes->edge[1], a, -INFINITY) : (edge){-INFINITY, .i = -1};
+    const double known = bt_max(side[0].s, side[1].s);
     if (known > margin) return false;
-    if (motion(k, now, radius) < k->room) return true;
+    if (motion(axes, now, radius) < axes->room) return true;
     double lead[2];
-    *k = *now;
-    e[0] = best_edge(a, b, margin, known - AROUND * tie, &lead[0]);
-    k->edge[0] = (int8_t)e[0].i;
-    if (e[0].s > margin) return false;
-    e[1] = best_edge(b, a, margin, bt_max(known, e[0].s) - AROUND * tie, &lead[1]);
-    k->edge[1] = (int8_t)e[1].i;
-    const bool first = e[1].s > e[0].s;
-    const double both = bt_min(lead[0], lead[1]), alone = bt_min(lead[first], fabs(e[0].s - e[1].s) - tie);
-    if (alone > both) k->edge[!first] = -1;
-    if (e[1].s > margin) return false;
-    k->room = (float)(0.5 * bt_max(both, alone));
+    *axes = *now;
+    side[0] = best_edge(a, b, margin, known - AROUND * tie, &lead[0]);
+    axes->edge[0] = (int8_t)side[0].i;
+    if (side[0].s > margin) return false;
+    side[1] = best_edge(b, a, margin, bt_max(known, side[0].s) - AROUND * tie, &lead[1]);
+    axes->edge[1] = (int8_t)side[1].i;
+    const bool first = side[1].s > side[0].s;
+    const double both = bt_min(lead[0], lead[1]), alone = bt_min(lead[first], fabs(side[0].s - side[1].s) - tie);
+    if (alone > both) axes->edge[!first] = -1;
+    if (side[1].s > margin) return false;
+    axes->room = (float)(0.5 * bt_max(both, alone));
     return true;
 }
 
 /// Of bodies that are convex. *gap: the largest separation, a lower bound of the distance.
 BT_FOR_EACH_CPU
-static bool bodies_touch(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
-                         bt_axes *k, double *gap)
+static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margin, int reference_before,
+                         bt_manifold *manifold, bt_axes *axes, double *gap)
 {
     double d[2];
-    bt_bodies_offset(w, a, b, d);
-    const bt_axes now = place_of(&w->bodies, a, b, d);
-    const polygon p[2] = {polygon_of(&w->bodies, a, 0, 0, 0), polygon_of(&w->bodies, b, 0, d[0], d[1])};
-    const double tie = tie_of(&w->bodies, a, b);
-    const float radius = (float)bt_max(w->bodies.radius[a], w->bodies.radius[b]);
-    edge e[2];
-    const bool apart = !find_axes(&p[0], &p[1], margin, tie, radius, &now, k, e);
-    *gap = bt_max(e[0].s, e[1].s);
+    bt_bodies_offset(world, a, b, d);
+    const bt_axes now = place_of(&world->bodies, a, b, d);
+    const polygon shape[2] = {polygon_of(&world->bodies, a, 0, 0, 0), polygon_of(&world->bodies, b, 0, d[0], d[1])};
+    const double tie = tie_of(&world->bodies, a, b);
+    const float radius = (float)bt_max(world->bodies.radius[a], world->bodies.radius[b]);
+    edge side[2];
+    const bool apart = !find_axes(&shape[0], &shape[1], margin, tie, radius, &now, axes, side);
+    *gap = bt_max(side[0].s, side[1].s);
     if (apart) return false;
-    const bool ref = reference_is_b(&e[0], &e[1], tie, reference_before);
-    const double sep = e[ref].s;
+    const bool ref = reference_is_b(&side[0], &side[1], tie, reference_before);
+    const double sep = side[ref].s;
 
-    m->a = a, m->b = b, m->n_points = 0; // and no more: the rest follows with the points
-    const bounds most = bounds_of(w, margin);
-    clip_points(&p[ref], &e[ref], NULL, &p[!ref], facing_edge(&p[!ref], &e[ref], e[!ref].i), ref, d, most, m);
+    manifold->a = a, manifold->b = b, manifold->n_points = 0; // and no more: the rest follows with the points
+    const bounds most = bounds_of(world, margin);
+    clip_points(&shape[ref], &side[ref], NULL, &shape[!ref], facing_edge(&shape[!ref], &side[ref], side[!ref].i), ref,
+                d, most, manifold);
     if (!(sep > 0)) {
-        if (m->n_points == 0) deepest_point(&p[ref], &e[ref], &p[!ref], ref, d, m);
+        if (manifold->n_points == 0) deepest_point(&shape[ref], &side[ref], &shape[!ref], ref, d, manifold);
         return true;
     }
-    if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie) return true;
+    if (manifold->n_points > 0 && bt_min(manifold->p[0].gap, manifold->p[manifold->n_points - 1].gap) <= sep + tie)
+        return true;
     // The nearest vertex lies beside the reference edge, and not by the tilt of two nearly parallel edges: a corner is
     // near.
-    m->n_points = 0;
+    manifold->n_points = 0;
     int ca = 0, cb = 0, near = 0;
     bool of_b = false;
-    if (nearest_features(&p[0], &p[1], &ca, &cb, &near, &of_b)) return join_corners(&p[0], ca, &p[1], cb, d, margin, m);
-    const edge with = edge_of(&p[of_b], near, &p[!of_b], INFINITY);
-    clip_points(&p[of_b], &with, NULL, &p[!of_b], facing_edge(&p[!of_b], &with, -1), of_b, d, most, m);
-    return m->n_points > 0;
+    if (nearest_features(&shape[0], &shape[1], &ca, &cb, &near, &of_b))
+        return join_corners(&shape[0], ca, &shape[1], cb, d, margin, manifold);
+    const edge with = edge_of(&shape[of_b], near, &shape[!of_b], INFINITY);
+    clip_points(&shape[of_b], &with, NULL, &shape[!of_b], facing_edge(&shape[!of_b], &with, -1), of_b, d, most,
+                manifold);
+    return manifold->n_points > 0;
 }
 
 // --- bodies that are not convex, and shores --------------------------------------------------------------------------
@@ -399,90 +408,91 @@ typedef struct {
     bool whole;            ///< the body is convex and alone: everything counts
 } part_of_body;
 
-static part_of_body part_of(const bt_world *w, bt_idx i, int part, double x, double y)
+static part_of_body part_of(const bt_world *world, bt_idx i, int part, double x, double y)
 {
-    const bt_bodies *b = &w->bodies;
-    const int64_t first = b->offset[i];
-    const bt_face *face = bt_shore_faces(w->shore, b->gid[i], part);
-    return (part_of_body){polygon_of(b, i, part, x, y), b->mark + first + part, b->outline + 2 * first,
-                          bt_body_corners(b, i), face, part == 0 && !face};
+    const bt_bodies *bodies = &world->bodies;
+    const int64_t first = bodies->offset[i];
+    const bt_face *face = bt_shore_faces(world->shore, bodies->gid[i], part);
+    return (part_of_body){polygon_of(bodies, i, part, x, y), bodies->mark + first + part, bodies->outline + 2 * first,
+                          bt_body_corners(bodies, i), face, part == 0 && !face};
 }
 
-static bool edge_counts(const part_of_body *q, int i)
+static bool edge_counts(const part_of_body *part, int i)
 {
-    const int next = i + 1 < q->p.count ? i + 1 : 0, after = q->mark[i].corner + 1;
-    if (q->face) return q->face[i].from < q->face[i].to;
-    return q->whole || q->mark[next].corner == (after < q->corners ? after : 0);
+    const int next = i + 1 < part->p.count ? i + 1 : 0, after = part->mark[i].corner + 1;
+    if (part->face) return part->face[i].from < part->face[i].to;
+    return part->whole || part->mark[next].corner == (after < part->corners ? after : 0);
 }
 
-static bool corner_counts(const part_of_body *q, int i, double nx, double ny)
+static bool corner_counts(const part_of_body *part, int i, double nx, double ny)
 {
-    if (q->whole) return true;
-    if (q->face) return bt_shore_in_cone(&q->face[i], nx, ny);
-    const int here = q->mark[i].corner, before = here > 0 ? here - 1 : q->corners - 1,
-              after = here + 1 < q->corners ? here + 1 : 0;
-    const double *o = q->outline;
+    if (part->whole) return true;
+    if (part->face) return bt_shore_in_cone(&part->face[i], nx, ny);
+    const int here = part->mark[i].corner, before = here > 0 ? here - 1 : part->corners - 1,
+              after = here + 1 < part->corners ? here + 1 : 0;
+    const double *o = part->outline;
     const double ax = o[2 * here] - o[2 * before], ay = o[2 * here + 1] - o[2 * before + 1];
     const double bx = o[2 * after] - o[2 * here], by = o[2 * after + 1] - o[2 * here + 1];
     if (ax * by - ay * bx <= 0) return false;
     return nx * ax + ny * ay >= -CONE * bt_hypot(ax, ay) && nx * bx + ny * by <= CONE * bt_hypot(bx, by);
 }
 
-/// Vertex of q that reaches farthest against (nx, ny).
-static int support(const polygon *q, double nx, double ny)
+/// Vertex of `shape` that reaches farthest against (nx, ny).
+static int support(const polygon *shape, double nx, double ny)
 {
     int at = 0;
     double least = INFINITY;
-    for (int j = 0; j < q->count; j++) {
-        const double s = nx * q->v[2 * j] + ny * q->v[2 * j + 1];
+    for (int j = 0; j < shape->count; j++) {
+        const double s = nx * shape->v[2 * j] + ny * shape->v[2 * j + 1];
         if (s < least) least = s, at = j;
     }
     return at;
 }
 
 /// Is edge i of a shore, and covered by others at an end?
-static bool covered_at_an_end(const part_of_body *q, int i)
+static bool covered_at_an_end(const part_of_body *part, int i)
 {
-    const bt_face *f = q->face ? &q->face[i] : NULL;
-    return f && (f->from > 0 || f->to * q->p.per_length[i] < 1 - 1e-9);
+    const bt_face *face = part->face ? &part->face[i] : NULL;
+    return face && (face->from > 0 || face->to * part->p.per_length[i] < 1 - 1e-9);
 }
 
 /// Is x beside a stretch of edge i that shows?
-static bool shows_at(const part_of_body *q, int i, const double x[2])
+static bool shows_at(const part_of_body *part, int i, const double x[2])
 {
-    const bt_face *f = &q->face[i];
+    const bt_face *face = &part->face[i];
     double nx, ny, v[2];
-    edge_normal(&q->p, i, &nx, &ny);
-    world_vertex(&q->p, i, v);
-    const double t = nx * (x[1] - v[1]) - ny * (x[0] - v[0]), slack = 1e-3 / q->p.per_length[i];
-    return f->from < f->to && t >= f->from - slack && t <= f->to + slack;
+    edge_normal(&part->p, i, &nx, &ny);
+    world_vertex(&part->p, i, v);
+    const double t = nx * (x[1] - v[1]) - ny * (x[0] - v[0]), slack = 1e-3 / part->p.per_length[i];
+    return face->from < face->to && t >= face->from - slack && t <= face->to + slack;
 }
 
 /// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count, and
 /// where others cover an end of it, what shows.
-static void clip_what_counts(const part_of_body *ref, const edge *e, const part_of_body *inc, bool flip,
-                             const double d[2], bounds most, bt_manifold *m)
+static void clip_what_counts(const part_of_body *ref, const edge *side, const part_of_body *inc, bool flip,
+                             const double d[2], bounds most, bt_manifold *manifold)
 {
-    const int facing = facing_edge(&inc->p, e, -1);
-    clip_points(&ref->p, e, ref->face ? &ref->face[e->i] : NULL, &inc->p, facing, flip, d, most, m);
+    const int facing = facing_edge(&inc->p, side, -1);
+    clip_points(&ref->p, side, ref->face ? &ref->face[side->i] : NULL, &inc->p, facing, flip, d, most, manifold);
     const bool partly = covered_at_an_end(inc, facing);
     if (edge_counts(inc, facing) && !partly) return;
     int kept = 0;
-    for (int k = 0; k < m->n_points; k++) {
-        const uint32_t id = m->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
-        const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -e->nx, -e->ny);
-        if (corner || (partly && shows_at(inc, facing, m->p[k].ra))) m->p[kept++] = m->p[k];
+    for (int k = 0; k < manifold->n_points; k++) {
+        const uint32_t id = manifold->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
+        const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -side->nx, -side->ny);
+        if (corner || (partly && shows_at(inc, facing, manifold->p[k].ra))) manifold->p[kept++] = manifold->p[k];
     }
-    m->n_points = kept;
+    manifold->n_points = kept;
 }
 
-/// Do others cover an end of edge e of p, or of the edge of q that faces it, and is nothing else between them?
-static bool beside_what_shows(const part_of_body *p, const edge *e, const part_of_body *q)
+/// Do others cover an end of edge `side` of p, or of the edge of q that faces it, and is nothing else between them?
+static bool beside_what_shows(const part_of_body *p, const edge *side, const part_of_body *q)
 {
-    if (!covered_at_an_end(p, e->i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, e, -1)))) return false;
-    bt_manifold m = {0};
-    clip_what_counts(p, e, q, false, (double[2]){0, 0}, (bounds){INFINITY, 0}, &m);
-    return m.n_points == 0;
+    if (!covered_at_an_end(p, side->i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, side, -1))))
+        return false;
+    bt_manifold manifold = {0};
+    clip_what_counts(p, side, q, false, (double[2]){0, 0}, (bounds){INFINITY, 0}, &manifold);
+    return manifold.n_points == 0;
 }
 
 /// The edge of p that separates q most, of those that count, against corners of q that do.
@@ -491,40 +501,42 @@ static edge best_that_counts(const part_of_body *p, const part_of_body *q)
     edge best = {.s = -INFINITY};
     for (int i = 0; i < p->p.count; i++) {
         if (!edge_counts(p, i)) continue;
-        const edge e = edge_of(&p->p, i, &q->p, -INFINITY);
-        if (e.s > best.s && corner_counts(q, support(&q->p, e.nx, e.ny), -e.nx, -e.ny) && !beside_what_shows(p, &e, q))
-            best = e;
+        const edge side = edge_of(&p->p, i, &q->p, -INFINITY);
+        if (side.s > best.s && corner_counts(q, support(&q->p, side.nx, side.ny), -side.nx, -side.ny) &&
+            !beside_what_shows(p, &side, q))
+            best = side;
     }
     return best;
 }
 
 /// The nearest features of two parts that are apart, where both count.
 static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], bounds most,
-                            bt_manifold *m)
+                            bt_manifold *manifold)
 {
     int ca = 0, cb = 0, near = 0;
     bool of_b = false;
-    m->n_points = 0;
+    manifold->n_points = 0;
     if (nearest_features(&a->p, &b->p, &ca, &cb, &near, &of_b)) {
-        return join_corners(&a->p, ca, &b->p, cb, d, most.margin, m) && corner_counts(a, ca, m->nx, m->ny) &&
-               corner_counts(b, cb, -m->nx, -m->ny);
+        return join_corners(&a->p, ca, &b->p, cb, d, most.margin, manifold) &&
+               corner_counts(a, ca, manifold->nx, manifold->ny) && corner_counts(b, cb, -manifold->nx, -manifold->ny);
     }
     const part_of_body *ref = of_b ? b : a, *inc = of_b ? a : b;
-    const edge e = edge_of(&ref->p, near, &inc->p, INFINITY);
-    if (!edge_counts(ref, near) || !corner_counts(inc, of_b ? ca : cb, -e.nx, -e.ny) || beside_what_shows(ref, &e, inc))
+    const edge side = edge_of(&ref->p, near, &inc->p, INFINITY);
+    if (!edge_counts(ref, near) || !corner_counts(inc, of_b ? ca : cb, -side.nx, -side.ny) ||
+        beside_what_shows(ref, &side, inc))
         return false;
-    clip_what_counts(ref, &e, inc, of_b, d, most, m);
-    if (m->n_points == 0) deepest_point(&ref->p, &e, &inc->p, of_b, d, m);
-    return bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= most.margin;
+    clip_what_counts(ref, &side, inc, of_b, d, most, manifold);
+    if (manifold->n_points == 0) deepest_point(&ref->p, &side, &inc->p, of_b, d, manifold);
+    return bt_min(manifold->p[0].gap, manifold->p[manifold->n_points - 1].gap) <= most.margin;
 }
 
-static bool parts_touch(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
-                        int reference_before, bt_manifold *m, bt_axes *known, double *gap)
+static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
+                        int reference_before, bt_manifold *manifold, bt_axes *known, double *gap)
 {
     double d[2];
-    bt_bodies_offset(w, ia, ib, d);
-    const part_of_body p[2] = {part_of(w, ia, part[0], 0, 0), part_of(w, ib, part[1], d[0], d[1])};
-    const double tie = tie_of(&w->bodies, ia, ib);
+    bt_bodies_offset(world, ia, ib, d);
+    const part_of_body p[2] = {part_of(world, ia, part[0], 0, 0), part_of(world, ib, part[1], d[0], d[1])};
+    const double tie = tie_of(&world->bodies, ia, ib);
     // Parts do not hold the centroid of their body, which rules out edges in best_edge: all edges in full, the last
     // axis first.
     const int n_a = p[0].p.count, n = n_a + p[1].p.count,
@@ -533,42 +545,43 @@ static bool parts_touch(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t 
     double best = -INFINITY;
     for (int k = 0; k < n && !(best > margin); k++) {
         const int axis = k == 0 ? hint : k <= hint ? k - 1 : k, in_b = axis >= n_a;
-        const edge e = edge_of(&p[in_b].p, in_b ? axis - n_a : axis, &p[!in_b].p, -INFINITY);
-        if (e.s <= best) continue;
-        best = e.s;
-        known->edge[in_b] = (int8_t)e.i;
+        const edge side = edge_of(&p[in_b].p, in_b ? axis - n_a : axis, &p[!in_b].p, -INFINITY);
+        if (side.s <= best) continue;
+        best = side.s;
+        known->edge[in_b] = (int8_t)side.i;
         known->edge[!in_b] = -1;
     }
     *gap = best;
     if (best > margin) return false;
 
-    *m = (bt_manifold){.a = ia, .b = ib};
-    const bounds most = bounds_of(w, margin);
-    const edge e[2] = {best_that_counts(&p[0], &p[1]), best_that_counts(&p[1], &p[0])};
-    const bool ref = reference_is_b(&e[0], &e[1], tie, reference_before);
-    const double sep = e[ref].s;
+    *manifold = (bt_manifold){.a = ia, .b = ib};
+    const bounds most = bounds_of(world, margin);
+    const edge side[2] = {best_that_counts(&p[0], &p[1]), best_that_counts(&p[1], &p[0])};
+    const bool ref = reference_is_b(&side[0], &side[1], tie, reference_before);
+    const double sep = side[ref].s;
     if (best > 0) {
         if (sep > 0 && sep >= best - tie) {
-            clip_what_counts(&p[ref], &e[ref], &p[!ref], ref, d, most, m);
-            if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie) return true;
+            clip_what_counts(&p[ref], &side[ref], &p[!ref], ref, d, most, manifold);
+            if (manifold->n_points > 0 && bt_min(manifold->p[0].gap, manifold->p[manifold->n_points - 1].gap) <=
+                sep + tie) return true;
         }
-        return nearest_contact(&p[0], &p[1], d, most, m);
+        return nearest_contact(&p[0], &p[1], d, most, manifold);
     }
     if (!(-sep <= bt_max(tie, -DETOUR * best))) return false;
-    clip_what_counts(&p[ref], &e[ref], &p[!ref], ref, d, most, m);
-    if (m->n_points == 0) deepest_point(&p[ref].p, &e[ref], &p[!ref].p, ref, d, m);
+    clip_what_counts(&p[ref], &side[ref], &p[!ref], ref, d, most, manifold);
+    if (manifold->n_points == 0) deepest_point(&p[ref].p, &side[ref], &p[!ref].p, ref, d, manifold);
     return true;
 }
 
-bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
-                       int reference_before, bt_manifold *m, bt_axes *axes)
+bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
+                       int reference_before, bt_manifold *manifold, bt_axes *axes)
 {
     bt_axes none = BT_NO_AXES, *known = axes ? axes : &none;
-    const bool whole = part[0] == 0 && part[1] == 0 && !bt_shore_holds(w, a) && !bt_shore_holds(w, b);
+    const bool whole = part[0] == 0 && part[1] == 0 && !bt_shore_holds(world, a) && !bt_shore_holds(world, b);
     double gap;
-    const bool touch = whole ? bodies_touch(w, a, b, margin, reference_before, m, known, &gap)
-                             : parts_touch(w, a, b, part, margin, reference_before, m, known, &gap);
-    const double reach = gap + w->bodies.path[a] + w->bodies.path[b];
+    const bool touch = whole ? bodies_touch(world, a, b, margin, reference_before, manifold, known, &gap)
+                             : parts_touch(world, a, b, part, margin, reference_before, manifold, known, &gap);
+    const double reach = gap + world->bodies.path[a] + world->bodies.path[b];
     known->reach = (float)(reach - 1e-6 * fabs(reach));
     return touch;
 }

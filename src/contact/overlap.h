@@ -16,18 +16,18 @@ typedef struct bt_overlap {
 
 /// Intersection of these parts of a and b when b has been moved by (dx, dy): Sutherland & Hodgman 1974, Comm. ACM 17, a
 /// cut by the edges of b one after the other. The same bits for the same poses, whatever was before.
-void bt_overlap_clip(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double dx, double dy,
-                     bt_overlap *o);
+void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double dx, double dy,
+                     bt_overlap *overlap);
 
 /// Area (m²) and centroid (m, in the frame of a).
-double bt_overlap_area(const bt_overlap *o, double centroid[2]);
+double bt_overlap_area(const bt_overlap *overlap, double centroid[2]);
 
 /// How the area A changes when b is moved: grad = ∂A/∂(displacement of b), m. The boundary of the overlap is a closed
 /// line, so with n the outward normal
 ///     grad = ∫_{edges of b} n dl = −∫_{edges of a} n dl = ½ (∫_b − ∫_a) n dl
 /// Where edges of both lie on each other and face the same way (rectangles in a row) the gradient jumps as one passes
 /// the other. Such edges count for neither; within `blend` of each other in part.
-void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *o,
+void bt_overlap_gradient(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *overlap,
                          double blend, double grad[2]);
 
 #endif

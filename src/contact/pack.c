@@ -18,62 +18,64 @@
 enum { MAX_COLOURS = 64 };
 #define RELEASED 1e9 // m, a gap that nothing closes
 
-void bt_pack_scratch_free(bt_pack_scratch *s)
+void bt_pack_scratch_free(bt_pack_scratch *scratch)
 {
-    free(s->man);
-    free(s->pair);
-    free(s->held);
-    free(s->colour);
-    free(s->used);
-    *s = (bt_pack_scratch){0};
+    free(scratch->man);
+    free(scratch->pair);
+    free(scratch->held);
+    free(scratch->colour);
+    free(scratch->used);
+    *scratch = (bt_pack_scratch){0};
 }
 
-void bt_pack_begin(bt_pack_scratch *s, size_t n)
+void bt_pack_begin(bt_pack_scratch *scratch, size_t n)
 {
-    s->n = 0;
-    if (n < s->cap) return;
-    s->cap = n + n / 2 + 16;
-    s->man = bt_realloc(s->man, s->cap, sizeof *s->man);
-    s->pair = bt_realloc(s->pair, s->cap, sizeof *s->pair);
-    s->held = bt_realloc(s->held, s->cap, sizeof *s->held);
-    s->colour = bt_realloc(s->colour, s->cap, sizeof *s->colour);
+    scratch->n = 0;
+    if (n < scratch->cap) return;
+    scratch->cap = n + n / 2 + 16;
+    scratch->man = bt_realloc(scratch->man, scratch->cap, sizeof *scratch->man);
+    scratch->pair = bt_realloc(scratch->pair, scratch->cap, sizeof *scratch->pair);
+    scratch->held = bt_realloc(scratch->held, scratch->cap, sizeof *scratch->held);
+    scratch->colour = bt_realloc(scratch->colour, scratch->cap, sizeof *scratch->colour);
 }
 
-/// Position of body i in the block of cell t, −1 = a large one.
-static bt_idx in_block(const bt_cells *ts, const bt_cell *t, const bt_idx base[4], bt_idx i)
+/// Position of body i in the block of the cell, −1 = a large one.
+static bt_idx in_block(const bt_cells *ts, const bt_cell *cell, const bt_idx base[4], bt_idx i)
 {
-    const bt_idx block[4] = {t->right, t->above, t->diagonal};
-    if (i >= t->first && i < t->end) return i - t->first;
+    const bt_idx block[4] = {cell->right, cell->above, cell->diagonal};
+    if (i >= cell->first && i < cell->end) return i - cell->first;
     for (int k = 0; k < 3; k++)
         if (block[k] >= 0 && i >= ts->cell[block[k]].first && i < ts->cell[block[k]].end)
             return base[k + 1] + i - ts->cell[block[k]].first;
     return -1;
 }
 
-static int colour_contacts(const bt_world *w, const bt_cell *t, bt_pack_scratch *s, bt_idx start[MAX_COLOURS + 2])
+static int colour_contacts(const bt_world *world, const bt_cell *cell, bt_pack_scratch *scratch,
+                           bt_idx start[MAX_COLOURS + 2])
 {
-    const bt_cells *ts = w->cells;
-    const bt_bodies *b = &w->bodies;
-    const bt_idx block[4] = {t->right, t->above, t->diagonal};
+    const bt_cells *ts = world->cells;
+    const bt_bodies *bodies = &world->bodies;
+    const bt_idx block[4] = {cell->right, cell->above, cell->diagonal};
     bt_idx base[4] = {0};
-    bt_idx n = t->end - t->first;
+    bt_idx n = cell->end - cell->first;
     for (int k = 0; k < 3; k++) {
         base[k + 1] = n;
         if (block[k] >= 0) n += ts->cell[block[k]].end - ts->cell[block[k]].first;
     }
-    if ((size_t)n > s->cap_used) s->used = bt_realloc(s->used, s->cap_used = 2 * (size_t)n, sizeof *s->used);
-    if (n > 0) memset(s->used, 0, (size_t)n * sizeof *s->used);
+    if ((size_t)n > scratch->cap_used)
+        scratch->used = bt_realloc(scratch->used, scratch->cap_used = 2 * (size_t)n, sizeof *scratch->used);
+    if (n > 0) memset(scratch->used, 0, (size_t)n * sizeof *scratch->used);
     bt_idx count[MAX_COLOURS + 1] = {0};
     int n_colours = 0;
-    for (size_t k = 0; k < s->n; k++) {
-        const bt_manifold *m = &s->man[k];
-        const bt_idx i = b->inv[m->a].m > 0 ? in_block(ts, t, base, m->a) : -1,
-                     j = b->inv[m->b].m > 0 ? in_block(ts, t, base, m->b) : -1;
-        const uint64_t used = (i >= 0 ? s->used[i] : 0) | (j >= 0 ? s->used[j] : 0);
+    for (size_t k = 0; k < scratch->n; k++) {
+        const bt_manifold *manifold = &scratch->man[k];
+        const bt_idx i = bodies->inv[manifold->a].m > 0 ? in_block(ts, cell, base, manifold->a) : -1,
+                     j = bodies->inv[manifold->b].m > 0 ? in_block(ts, cell, base, manifold->b) : -1;
+        const uint64_t used = (i >= 0 ? scratch->used[i] : 0) | (j >= 0 ? scratch->used[j] : 0);
         const int colour = ~used ? __builtin_ctzll(~used) : MAX_COLOURS; // none left: at the end, one by one
-        if (colour < MAX_COLOURS && i >= 0) s->used[i] |= (uint64_t)1 << colour;
-        if (colour < MAX_COLOURS && j >= 0) s->used[j] |= (uint64_t)1 << colour;
-        s->colour[k] = (uint8_t)colour;
+        if (colour < MAX_COLOURS && i >= 0) scratch->used[i] |= (uint64_t)1 << colour;
+        if (colour < MAX_COLOURS && j >= 0) scratch->used[j] |= (uint64_t)1 << colour;
+        scratch->colour[k] = (uint8_t)colour;
         count[colour]++;
         if (colour >= n_colours) n_colours = colour + 1;
     }
@@ -83,159 +85,164 @@ static int colour_contacts(const bt_world *w, const bt_cell *t, bt_pack_scratch 
 }
 
 /// The contacts of the step before, whose memory that of this step takes.
-static void hold(const bt_cell *t, bt_pack_scratch *s)
+static void hold(const bt_cell *cell, bt_pack_scratch *scratch)
 {
-    for (size_t k = 0; k < s->n; k++) {
-        const bt_idx at = t->search.pairs[s->pair[k]].contact;
-        s->held[k].n = 0;
+    for (size_t k = 0; k < scratch->n; k++) {
+        const bt_idx at = cell->search.pairs[scratch->pair[k]].contact;
+        scratch->held[k].n = 0;
         if (at < 0) continue;
-        const bt_contact *u = &t->contacts[at];
-        const bt_gaps *g = &t->gaps[at];
-        s->held[k] = (bt_held){u->n, {g->feature[0], g->feature[1]}, {u->ln[0], u->ln[1]}, u->lt, g->row};
+        const bt_contact *contact = &cell->contacts[at];
+        const bt_gaps *gaps = &cell->gaps[at];
+        scratch->held[k] = (bt_held){contact->n, {gaps->feature[0], gaps->feature[1]}, {contact->ln[0], contact->ln[1]},
+                                     contact->lt, gaps->row};
     }
 }
 
-static void inherit(const bt_manifold *m, const bt_held *h, bt_contact *u)
+static void inherit(const bt_manifold *manifold, const bt_held *held, bt_contact *contact)
 {
-    for (int i = 0; i < m->n_points; i++)
-        for (int j = 0; j < h->n; j++)
-            if (h->feature[j] == m->p[i].feature) u->ln[i] = h->ln[j];
+    for (int i = 0; i < manifold->n_points; i++)
+        for (int j = 0; j < held->n; j++)
+            if (held->feature[j] == manifold->p[i].feature) contact->ln[i] = held->ln[j];
     // The friction of the points is one number: it stays with the normal impulses that stay.
-    const double before = h->n > 1 ? h->ln[0] + h->ln[1] : h->n > 0 ? h->ln[0] : 0;
-    const double kept = u->ln[0] + u->ln[1];
-    u->lt = before == 0 ? 0 : kept == before ? h->lt : h->lt * (kept / before);
+    const double before = held->n > 1 ? held->ln[0] + held->ln[1] : held->n > 0 ? held->ln[0] : 0;
+    const double kept = contact->ln[0] + contact->ln[1];
+    contact->lt = before == 0 ? 0 : kept == before ? held->lt : held->lt * (kept / before);
 }
 
 /// Sheets that lie on each other (contact/raft.h): components along x and y.
-static void fill_sheets(const bt_manifold *m, bt_idx pair, bt_contact *u, bt_gaps *g)
+static void fill_sheets(const bt_manifold *manifold, bt_idx pair, bt_contact *contact, bt_gaps *gaps)
 {
-    const bt_point *q = &m->p[0];
-    *u = (bt_contact){
-        .a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0],
-        .pair = pair};
-    *g = (bt_gaps){0};
+    const bt_point *q = &manifold->p[0];
+    *contact = (bt_contact){
+        .a = manifold->a, .b = manifold->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0],
+        .rbt = q->rb[0], .pair = pair};
+    *gaps = (bt_gaps){0};
 }
 
-void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u)
+void bt_pack_rows(const bt_world *world, const bt_manifold *manifold, bt_contact *contact)
 {
-    const bt_bodies *b = &w->bodies;
-    const double nx = m->nx, ny = m->ny;
-    *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = bt_pair_friction(b, m->a, m->b), .n = m->n_points,
-                      .pair = u->pair};
-    for (int i = 0; i < m->n_points; i++) {
-        const bt_point *q = &m->p[i];
-        u->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
-        u->rbn[i] = q->rb[0] * ny - q->rb[1] * nx;
+    const bt_bodies *bodies = &world->bodies;
+    const double nx = manifold->nx, ny = manifold->ny;
+    *contact = (bt_contact){.a = manifold->a, .b = manifold->b, .nx = nx, .ny = ny,
+                            .mu = bt_pair_friction(bodies, manifold->a, manifold->b), .n = manifold->n_points,
+                            .pair = contact->pair};
+    for (int i = 0; i < manifold->n_points; i++) {
+        const bt_point *q = &manifold->p[i];
+        contact->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
+        contact->rbn[i] = q->rb[0] * ny - q->rb[1] * nx;
     }
-    u->rat = m->p[0].ra[0] * nx + m->p[0].ra[1] * ny;
-    u->rbt = m->p[0].rb[0] * nx + m->p[0].rb[1] * ny;
+    contact->rat = manifold->p[0].ra[0] * nx + manifold->p[0].ra[1] * ny;
+    contact->rbt = manifold->p[0].rb[0] * nx + manifold->p[0].rb[1] * ny;
 }
 
-static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_held *h, bt_contact *u,
-                         bt_gaps *g)
+static void fill_contact(const bt_world *world, const bt_manifold *manifold, bt_idx pair, const bt_held *held,
+                         bt_contact *contact, bt_gaps *gaps)
 {
-    u->pair = pair;
-    bt_pack_rows(w, m, u);
-    *g = (bt_gaps){0};
-    for (int i = 0; i < m->n_points; i++) {
-        g->gap[i] = m->p[i].gap;
-        g->feature[i] = m->p[i].feature;
+    contact->pair = pair;
+    bt_pack_rows(world, manifold, contact);
+    *gaps = (bt_gaps){0};
+    for (int i = 0; i < manifold->n_points; i++) {
+        gaps->gap[i] = manifold->p[i].gap;
+        gaps->feature[i] = manifold->p[i].feature;
     }
-    if (w->par.warm_start) inherit(m, h, u);
+    if (world->par.warm_start) inherit(manifold, held, contact);
 }
 
 /// Velocity at which point i of these gaps comes to touch at the end of the step, m/s; beyond all speeds where the row
 /// is released.
-static double place_of(const bt_world *w, const bt_gaps *g, int i)
+static double place_of(const bt_world *world, const bt_gaps *gaps, int i)
 {
-    return g->row == BT_ROW_RELEASED ? RELEASED / w->par.dt : bt_max(g->gap[i], 0) / w->par.dt;
+    return gaps->row == BT_ROW_RELEASED ? RELEASED / world->par.dt : bt_max(gaps->gap[i], 0) / world->par.dt;
 }
 
 /// Normal bias b of model equation (1). Of a pair that passes: contact/contacts.h.
-static double bias_of(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, double restitution)
+static double bias_of(const bt_world *world, const bt_contact *contact, const bt_gaps *gaps, int i, double restitution)
 {
-    const bt_bodies *b = &w->bodies;
-    if (restitution > 0 && g->row != BT_ROW_RELEASED) {
+    const bt_bodies *bodies = &world->bodies;
+    if (restitution > 0 && gaps->row != BT_ROW_RELEASED) {
         // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
         // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
         // from the slop on, or rounding would decide which of two points of a square hit rebounds.
         // Where drag takes part of the approach within the step, the law refers to what is left: the work of a row is
         // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
-        const double approach = bt_normal_velocity(u, i, &b->vel_start[u->a], &b->vel_start[u->b]);
-        const double closing = bt_normal_velocity(u, i, &b->vel_free[u->a], &b->vel_free[u->b]);
-        if (approach < -w->par.rest_speed && g->gap[i] + w->par.dt * bt_min(closing, 0) < w->par.slop)
+        const double approach = bt_normal_velocity(contact, i, &bodies->vel_start[contact->a],
+                                                   &bodies->vel_start[contact->b]);
+        const double closing = bt_normal_velocity(contact, i, &bodies->vel_free[contact->a],
+                                                  &bodies->vel_free[contact->b]);
+        if (approach < -world->par.rest_speed && gaps->gap[i] + world->par.dt * bt_min(closing, 0) < world->par.slop)
             return restitution * bt_max(approach, bt_min(closing, 0));
     }
-    return place_of(w, g, i);
+    return place_of(world, gaps, i);
 }
 
-void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share)
+void bt_pack_bias(const bt_world *world, bt_contact *contact, const bt_gaps *gaps, double share)
 {
-    const double restitution = share * bt_pair_restitution(&w->bodies, u->a, u->b);
-    for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g, i, restitution);
+    const double restitution = share * bt_pair_restitution(&world->bodies, contact->a, contact->b);
+    for (int i = 0; i < contact->n; i++) contact->bias[i] = bias_of(world, contact, gaps, i, restitution);
 }
 
-void bt_pack_set_row(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state)
+void bt_pack_set_row(const bt_world *world, bt_cell *cell, bt_idx j, bt_row_state state)
 {
-    bt_contact *u = &t->contacts[j];
-    bt_gaps *g = &t->gaps[j];
-    g->row = state;
-    if (state == BT_ROW_RELEASED) u->ln[0] = u->ln[1] = u->lt = 0;
-    bt_pack_bias(w, u, g, 1);
-    if (t->laws.limits)
-        for (int i = 0; i < u->n; i++) t->laws.limits[j].place[i] = place_of(w, g, i);
+    bt_contact *contact = &cell->contacts[j];
+    bt_gaps *gaps = &cell->gaps[j];
+    gaps->row = state;
+    if (state == BT_ROW_RELEASED) contact->ln[0] = contact->ln[1] = contact->lt = 0;
+    bt_pack_bias(world, contact, gaps, 1);
+    if (cell->laws.limits)
+        for (int i = 0; i < contact->n; i++) cell->laws.limits[j].place[i] = place_of(world, gaps, i);
 }
 
-/// State of the row of contact j, made from manifold m; held: what it takes over.
-static bt_row_state row_state(const bt_world *w, const bt_cell *t, bt_idx j, const bt_manifold *m, const bt_held *held)
+/// State of the row of contact j, made from the manifold; held: what it takes over.
+static bt_row_state row_state(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold,
+                              const bt_held *held)
 {
-    if (w->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
-    if (w->stats.repeats > 0 && held->n > 0) return held->row; // of the detection before, in the same step
+    if (world->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
+    if (world->stats.repeats > 0 && held->n > 0) return held->row; // of the detection before, in the same step
     if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
-    for (int i = 0; i < m->n_points; i++)
-        if (m->p[i].gap <= w->par.slop || t->gaps[j].gap[i] <= w->par.slop) return BT_ROW_STAYS;
-    for (int law = 0; t->laws.limits && law < BT_ALL_LAWS; law++)
-        if (t->laws.limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
+    for (int i = 0; i < manifold->n_points; i++)
+        if (manifold->p[i].gap <= world->par.slop || cell->gaps[j].gap[i] <= world->par.slop) return BT_ROW_STAYS;
+    for (int law = 0; cell->laws.limits && law < BT_ALL_LAWS; law++)
+        if (cell->laws.limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
     return BT_ROW_OPEN;
 }
 
 __attribute__((flatten))
-void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
+void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch)
 {
-    bt_cell *t = &w->cells->cell[k];
-    hold(t, s);
-    if ((bt_idx)s->n > t->cap_contacts) {
-        t->cap_contacts = bt_cells_room((bt_idx)s->n);
-        free(t->gaps);
-        t->gaps = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->gaps);
+    bt_cell *cell = &world->cells->cell[k];
+    hold(cell, scratch);
+    if ((bt_idx)scratch->n > cell->cap_contacts) {
+        cell->cap_contacts = bt_cells_room((bt_idx)scratch->n);
+        free(cell->gaps);
+        cell->gaps = bt_alloc_aligned((size_t)cell->cap_contacts, sizeof *cell->gaps);
     }
-    t->n_contacts = (bt_idx)s->n;
-    t->n_points = 0;
-    t->overlap = 0;
-    bt_cells_make_room(t, s->n * sizeof *t->contacts);
-    if (s->n == 0) return;
-    const bool bounded = bt_laws_on(&w->par);
-    t->laws.rising = bt_laws_rise(&w->par);
-    if (bounded) bt_laws_reserve(t);
+    cell->n_contacts = (bt_idx)scratch->n;
+    cell->n_points = 0;
+    cell->overlap = 0;
+    bt_cells_make_room(cell, scratch->n * sizeof *cell->contacts);
+    if (scratch->n == 0) return;
+    const bool bounded = bt_laws_on(&world->par);
+    cell->laws.rising = bt_laws_rise(&world->par);
+    if (bounded) bt_laws_reserve(cell);
     bt_idx next[MAX_COLOURS + 2] = {0};
-    if (t->phase < BT_COLOURS) colour_contacts(w, t, s, next);
-    else memset(s->colour, 0, s->n); // in sequence
-    for (size_t i = 0; i < s->n; i++) {
-        bt_pair *p = &t->search.pairs[s->pair[i]];
-        const bt_idx at = next[s->colour[i]]++;
-        bt_contact *u = &t->contacts[at];
-        if (s->man[i].n_points == 0) {
-            fill_sheets(&s->man[i], s->pair[i], u, &t->gaps[at]);
-            bt_laws_bound(w, t, at, p, &s->man[i]);
+    if (cell->phase < BT_COLOURS) colour_contacts(world, cell, scratch, next);
+    else memset(scratch->colour, 0, scratch->n); // in sequence
+    for (size_t i = 0; i < scratch->n; i++) {
+        bt_pair *pair = &cell->search.pairs[scratch->pair[i]];
+        const bt_idx at = next[scratch->colour[i]]++;
+        bt_contact *contact = &cell->contacts[at];
+        if (scratch->man[i].n_points == 0) {
+            fill_sheets(&scratch->man[i], scratch->pair[i], contact, &cell->gaps[at]);
+            bt_laws_bound(world, cell, at, pair, &scratch->man[i]);
             continue;
         }
-        fill_contact(w, &s->man[i], s->pair[i], &s->held[i], u, &t->gaps[at]);
-        if (bounded) bt_laws_bound(w, t, at, p, &s->man[i]); // the gaps may be others after it
-        bt_pack_set_row(w, t, at, row_state(w, t, at, &s->man[i], &s->held[i]));
-        p->contact = at;
-        t->n_points += u->n;
+        fill_contact(world, &scratch->man[i], scratch->pair[i], &scratch->held[i], contact, &cell->gaps[at]);
+        if (bounded) bt_laws_bound(world, cell, at, pair, &scratch->man[i]); // the gaps may be others after it
+        bt_pack_set_row(world, cell, at, row_state(world, cell, at, &scratch->man[i], &scratch->held[i]));
+        pair->contact = at;
+        cell->n_points += contact->n;
         // Of what is left of the outlines. 0 − gap, not −gap: a contact that just touches must not make the deepest
         // overlap −0 on the one rank that holds it alone.
-        for (int j = 0; j < u->n; j++) t->overlap = bt_max(t->overlap, 0 - t->gaps[at].gap[j]);
+        for (int j = 0; j < contact->n; j++) cell->overlap = bt_max(cell->overlap, 0 - cell->gaps[at].gap[j]);
     }
 }

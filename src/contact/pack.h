@@ -33,24 +33,24 @@ typedef struct bt_pack_scratch {
 } bt_pack_scratch;
 
 /// Room for n manifolds, none kept yet.
-void bt_pack_begin(bt_pack_scratch *s, size_t n);
+void bt_pack_begin(bt_pack_scratch *scratch, size_t n);
 /// Place for the next manifold, of pair i; it counts once n is one more.
-static inline bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i)
+static inline bt_manifold *bt_pack_next(bt_pack_scratch *scratch, bt_idx i)
 {
-    s->pair[s->n] = i;
-    return &s->man[s->n];
+    scratch->pair[scratch->n] = i;
+    return &scratch->man[scratch->n];
 }
 /// The contacts of cell k from the manifolds kept, with the impulses of those in their places (without warm start: 0).
-void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s);
-void bt_pack_scratch_free(bt_pack_scratch *s);
+void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch);
+void bt_pack_scratch_free(bt_pack_scratch *scratch);
 
 /// Normal and arms of a contact, from its manifold.
-void bt_pack_rows(const bt_world *w, const bt_manifold *m, bt_contact *u);
+void bt_pack_rows(const bt_world *world, const bt_manifold *manifold, bt_contact *contact);
 
 /// Normal biases of a contact with these gaps, `share`: factor on the restitution.
-void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share);
+void bt_pack_bias(const bt_world *world, bt_contact *contact, const bt_gaps *gaps, double share);
 
-/// The row of contact j of cell t gets this state, and the bias that goes with it.
-void bt_pack_set_row(const bt_world *w, bt_cell *t, bt_idx j, bt_row_state state);
+/// The row of contact j of the cell gets this state, and the bias that goes with it.
+void bt_pack_set_row(const bt_world *world, bt_cell *cell, bt_idx j, bt_row_state state);
 
 #endif

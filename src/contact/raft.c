@@ -54,32 +54,32 @@ static const bt_law_total totals[] = {
 
 #define LEAST_BLEND 1e-6 // of the mean floe, assumed: far beyond rounding, far below any slop but 0
 
-static void setup(const bt_case *c, double own[BT_MAX_CONTACT_OWN])
+static void setup(const bt_case *input, double own[BT_MAX_CONTACT_OWN])
 {
-    const double rise = bt_case_rise(c->ice.density, c->water.density);
-    own[BT_RAFT_LINE] = c->ice.rafting_kappa * 0.5 * rise;
-    own[BT_RAFT_SHEET] = (c->water.density - c->ice.density) * BT_GRAVITY;
+    const double rise = bt_case_rise(input->ice.density, input->water.density);
+    own[BT_RAFT_LINE] = input->ice.rafting_kappa * 0.5 * rise;
+    own[BT_RAFT_SHEET] = (input->water.density - input->ice.density) * BT_GRAVITY;
     own[BT_RAFT_RISE] = rise;
-    own[BT_RAFT_FREEBOARD] = 1 - c->ice.density / c->water.density;
+    own[BT_RAFT_FREEBOARD] = 1 - input->ice.density / input->water.density;
 }
 
 static bool on(const double *own) { return own[BT_RAFT_LINE] > 0; }
 
-static char *check(const bt_case *c, double thickness, double size)
+static char *check(const bt_case *input, double thickness, double size)
 {
-    if (!(c->ice.rafting_kappa > 0)) return NULL;
+    if (!(input->ice.rafting_kappa > 0)) return NULL;
     const double h = thickness,
-                 line = 0.5 * c->ice.rafting_kappa * bt_case_rise(c->ice.density, c->water.density) * h * h;
+                 line = 0.5 * input->ice.rafting_kappa * bt_case_rise(input->ice.density, input->water.density) * h * h;
     return bt_text_of(
         "rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an "
         "edge of a mean floe's width rafts at %.4g N\n",
-        line, c->ice.rafting_kappa, c->ice.friction * (c->water.density - c->ice.density) * BT_GRAVITY * h,
-        line * size);
+        line, input->ice.rafting_kappa,
+        input->ice.friction * (input->water.density - input->ice.density) * BT_GRAVITY * h, line * size);
 }
 
-static char *result(const bt_case *c, const bt_total_value *total, double ice_area)
+static char *result(const bt_case *input, const bt_total_value *total, double ice_area)
 {
-    if (!(c->ice.rafting_kappa > 0)) return NULL;
+    if (!(input->ice.rafting_kappa > 0)) return NULL;
     return bt_text_of(
         "  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J "
         "of it in the sheets' height, friction between sheets %.4g J\n",
@@ -87,215 +87,223 @@ static char *result(const bt_case *c, const bt_total_value *total, double ice_ar
         total[ALL_EDGE_WORK].real, total[ALL_ENERGY].real, total[ALL_FRICTION_WORK].real);
 }
 
-static const double *own_of(const bt_world *w) { return w->par.law_own[BT_LAW_RAFTING]; }
+static const double *own_of(const bt_world *world) { return world->par.law_own[BT_LAW_RAFTING]; }
 
-static double thinner(const bt_bodies *s, bt_idx a, bt_idx b) { return bt_min(s->thickness[a], s->thickness[b]); }
-
-static bool applies(const bt_world *w, bt_idx a, bt_idx b)
+static double thinner(const bt_bodies *bodies, bt_idx a, bt_idx b)
 {
-    const bt_bodies *s = &w->bodies;
-    return bt_bodies_slide(s, a, s, b, w->towed, own_of(w)[BT_RAFT_FREEBOARD]);
+    return bt_min(bodies->thickness[a], bodies->thickness[b]);
+}
+
+static bool applies(const bt_world *world, bt_idx a, bt_idx b)
+{
+    const bt_bodies *bodies = &world->bodies;
+    return bt_bodies_slide(bodies, a, bodies, b, world->towed, own_of(world)[BT_RAFT_FREEBOARD]);
 }
 
 /// q0, N/m.
-static double line_load(const bt_world *w, bt_idx a, bt_idx b)
+static double line_load(const bt_world *world, bt_idx a, bt_idx b)
 {
-    const double h = thinner(&w->bodies, a, b);
-    return own_of(w)[BT_RAFT_LINE] * h * h;
+    const double h = thinner(&world->bodies, a, b);
+    return own_of(world)[BT_RAFT_LINE] * h * h;
 }
 
 /// What the sheets gain in height, of that: E', N/m.
-static double stored_load(const bt_world *w, bt_idx a, bt_idx b)
+static double stored_load(const bt_world *world, bt_idx a, bt_idx b)
 {
-    const double *h = w->bodies.thickness;
-    return bt_min(own_of(w)[BT_RAFT_RISE] * h[a] * h[b], line_load(w, a, b));
+    const double *h = world->bodies.thickness;
+    return bt_min(own_of(world)[BT_RAFT_RISE] * h[a] * h[b], line_load(world, a, b));
 }
 
 /// Over what lengths rounding, and residuals, must not decide, m.
-static double least_blend(const bt_world *w) { return bt_max(w->par.slop, LEAST_BLEND * w->par.size); }
+static double least_blend(const bt_world *world) { return bt_max(world->par.slop, LEAST_BLEND * world->par.size); }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-static bool keeps(const bt_world *w, bt_memory *r)
+static bool keeps(const bt_world *world, bt_memory *memory)
 {
-    const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
+    const bt_idx a = bt_world_index(world, memory->a), b = bt_world_index(world, memory->b);
     if (a < 0 || b < 0) return false;
-    bt_overlap o;
+    bt_overlap overlap;
     double centroid[2];
-    bt_overlap_clip(w, a, b, r->part, 0, 0, &o);
-    r->value[1] = bt_overlap_area(&o, centroid);
-    r->value[0] = bt_max(r->value[0], r->value[1]);
-    return r->value[1] > 0;
+    bt_overlap_clip(world, a, b, memory->part, 0, 0, &overlap);
+    memory->value[1] = bt_overlap_area(&overlap, centroid);
+    memory->value[0] = bt_max(memory->value[0], memory->value[1]);
+    return memory->value[1] > 0;
 }
 
-static double count(const bt_world *w, const bt_memory *r, bt_sum *number)
+static double count(const bt_world *world, const bt_memory *memory, bt_sum *number)
 {
-    const bt_bodies *s = &w->bodies;
-    const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
-    if (!(r->value[1] > 0)) return 0;
+    const bt_bodies *bodies = &world->bodies;
+    const bt_idx a = bt_world_index(world, memory->a), b = bt_world_index(world, memory->b);
+    if (!(memory->value[1] > 0)) return 0;
     bt_sum_add(&number[PAIRS], 1);
-    bt_sum_add(&number[AREA], r->value[1]);
-    bt_sum_add(&number[ENERGY], own_of(w)[BT_RAFT_RISE] * s->thickness[a] * s->thickness[b] * r->value[1]);
-    return r->value[1];
+    bt_sum_add(&number[AREA], memory->value[1]);
+    bt_sum_add(&number[ENERGY],
+               own_of(world)[BT_RAFT_RISE] * bodies->thickness[a] * bodies->thickness[b] * memory->value[1]);
+    return memory->value[1];
 }
 
 // --- geometry --------------------------------------------------------------------------------------------------------
 
-static void set_point(bt_manifold *m, double x, double y, const double off[2], double gap, uint32_t feature)
+static void set_point(bt_manifold *manifold, double x, double y, const double off[2], double gap, uint32_t feature)
 {
-    m->p[m->n_points++] = (bt_point){.gap = gap, .ra = {x, y}, .rb = {x - off[0], y - off[1]}, .feature = feature};
+    manifold->p[manifold->n_points++] = (bt_point){.gap = gap, .ra = {x, y}, .rb = {x - off[0], y - off[1]},
+                                                   .feature = feature};
 }
 
 /// The edge: two points along it, about the centroid of the overlap.
 static void edge_of(const double grad[2], double length, double gap, const double centroid[2], const double off[2],
-                    bt_manifold *m)
+                    bt_manifold *manifold)
 {
-    m->nx = -grad[0] / length, m->ny = -grad[1] / length;
+    manifold->nx = -grad[0] / length, manifold->ny = -grad[1] / length;
     for (int side = -1; side <= 1; side += 2)
-        set_point(m, centroid[0] - side * 0.25 * length * m->ny, centroid[1] + side * 0.25 * length * m->nx, off, gap,
-                  side < 0 ? 0xfff00000u : 0xfff00001u);
+        set_point(manifold, centroid[0] - side * 0.25 * length * manifold->ny,
+                  centroid[1] + side * 0.25 * length * manifold->nx, off, gap, side < 0 ? 0xfff00000u : 0xfff00001u);
 }
 
 /// s of raft.h: of a push that goes along the edge by less than the blend, a part.
-static double length_of_ends(const bt_overlap *o, const bt_manifold *edge, double length, double blend)
+static double length_of_ends(const bt_overlap *overlap, const bt_manifold *edge, double length, double blend)
 {
     double sum = 0;
-    for (int k = 0; k < o->n; k++) {
-        const double along = o->push[k][1] * edge->nx - o->push[k][0] * edge->ny;
+    for (int k = 0; k < overlap->n; k++) {
+        const double along = overlap->push[k][1] * edge->nx - overlap->push[k][0] * edge->ny;
         sum += along * bt_max(0, bt_min(1, 0.5 * (1 + along / blend)));
     }
     return bt_min(0.5, sum / length);
 }
 
 /// False without an edge. `sheets` always; it has a vector along the edge, s long, in place of its normal.
-static bool contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
+static bool contact(const bt_world *world, const bt_pair *pair, const bt_memory *memory, bt_manifold *edge,
+                    bt_manifold *sheets)
 {
-    bt_overlap o;
+    bt_overlap overlap;
     double grad[2], centroid[2], off[2];
-    bt_overlap_clip(w, p->a, p->b, p->part, 0, 0, &o);
-    bt_overlap_area(&o, centroid);
+    bt_overlap_clip(world, pair->a, pair->b, pair->part, 0, 0, &overlap);
+    bt_overlap_area(&overlap, centroid);
     // rounding must not tell which edge is inside
-    bt_overlap_gradient(w, p->a, p->b, p->part, &o, least_blend(w), grad);
-    bt_bodies_offset(w, p->a, p->b, off);
-    *edge = (bt_manifold){.a = p->a, .b = p->b};
-    *sheets = (bt_manifold){.a = p->a, .b = p->b};
+    bt_overlap_gradient(world, pair->a, pair->b, pair->part, &overlap, least_blend(world), grad);
+    bt_bodies_offset(world, pair->a, pair->b, off);
+    *edge = (bt_manifold){.a = pair->a, .b = pair->b};
+    *sheets = (bt_manifold){.a = pair->a, .b = pair->b};
     sheets->p[0] = (bt_point){.ra = {centroid[0], centroid[1]}, .rb = {centroid[0] - off[0], centroid[1] - off[1]}};
     const double length = bt_hypot(grad[0], grad[1]);
-    if (!(length > LEAST_LENGTH * thinner(&w->bodies, p->a, p->b))) return false;
-    edge_of(grad, length, (r->value[0] - r->value[1]) / length, centroid, off, edge);
-    const double part = length_of_ends(&o, edge, length, least_blend(w));
+    if (!(length > LEAST_LENGTH * thinner(&world->bodies, pair->a, pair->b))) return false;
+    edge_of(grad, length, (memory->value[0] - memory->value[1]) / length, centroid, off, edge);
+    const double part = length_of_ends(&overlap, edge, length, least_blend(world));
     sheets->nx = -part * edge->ny, sheets->ny = part * edge->nx;
     return true;
 }
 
 /// Of a pair that has rafted: its two points, L/4 from the middle, take half each.
-static bt_patch chord_of(const bt_manifold *m)
+static bt_patch chord_of(const bt_manifold *manifold)
 {
-    return (bt_patch){2 * fabs(bt_law_along(m, 1) - bt_law_along(m, 0)), NAN};
+    return (bt_patch){2 * fabs(bt_law_along(manifold, 1) - bt_law_along(manifold, 0)), NAN};
 }
 
 /// Of one that has not: what lies flush of its edges, from the nearer point on.
-static bt_patch flush_part(const bt_manifold *m)
+static bt_patch flush_part(const bt_manifold *manifold)
 {
-    if (m->n_points < 2) return (bt_patch){m->flush, NAN};
-    const int near = m->p[1].gap < m->p[0].gap;
-    const double half = 0.5 * m->flush, from = bt_law_along(m, near), to = bt_law_along(m, 1 - near);
-    return (bt_patch){m->flush, from + (to < from ? -half : half)};
+    if (manifold->n_points < 2) return (bt_patch){manifold->flush, NAN};
+    const int near = manifold->p[1].gap < manifold->p[0].gap;
+    const double half = 0.5 * manifold->flush, from = bt_law_along(manifold, near),
+                 to = bt_law_along(manifold, 1 - near);
+    return (bt_patch){manifold->flush, from + (to < from ? -half : half)};
 }
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
 /// Of the way that an edge would make in the step by the velocities without contacts, the part beyond its gap; a slop
 /// is added to the way.
-static double reached(const bt_world *w, const bt_contact *edge, double gap)
+static double reached(const bt_world *world, const bt_contact *edge, double gap)
 {
-    const bt_bodies *s = &w->bodies;
-    const double before = bt_mean_normal_velocity(edge, &s->vel_start[edge->a], &s->vel_start[edge->b]),
-                 free = bt_mean_normal_velocity(edge, &s->vel_free[edge->a], &s->vel_free[edge->b]);
-    const double way = w->par.dt * bt_max(0, -bt_min(before, free));
-    return bt_max(0, 1 - gap / (way + least_blend(w)));
+    const bt_bodies *bodies = &world->bodies;
+    const double before = bt_mean_normal_velocity(edge, &bodies->vel_start[edge->a], &bodies->vel_start[edge->b]),
+                 free = bt_mean_normal_velocity(edge, &bodies->vel_free[edge->a], &bodies->vel_free[edge->b]);
+    const double way = world->par.dt * bt_max(0, -bt_min(before, free));
+    return bt_max(0, 1 - gap / (way + least_blend(world)));
 }
 
 /// edge: contact of the same pair, which has its bounds already (detect.c puts sheets after all others), −1 = none.
-static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, bt_idx edge, const bt_manifold *m,
-                         const bt_memory *r)
+static void bound_sheets(const bt_world *world, bt_cell *cell, bt_idx j, bt_idx edge, const bt_manifold *manifold,
+                         const bt_memory *memory)
 {
-    bt_contact *u = &t->contacts[j];
-    bt_limit *l = &t->laws.limits[j];
-    const double pressure = own_of(w)[BT_RAFT_SHEET] * thinner(&w->bodies, u->a, u->b);
-    l->flat[0] = bt_pair_friction(&w->bodies, u->a, u->b) * pressure * r->value[1] * w->par.dt;
+    bt_contact *contact = &cell->contacts[j];
+    bt_limit *l = &cell->laws.limits[j];
+    const double pressure = own_of(world)[BT_RAFT_SHEET] * thinner(&world->bodies, contact->a, contact->b);
+    l->flat[0] = bt_pair_friction(&world->bodies, contact->a, contact->b) * pressure * memory->value[1] * world->par.dt;
     double load = 0;
     if (edge >= 0) {
-        const bt_limit *e = &t->laws.limits[edge];
-        load = (e->flat[0] + e->flat[1]) * reached(w, &t->contacts[edge], t->gaps[edge].gap[0]);
+        const bt_limit *e = &cell->laws.limits[edge];
+        load = (e->flat[0] + e->flat[1]) * reached(world, &cell->contacts[edge], cell->gaps[edge].gap[0]);
     }
-    l->ends[0] = load * m->nx, l->ends[1] = load * m->ny;
-    if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
+    l->ends[0] = load * manifold->nx, l->ends[1] = load * manifold->ny;
+    if (world->par.warm_start) contact->ln[0] = memory->value[2], contact->lt = memory->value[3];
 }
 
-static void bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
-    bt_limit *l = &t->laws.limits[j];
-    const bt_memory names = bt_law_names(w, p, BT_LAW_RAFTING);
-    const bt_idx at = bt_law_find(t, &names);
-    l->record[BT_LAW_RAFTING] = (int32_t)at;
-    if (m->n_points == 0) {
-        bound_sheets(w, t, j, p->contact, m, &t->laws.memory[at]);
+    bt_limit *limit = &cell->laws.limits[j];
+    const bt_memory names = bt_law_names(world, pair, BT_LAW_RAFTING);
+    const bt_idx at = bt_law_find(cell, &names);
+    limit->record[BT_LAW_RAFTING] = (int32_t)at;
+    if (manifold->n_points == 0) {
+        bound_sheets(world, cell, j, pair->contact, manifold, &cell->laws.memory[at]);
         return;
     }
-    const double h = thinner(&w->bodies, m->a, m->b), stored = stored_load(w, m->a, m->b);
-    double load = line_load(w, m->a, m->b);
-    if (at >= 0) load = stored + (load - stored) * reached(w, &t->contacts[j], m->p[0].gap);
-    const bt_closing c = bt_law_closing(w, t, j, m);
-    const bt_patch edge = at >= 0 ? chord_of(m) : flush_part(m);
-    for (int i = 0; i < m->n_points; i++) {
-        const double length = edge.length * bt_law_share(m, i, edge, &c);
-        bt_law_narrow(l, i, load * w->par.dt * bt_max(length, h / c.n), BT_LAW_RAFTING);
+    const double h = thinner(&world->bodies, manifold->a, manifold->b),
+                 stored = stored_load(world, manifold->a, manifold->b);
+    double load = line_load(world, manifold->a, manifold->b);
+    if (at >= 0) load = stored + (load - stored) * reached(world, &cell->contacts[j], manifold->p[0].gap);
+    const bt_closing closing = bt_law_closing(world, cell, j, manifold);
+    const bt_patch edge = at >= 0 ? chord_of(manifold) : flush_part(manifold);
+    for (int i = 0; i < manifold->n_points; i++) {
+        const double length = edge.length * bt_law_share(manifold, i, edge, &closing);
+        bt_law_narrow(limit, i, load * world->par.dt * bt_max(length, h / closing.n), BT_LAW_RAFTING);
     }
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-static bool gives_way(const bt_contact *u, const bt_limit *l, int i)
+static bool gives_way(const bt_contact *contact, const bt_limit *limit, int i)
 {
-    return l->by[i] == BT_LAW_RAFTING && u->ln[i] >= l->cap[i];
+    return limit->by[i] == BT_LAW_RAFTING && contact->ln[i] >= limit->cap[i];
 }
 
-static void give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_sum *number)
+static void give_way(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *number)
 {
-    bt_sum_add(&number[EDGE_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
+    bt_sum_add(&number[EDGE_WORK], -bt_contacts_normal_work(world, &cell->contacts[j], i));
 }
 
 /// Sheets with the load of their ends alone.
-static bt_contact ends_of(const bt_contact *sheets, const bt_limit *l)
+static bt_contact ends_of(const bt_contact *sheets, const bt_limit *limit)
 {
-    bt_contact u = *sheets;
-    const double part = bt_part_of_ends(l->ends, u.ln[0], u.lt);
-    u.ln[0] = part * l->ends[0], u.lt = part * l->ends[1];
-    return u;
+    bt_contact contact = *sheets;
+    const double part = bt_part_of_ends(limit->ends, contact.ln[0], contact.lt);
+    contact.ln[0] = part * limit->ends[0], contact.lt = part * limit->ends[1];
+    return contact;
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
-static void remember(bt_world *w, bt_cell *t, bt_idx j, bt_sum *number)
+static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 {
-    const bt_contact *u = &t->contacts[j];
-    const bt_limit *l = &t->laws.limits[j];
-    const bt_idx at = l->record[BT_LAW_RAFTING];
-    if (u->n == 0) {
-        t->laws.memory[at].value[2] = u->ln[0];
-        t->laws.memory[at].value[3] = u->lt;
-        const bt_contact ends = ends_of(u, l);
-        const double of_ends = -bt_contacts_work(w, &ends);
+    const bt_contact *contact = &cell->contacts[j];
+    const bt_limit *limit = &cell->laws.limits[j];
+    const bt_idx at = limit->record[BT_LAW_RAFTING];
+    if (contact->n == 0) {
+        cell->laws.memory[at].value[2] = contact->ln[0];
+        cell->laws.memory[at].value[3] = contact->lt;
+        const bt_contact ends = ends_of(contact, limit);
+        const double of_ends = -bt_contacts_work(world, &ends);
         bt_sum_add(&number[EDGE_WORK], of_ends);
-        bt_sum_add(&number[FRICTION_WORK], -bt_contacts_work(w, u) - of_ends);
+        bt_sum_add(&number[FRICTION_WORK], -bt_contacts_work(world, contact) - of_ends);
         return;
     }
     bool begins = false;
-    for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && gives_way(u, l, i));
+    for (int i = 0; i < contact->n; i++) begins = begins || (limit->grown[i] > 0 && gives_way(contact, limit, i));
     if (!begins || at >= 0) return;
-    bt_memory r = bt_law_names(w, &t->search.pairs[t->contacts[j].pair], BT_LAW_RAFTING);
-    r.n_points = 2;
-    bt_law_put(t, -1, &r);
+    bt_memory memory = bt_law_names(world, &cell->search.pairs[cell->contacts[j].pair], BT_LAW_RAFTING);
+    memory.n_points = 2;
+    bt_law_put(cell, -1, &memory);
 }
 
 const bt_law bt_raft_law = {.name = "rafting",

@@ -34,11 +34,12 @@ static void check_series(const bt_contact_law *law, const char *name, bt_errors 
     snprintf(work, sizeof work, "%.*s_work", BT_MOST_LAW_NAME, name);
     if (!bt_series_may_be || !bt_series_may_be(work, 1 + law->n_numbers, err)) return;
     for (int k = 0; k < law->n_numbers; k++) {
-        const bt_contact_number *n = &law->numbers[k];
-        if (!n->name || !n->units || !*n->units || !n->description || strlen(n->description) < 8)
+        const bt_contact_number *number = &law->numbers[k];
+        if (!number->name || !number->units || !*number->units || !number->description ||
+            strlen(number->description) < 8)
             bt_errors_add(err, "contact law %s: its number %d needs name, units (\"1\" for a plain number) and a "
                           "description", name, k + 1);
-        else bt_series_may_be(n->name, 1, err);
+        else bt_series_may_be(number->name, 1, err);
     }
 }
 

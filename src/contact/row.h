@@ -7,20 +7,21 @@
 
 #include "space/cells.h"
 
-static inline double bt_normal_velocity(const bt_contact *u, int i, const bt_vel *va, const bt_vel *vb)
+static inline double bt_normal_velocity(const bt_contact *contact, int i, const bt_vel *va, const bt_vel *vb)
 {
-    return u->nx * (vb->x - va->x) + u->ny * (vb->y - va->y) + u->rbn[i] * vb->w - u->ran[i] * va->w;
+    return contact->nx * (vb->x - va->x) + contact->ny * (vb->y - va->y) + contact->rbn[i] * vb->w -
+           contact->ran[i] * va->w;
 }
 
 /// At the middle of the two points of a contact.
-static inline double bt_mean_normal_velocity(const bt_contact *u, const bt_vel *va, const bt_vel *vb)
+static inline double bt_mean_normal_velocity(const bt_contact *contact, const bt_vel *va, const bt_vel *vb)
 {
-    return 0.5 * (bt_normal_velocity(u, 0, va, vb) + bt_normal_velocity(u, 1, va, vb));
+    return 0.5 * (bt_normal_velocity(contact, 0, va, vb) + bt_normal_velocity(contact, 1, va, vb));
 }
 
-static inline double bt_tangent_velocity(const bt_contact *u, const bt_vel *va, const bt_vel *vb)
+static inline double bt_tangent_velocity(const bt_contact *contact, const bt_vel *va, const bt_vel *vb)
 {
-    return u->nx * (vb->y - va->y) - u->ny * (vb->x - va->x) + u->rbt * vb->w - u->rat * va->w;
+    return contact->nx * (vb->y - va->y) - contact->ny * (vb->x - va->x) + contact->rbt * vb->w - contact->rat * va->w;
 }
 
 /// Effective masses of a contact.
@@ -38,61 +39,62 @@ static inline double bt_coupling(bt_inv ia, bt_inv ib, double p, double q, doubl
 }
 
 /// Sheets that lie on each other (contact/raft.h): one step length for the components along x and y.
-static inline bt_mass bt_mass_of_sheets(const bt_contact *u, bt_inv ia, bt_inv ib)
+static inline bt_mass bt_mass_of_sheets(const bt_contact *contact, bt_inv ia, bt_inv ib)
 {
-    const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
-    const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt,
-                 xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
+    const double free = ia.m + ib.m,
+                 x = ia.i * contact->ran[0] * contact->ran[0] + ib.i * contact->rbn[0] * contact->rbn[0];
+    const double y = ia.i * contact->rat * contact->rat + ib.i * contact->rbt * contact->rbt,
+                 xy = ia.i * contact->ran[0] * contact->rat + ib.i * contact->rbn[0] * contact->rbt;
     const double w = free + 0.5 * (x + y) + sqrt(0.25 * (x - y) * (x - y) + xy * xy);
     return (bt_mass){.w = {w}, .mn = {1 / w}, .wt = w, .mt = 1 / w};
 }
 
 /// Always by these expressions, or by the same four at a time (solve/rows.h): bits are the same wherever it is formed.
-static inline bt_mass bt_mass_of(const bt_contact *u, const bt_inv *inv)
+static inline bt_mass bt_mass_of(const bt_contact *contact, const bt_inv *inv)
 {
-    const bt_inv ia = inv[u->a], ib = inv[u->b];
-    if (u->n == 0) return bt_mass_of_sheets(u, ia, ib);
+    const bt_inv ia = inv[contact->a], ib = inv[contact->b];
+    if (contact->n == 0) return bt_mass_of_sheets(contact, ia, ib);
     bt_mass m = {0};
-    for (int i = 0; i < u->n; i++) {
-        m.w[i] = bt_coupling(ia, ib, u->ran[i], u->ran[i], u->rbn[i], u->rbn[i]);
+    for (int i = 0; i < contact->n; i++) {
+        m.w[i] = bt_coupling(ia, ib, contact->ran[i], contact->ran[i], contact->rbn[i], contact->rbn[i]);
         m.mn[i] = 1 / m.w[i];
     }
-    m.wt = bt_coupling(ia, ib, u->rat, u->rat, u->rbt, u->rbt);
+    m.wt = bt_coupling(ia, ib, contact->rat, contact->rat, contact->rbt, contact->rbt);
     m.mt = 1 / m.wt;
-    if (u->n == 1) return m;
-    m.w12 = bt_coupling(ia, ib, u->ran[0], u->ran[1], u->rbn[0], u->rbn[1]);
+    if (contact->n == 1) return m;
+    m.w12 = bt_coupling(ia, ib, contact->ran[0], contact->ran[1], contact->rbn[0], contact->rbn[1]);
     const double det = m.w[0] * m.w[1] - m.w12 * m.w12;
     m.per_det = det > 1e-9 * m.w[0] * m.w[1] ? 1 / det : 0;
     return m;
 }
 
 /// Add impulses to both velocities: normal total jn = Σ λ, its moments Σ λ ra×n and Σ λ rb×n, tangential jt.
-static inline void bt_apply(const bt_contact *u, double jn, double ma, double mb, double jt, bt_inv ia, bt_inv ib,
+static inline void bt_apply(const bt_contact *contact, double jn, double ma, double mb, double jt, bt_inv ia, bt_inv ib,
                             bt_vel *va, bt_vel *vb)
 {
-    const double jx = jn * u->nx - jt * u->ny, jy = jn * u->ny + jt * u->nx;
+    const double jx = jn * contact->nx - jt * contact->ny, jy = jn * contact->ny + jt * contact->nx;
     va->x -= ia.m * jx;
     va->y -= ia.m * jy;
-    va->w -= ia.i * (ma + jt * u->rat);
+    va->w -= ia.i * (ma + jt * contact->rat);
     vb->x += ib.m * jx;
     vb->y += ib.m * jy;
-    vb->w += ib.i * (mb + jt * u->rbt);
+    vb->w += ib.i * (mb + jt * contact->rbt);
 }
 
 /// Impulse of a contact on its body b; on a the opposite.
-static inline void bt_impulse_on_b(const bt_contact *u, double *x, double *y)
+static inline void bt_impulse_on_b(const bt_contact *contact, double *x, double *y)
 {
-    const double normal = u->ln[0] + u->ln[1];
-    *x = normal * u->nx - u->lt * u->ny;
-    *y = normal * u->ny + u->lt * u->nx;
+    const double normal = contact->ln[0] + contact->ln[1];
+    *x = normal * contact->nx - contact->lt * contact->ny;
+    *y = normal * contact->ny + contact->lt * contact->nx;
 }
 
 /// The impulse that comes in by a contact whose other body has infinite mass: on the one that can move. False where
 /// both can or neither. inv: of all bodies.
-static inline bool bt_impulse_from_outside(const bt_contact *u, const bt_inv *inv, double *x, double *y)
+static inline bool bt_impulse_from_outside(const bt_contact *contact, const bt_inv *inv, double *x, double *y)
 {
-    const double sign = (inv[u->b].m > 0) - (inv[u->a].m > 0);
-    bt_impulse_on_b(u, x, y);
+    const double sign = (inv[contact->b].m > 0) - (inv[contact->a].m > 0);
+    bt_impulse_on_b(contact, x, y);
     *x *= sign, *y *= sign;
     return sign != 0;
 }

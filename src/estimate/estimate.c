@@ -163,113 +163,117 @@ static int n_estimates = BT_N_OWN_ESTIMATES;
 int bt_n_estimates(void) { return n_estimates; }
 const bt_estimate_def *bt_estimate_of(int k) { return &estimates[k]; }
 
-bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err)
+bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
 {
     const size_t before = err->n;
-    const char *name = d->name ? d->name : "";
+    const char *name = def->name ? def->name : "";
     if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // the summary has curves of them all
         bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
     for (int k = 0; k < n_estimates; k++)
         if (!strcmp(estimates[k].name, name))
             bt_errors_add(err, "estimate %s: there is one of this name; choose another", name);
-    if (!d->label || !d->formula || !d->source)
+    if (!def->label || !def->formula || !def->source)
         bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
-    if (!d->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);
+    if (!def->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);
     if (n_estimates == BT_MAX_ESTIMATES)
         bt_errors_add(err, "estimate %s: there are %d; raise BT_MAX_ESTIMATES", name, BT_MAX_ESTIMATES);
     if (err->n > before) return BT_ERR_USAGE;
-    estimates[n_estimates++] = *d;
+    estimates[n_estimates++] = *def;
     return BT_OK;
 }
 
-static bt_estimate force_of(const bt_estimate_def *d, const bt_estimate_input *in)
+static bt_estimate force_of(const bt_estimate_def *def, const bt_estimate_input *in)
 {
     if (isnan(in->along)) return just(NAN, false, "no tow: free drift");
-    if (d->on_top) return d->at(in);
+    if (def->on_top) return def->at(in);
     if (in->concentration == 0) return just(0, true, "no ice");
-    if (in->along <= 0 && !d->any_course) return just(NAN, false, "the body does not move ahead through the ice");
+    if (in->along <= 0 && !def->any_course) return just(NAN, false, "the body does not move ahead through the ice");
     if (in->speed == 0) return just(0, true, "no motion through the ice");
-    return d->at(in);
+    return def->at(in);
 }
 
 bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
 {
-    const bt_estimate_def *d = &estimates[kind];
-    bt_estimate e = force_of(d, in);
-    e.compares =
-        e.valid && !d->on_top && (!d->knows || d->knows(in)) && e.force > 0 && !in->turns && !in->channel;
-    if (e.compares && in->along < BT_EST_STILL * in->ordered) {
+    const bt_estimate_def *def = &estimates[kind];
+    bt_estimate estimate = force_of(def, in);
+    estimate.compares =
+        estimate.valid && !def->on_top && (!def->knows || def->knows(in)) && estimate.force > 0 && !in->turns &&
+        !in->channel;
+    if (estimate.compares && in->along < BT_EST_STILL * in->ordered) {
         bt_estimate_input faster = *in;
         faster.along *= 2, faster.speed *= 2;
-        e.compares = force_of(d, &faster).force == e.force;
+        estimate.compares = force_of(def, &faster).force == estimate.force;
     }
-    return e;
+    return estimate;
 }
 
 /// Mean diameter weighted with area, <d³>/<d²>.
-static double weighted_size(const bt_case *c) { return bt_case_size_moment(c, 3) / bt_case_size_moment(c, 2); }
-
-void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
+static double weighted_size(const bt_case *input)
 {
-    bt_estimate_ordered(c, (const double[]){NAN, NAN}, in);
+    return bt_case_size_moment(input, 3) / bt_case_size_moment(input, 2);
 }
 
-void bt_estimate_ordered(const bt_case *c, const double ice[2], bt_estimate_input *in)
+void bt_estimate_conditions(const bt_case *input, bt_estimate_input *in)
 {
-    const double scale = c->estimate.length_scale;
+    bt_estimate_ordered(input, (const double[]){NAN, NAN}, in);
+}
+
+void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_input *in)
+{
+    const double scale = input->estimate.length_scale;
     *in = (bt_estimate_input){
-        .concentration = c->ice.concentration,
-        .thickness = c->ice.thickness,
-        .floe_radius = 0.5 * weighted_size(c),
+        .concentration = input->ice.concentration,
+        .thickness = input->ice.thickness,
+        .floe_radius = 0.5 * weighted_size(input),
         .speed = NAN,
         .along = NAN,
         .water_speed = NAN,
         .water_along = NAN,
         .ordered = NAN,
-        .restitution = c->body.restitution,
-        .ship = c->body.shape == BT_BODY_SHIP,
-        .ice_density = c->ice.density,
-        .water_density = c->water.density,
-        .p_star = c->estimate.p_star / scale,
-        .p_s = c->estimate.p_s / (scale * scale),
-        .c_si = c->estimate.c_si,
-        .kappa = c->estimate.kappa,
-        .kappa_low = c->estimate.kappa_low,
-        .kappa_high = c->estimate.kappa_high,
-        .phi_j = c->estimate.phi_j,
+        .restitution = input->body.restitution,
+        .ship = input->body.shape == BT_BODY_SHIP,
+        .ice_density = input->ice.density,
+        .water_density = input->water.density,
+        .p_star = input->estimate.p_star / scale,
+        .p_s = input->estimate.p_s / (scale * scale),
+        .c_si = input->estimate.c_si,
+        .kappa = input->estimate.kappa,
+        .kappa_low = input->estimate.kappa_low,
+        .kappa_high = input->estimate.kappa_high,
+        .phi_j = input->estimate.phi_j,
         .length_scale = scale,
-        .channel = c->lead.mode == BT_LEAD_CHANNEL,
+        .channel = input->lead.mode == BT_LEAD_CHANNEL,
     };
     double v[2 * BT_MAX_VERTICES];
-    const int n = bt_case_waterline(c, v);
+    const int n = bt_case_waterline(input, v);
     if (!n) return;
-    const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
-    const double ahead = c->tow.direction - c->body.yaw;
+    const double ux = bt_cos(input->tow.direction), uy = bt_sin(input->tow.direction);
+    const double ahead = input->tow.direction - input->body.yaw;
     in->width = bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead));
-    if (c->tow.mode == BT_TOW_NONE) return;
+    if (input->tow.mode == BT_TOW_NONE) return;
     double current[2]; // of a current that changes the mean over the run
-    bt_environment_mean(c, true, current);
+    bt_environment_mean(input, true, current);
     const double *drift = isnan(ice[0]) ? current : ice;
-    const double rx = c->tow.speed * ux - current[0], ry = c->tow.speed * uy - current[1],
-                 ix = c->tow.speed * ux - drift[0], iy = c->tow.speed * uy - drift[1];
+    const double rx = input->tow.speed * ux - current[0], ry = input->tow.speed * uy - current[1],
+                 ix = input->tow.speed * ux - drift[0], iy = input->tow.speed * uy - drift[1];
     in->speed = bt_hypot(ix, iy);
     in->along = in->ordered = ix * ux + iy * uy;
     in->water_speed = bt_hypot(rx, ry);
     in->water_along = rx * ux + ry * uy;
-    const double flow = in->water_speed > 0 ? bt_atan2(ry, rx) - c->body.yaw : ahead;
+    const double flow = in->water_speed > 0 ? bt_atan2(ry, rx) - input->body.yaw : ahead;
     in->drag =
-        0.5 * c->water.density * c->body.drag.water_form * c->body.draft *
+        0.5 * input->water.density * input->body.drag.water_form * input->body.draft *
             bt_shape_width(n, v, bt_cos(flow), bt_sin(flow)) +
-        c->water.density * c->body.drag.water_skin * bt_shape_moments(n, v).area;
+        input->water.density * input->body.drag.water_skin * bt_shape_moments(n, v).area;
 }
 
-void bt_estimate_field(const bt_field *f, double *thickness, double *radius)
+void bt_estimate_field(const bt_field *field, double *thickness, double *radius)
 {
     double area = 0, volume = 0, reach = 0;
-    for (bt_idx i = 0; i < f->n; i++) {
-        area += f->area[i];
-        volume += f->area[i] * f->thickness[i];
-        reach += f->area[i] * sqrt(f->area[i] / BT_PI);
+    for (bt_idx i = 0; i < field->n; i++) {
+        area += field->area[i];
+        volume += field->area[i] * field->thickness[i];
+        reach += field->area[i] * sqrt(field->area[i] / BT_PI);
     }
     *thickness = area > 0 ? volume / area : 0;
     *radius = area > 0 ? reach / area : 0;

@@ -13,57 +13,58 @@
 static const double ALONG = 0.9; // least cosine between the tow and the axis of the domain it is taken to follow
 
 /// Time at which the tow has gone so far, also beyond the end of the run; INFINITY if it never does.
-static double time_of(const bt_case *c, double way)
+static double time_of(const bt_case *input, double way)
 {
-    bt_case longer = *c;
+    bt_case longer = *input;
     for (int k = 0; k < 20; k++, longer.run.duration *= 2)
-        if (bt_case_tow_distance(c, longer.run.duration) >= way) return bt_case_tow_time(&longer, way);
+        if (bt_case_tow_distance(input, longer.run.duration) >= way) return bt_case_tow_time(&longer, way);
     return INFINITY;
 }
 
-bt_packing bt_packing_of(const bt_case *c, double concentration)
+bt_packing bt_packing_of(const bt_case *input, double concentration)
 {
-    bt_packing p = {.time = NAN, .way = NAN, .packed = c->estimate.phi_j};
+    bt_packing packing = {.time = NAN, .way = NAN, .packed = input->estimate.phi_j};
     double v[2 * BT_MAX_VERTICES];
-    const int n = bt_case_waterline(c, v);
-    const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction), yaw = c->body.yaw;
+    const int n = bt_case_waterline(input, v);
+    const double ux = bt_cos(input->tow.direction), uy = bt_sin(input->tow.direction), yaw = input->body.yaw;
     const bool x = fabs(ux) >= fabs(uy);
-    const bool wall = (x ? c->domain.ends : c->domain.sides) == BT_BOUND_WALL;
-    if (!n || !wall || !(concentration > 0) || c->tow.mode == BT_TOW_NONE || c->tow.n_waypoints > 0 ||
-        c->lead.mode != BT_LEAD_NONE)
-        return p;
-    if (fabs(x ? ux : uy) < ALONG) return p;
+    const bool wall = (x ? input->domain.ends : input->domain.sides) == BT_BOUND_WALL;
+    if (!n || !wall || !(concentration > 0) || input->tow.mode == BT_TOW_NONE || input->tow.n_waypoints > 0 ||
+        input->lead.mode != BT_LEAD_NONE)
+        return packing;
+    if (fabs(x ? ux : uy) < ALONG) return packing;
     // Along the axis s = x or y, in the sense of the tow: bow, wall, end of the ice.
-    const double sign = (x ? ux : uy) > 0 ? 1 : -1, at = x ? c->body.x : c->body.y;
+    const double sign = (x ? ux : uy) > 0 ? 1 : -1, at = x ? input->body.x : input->body.y;
     double bow = -INFINITY;
     for (int i = 0; i < n; i++) {
         const double wx = bt_cos(yaw) * v[2 * i] - bt_sin(yaw) * v[2 * i + 1],
                      wy = bt_sin(yaw) * v[2 * i] + bt_cos(yaw) * v[2 * i + 1];
         bow = bt_max(bow, sign * (at + (x ? wx : wy)));
     }
-    const double low = x ? c->domain.x0 : c->domain.y0, length = x ? c->domain.length : c->domain.width,
-                 W = x ? c->domain.width : c->domain.length;
+    const double low = x ? input->domain.x0 : input->domain.y0, length = x ? input->domain.length : input->domain.width,
+                 W = x ? input->domain.width : input->domain.length;
     double ice_low[2], ice_high[2];
-    bt_case_ice_region(c, ice_low, ice_high);
+    bt_case_ice_region(input, ice_low, ice_high);
     const double L = (sign > 0 ? low + length : -low) - bow,
                  ice = bt_min(L, bt_max(0, (sign > 0 ? ice_high[!x] : -ice_low[!x]) - bow));
-    const double ahead = c->tow.direction - yaw, b = bt_min(W, bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)));
-    const double room = W * (p.packed * L - concentration * ice), taken = p.packed * W - concentration * (W - b);
-    p.way = room <= 0 ? 0 : room / taken;
-    if (!(p.way <= L)) return (bt_packing){NAN, NAN, p.packed}; // the body is there first
-    p.time = p.way > 0 ? time_of(c, p.way / fabs(x ? ux : uy)) : 0;
-    return p;
+    const double ahead = input->tow.direction - yaw, b = bt_min(W, bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)));
+    const double room = W * (packing.packed * L - concentration * ice),
+                 taken = packing.packed * W - concentration * (W - b);
+    packing.way = room <= 0 ? 0 : room / taken;
+    if (!(packing.way <= L)) return (bt_packing){NAN, NAN, packing.packed}; // the body is there first
+    packing.time = packing.way > 0 ? time_of(input, packing.way / fabs(x ? ux : uy)) : 0;
+    return packing;
 }
 
-void bt_packing_warn(const bt_packing *p, double end, bt_errors *warnings)
+void bt_packing_warn(const bt_packing *packing, double end, bt_errors *warnings)
 {
-    if (!(end > BT_PACKING_EARLY * p->time)) return;
-    if (p->time == 0)
+    if (!(end > BT_PACKING_EARLY * packing->time)) return;
+    if (packing->time == 0)
         bt_warn(warnings, BT_WARN_PACKED_AT_START,
                 "domain.length: ice as dense as this (estimate.phi_j %g) is packed up to the wall ahead from the "
                 "start: the resistance is also a property of "
                 "the domain's length; take domain.ends: open, periodic or moving where no wall is meant",
-                p->packed);
+                packing->packed);
     else
         bt_warn(warnings, BT_WARN_PACKED,
                 "domain.length: the packed ice ahead reaches the wall at about %.3g s, %.3g s at the earliest "
@@ -71,5 +72,5 @@ void bt_packing_warn(const bt_packing *p, double end, bt_errors *warnings)
                 "%g over the width of the domain), and the end is at %g s: from then on the resistance is also a "
                 "property of the domain's length; end the run before, "
                 "or take a longer domain",
-                p->time, BT_PACKING_EARLY * p->time, p->packed, end);
+                packing->time, BT_PACKING_EARLY * packing->time, packing->packed, end);
 }

@@ -32,9 +32,9 @@ typedef struct bt_packing {
 
 /// concentration: as made, or as the case asks for. A tow along one pair of walls or the other, within 25 degrees; no
 /// lead, no way-points.
-bt_packing bt_packing_of(const bt_case *c, double concentration);
+bt_packing bt_packing_of(const bt_case *input, double concentration);
 
 /// Warn of a run (or window) that ends at `end`, s, after the wall has come into it.
-void bt_packing_warn(const bt_packing *p, double end, bt_errors *warnings);
+void bt_packing_warn(const bt_packing *packing, double end, bt_errors *warnings);
 
 #endif

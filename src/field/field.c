@@ -14,150 +14,150 @@
 
 // The ice field of rank 0 to all ranks.
 
-static void array(const bt_comm *c, double **x, int64_t n)
+static void array(const bt_comm *comm, double **x, int64_t n)
 {
-    if (c->rank != 0) *x = bt_realloc(*x, (size_t)n, sizeof **x);
-    bt_comm_bcast(c, *x, (size_t)n * sizeof **x);
+    if (comm->rank != 0) *x = bt_realloc(*x, (size_t)n, sizeof **x);
+    bt_comm_bcast(comm, *x, (size_t)n * sizeof **x);
 }
 
-void bt_field_share(const bt_comm *c, bt_field *f)
+void bt_field_share(const bt_comm *comm, bt_field *field)
 {
-    if (c->size == 1) return;
+    if (comm->size == 1) return;
     struct { int64_t n, vertices; double ice_area, concentration; bt_outline_counts outlines; } head = {0};
-    if (c->rank == 0) {
-        head.n = f->n;
-        head.vertices = f->offsets[f->n];
-        head.ice_area = f->ice_area;
-        head.concentration = f->concentration;
-        head.outlines = f->outlines;
+    if (comm->rank == 0) {
+        head.n = field->n;
+        head.vertices = field->offsets[field->n];
+        head.ice_area = field->ice_area;
+        head.concentration = field->concentration;
+        head.outlines = field->outlines;
     }
-    bt_comm_bcast(c, &head, sizeof head);
-    if (c->rank != 0) {
-        f->n = f->cap = (bt_idx)head.n;
-        f->cap_vertices = head.vertices;
-        f->ice_area = head.ice_area;
-        f->concentration = head.concentration;
-        f->outlines = head.outlines;
-        f->offsets = bt_realloc(f->offsets, (size_t)head.n + 1, sizeof *f->offsets);
+    bt_comm_bcast(comm, &head, sizeof head);
+    if (comm->rank != 0) {
+        field->n = field->cap = (bt_idx)head.n;
+        field->cap_vertices = head.vertices;
+        field->ice_area = head.ice_area;
+        field->concentration = head.concentration;
+        field->outlines = head.outlines;
+        field->offsets = bt_realloc(field->offsets, (size_t)head.n + 1, sizeof *field->offsets);
     }
-    bt_comm_bcast(c, f->offsets, ((size_t)head.n + 1) * sizeof *f->offsets);
-    array(c, &f->vertices, 2 * head.vertices);
-    array(c, &f->pose, 3 * head.n);
-    array(c, &f->thickness, head.n);
-    array(c, &f->area, head.n);
+    bt_comm_bcast(comm, field->offsets, ((size_t)head.n + 1) * sizeof *field->offsets);
+    array(comm, &field->vertices, 2 * head.vertices);
+    array(comm, &field->pose, 3 * head.n);
+    array(comm, &field->thickness, head.n);
+    array(comm, &field->area, head.n);
 }
 
 // --- a field ---------------------------------------------------------------------------------------------------------
 
-void bt_field_init(bt_field *f)
+void bt_field_init(bt_field *field)
 {
-    *f = (bt_field){0};
-    f->offsets = bt_alloc(1, sizeof *f->offsets); // the number of vertices of no floes
+    *field = (bt_field){0};
+    field->offsets = bt_alloc(1, sizeof *field->offsets); // the number of vertices of no floes
 }
 
-void bt_field_free(bt_field *f)
+void bt_field_free(bt_field *field)
 {
-    free(f->offsets);
-    free(f->vertices);
-    free(f->pose);
-    free(f->thickness);
-    free(f->area);
-    *f = (bt_field){0};
+    free(field->offsets);
+    free(field->vertices);
+    free(field->pose);
+    free(field->thickness);
+    free(field->area);
+    *field = (bt_field){0};
 }
 
-static void reserve(bt_field *f, int64_t floes, int64_t n_vertices)
+static void reserve(bt_field *field, int64_t floes, int64_t n_vertices)
 {
-    if (floes > f->cap) {
-        size_t cap = (size_t)bt_max((double)floes, 2.0 * f->cap);
-        f->offsets = bt_realloc(f->offsets, cap + 1, sizeof *f->offsets);
-        f->pose = bt_realloc(f->pose, 3 * cap, sizeof *f->pose);
-        f->thickness = bt_realloc(f->thickness, cap, sizeof *f->thickness);
-        f->area = bt_realloc(f->area, cap, sizeof *f->area);
-        f->cap = (bt_idx)cap;
+    if (floes > field->cap) {
+        size_t cap = (size_t)bt_max((double)floes, 2.0 * field->cap);
+        field->offsets = bt_realloc(field->offsets, cap + 1, sizeof *field->offsets);
+        field->pose = bt_realloc(field->pose, 3 * cap, sizeof *field->pose);
+        field->thickness = bt_realloc(field->thickness, cap, sizeof *field->thickness);
+        field->area = bt_realloc(field->area, cap, sizeof *field->area);
+        field->cap = (bt_idx)cap;
     }
-    if (n_vertices > f->cap_vertices) {
-        size_t cap = (size_t)bt_max((double)n_vertices, 2.0 * (double)f->cap_vertices);
-        f->vertices = bt_realloc(f->vertices, 2 * cap, sizeof *f->vertices);
-        f->cap_vertices = (int64_t)cap;
+    if (n_vertices > field->cap_vertices) {
+        size_t cap = (size_t)bt_max((double)n_vertices, 2.0 * (double)field->cap_vertices);
+        field->vertices = bt_realloc(field->vertices, 2 * cap, sizeof *field->vertices);
+        field->cap_vertices = (int64_t)cap;
     }
 }
 
-double bt_field_floe_area(const bt_field *f)
+double bt_field_floe_area(const bt_field *field)
 {
     double area = 0;
-    for (bt_idx i = 0; i < f->n; i++) area += f->area[i];
+    for (bt_idx i = 0; i < field->n; i++) area += field->area[i];
     return area;
 }
 
-double bt_field_mean_size(const bt_field *f)
+double bt_field_mean_size(const bt_field *field)
 {
     double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++) sum += sqrt(4 * f->area[i] / BT_PI);
-    return f->n ? sum / f->n : NAN;
+    for (bt_idx i = 0; i < field->n; i++) sum += sqrt(4 * field->area[i] / BT_PI);
+    return field->n ? sum / field->n : NAN;
 }
 
-void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, double yaw, double thickness)
+void bt_field_add(bt_field *field, int nv, const double *v, double x, double y, double yaw, double thickness)
 {
-    bt_idx i = f->n;
-    int64_t at = f->offsets[i];
-    reserve(f, i + 1, at + nv);
-    double *own = f->vertices + 2 * at;
+    bt_idx i = field->n;
+    int64_t at = field->offsets[i];
+    reserve(field, i + 1, at + nv);
+    double *own = field->vertices + 2 * at;
     memcpy(own, v, 2 * (size_t)nv * sizeof *own);
-    bt_moments m = bt_shape_centre(nv, own);
+    bt_moments moments = bt_shape_centre(nv, own);
     double c = bt_cos(yaw), s = bt_sin(yaw);
-    f->pose[3 * i] = x + c * m.cx - s * m.cy;
-    f->pose[3 * i + 1] = y + s * m.cx + c * m.cy;
-    f->pose[3 * i + 2] = yaw;
-    f->thickness[i] = thickness;
-    f->area[i] = m.area;
-    f->offsets[i + 1] = at + nv;
-    f->n++;
+    field->pose[3 * i] = x + c * moments.cx - s * moments.cy;
+    field->pose[3 * i + 1] = y + s * moments.cx + c * moments.cy;
+    field->pose[3 * i + 2] = yaw;
+    field->thickness[i] = thickness;
+    field->area[i] = moments.area;
+    field->offsets[i + 1] = at + nv;
+    field->n++;
 }
 
-void bt_field_scale(bt_field *f, bt_idx i, double s)
+void bt_field_scale(bt_field *field, bt_idx i, double s)
 {
-    for (int64_t k = 2 * f->offsets[i]; k < 2 * f->offsets[i + 1]; k++) f->vertices[k] *= s;
-    f->area[i] *= s * s;
+    for (int64_t k = 2 * field->offsets[i]; k < 2 * field->offsets[i + 1]; k++) field->vertices[k] *= s;
+    field->area[i] *= s * s;
 }
 
-double bt_field_area_at(const bt_field *f, const double *clearance, const bool *held, double lambda)
+double bt_field_area_at(const bt_field *field, const double *clearance, const bool *held, double lambda)
 {
     double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++)
-        sum += f->area[i] * (held && held[i] ? 1 : bt_min(clearance[i] * clearance[i], lambda));
+    for (bt_idx i = 0; i < field->n; i++)
+        sum += field->area[i] * (held && held[i] ? 1 : bt_min(clearance[i] * clearance[i], lambda));
     return sum;
 }
 
-double bt_field_fit(bt_field *f, const double *clearance, const bool *held, double wanted)
+double bt_field_fit(bt_field *field, const double *clearance, const bool *held, double wanted)
 {
     double low = 0, high = 1;
-    for (bt_idx i = 0; i < f->n; i++) high = bt_max(high, clearance[i] * clearance[i]);
+    for (bt_idx i = 0; i < field->n; i++) high = bt_max(high, clearance[i] * clearance[i]);
     // the area grows with λ: bisect. 200 halvings end at neighbouring doubles.
     for (int k = 0; k < 200 && low < high; k++) {
         double mid = low + (high - low) / 2;
         if (mid == low || mid == high) break;
-        *(bt_field_area_at(f, clearance, held, mid) < wanted ? &low : &high) = mid;
+        *(bt_field_area_at(field, clearance, held, mid) < wanted ? &low : &high) = mid;
     }
     double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++) {
+    for (bt_idx i = 0; i < field->n; i++) {
         double s = held && held[i] ? 1 : bt_min(clearance[i], sqrt(high));
-        if (s != 1) bt_field_scale(f, i, s);
-        sum += f->area[i];
+        if (s != 1) bt_field_scale(field, i, s);
+        sum += field->area[i];
     }
     return sum;
 }
 
-void bt_field_append(bt_field *f, const bt_field *from, bt_idx i)
+void bt_field_append(bt_field *field, const bt_field *from, bt_idx i)
 {
-    const bt_idx k = f->n;
-    const int64_t first = from->offsets[i], n = from->offsets[i + 1] - first, at = f->offsets[k];
-    reserve(f, k + 1, at + n);
-    memcpy(f->vertices + 2 * at, from->vertices + 2 * first, 2 * (size_t)n * sizeof *f->vertices);
-    memcpy(f->pose + 3 * k, from->pose + 3 * i, 3 * sizeof *f->pose);
-    f->thickness[k] = from->thickness[i];
-    f->area[k] = from->area[i];
-    f->offsets[k + 1] = at + n;
-    f->n++;
+    const bt_idx k = field->n;
+    const int64_t first = from->offsets[i], n = from->offsets[i + 1] - first, at = field->offsets[k];
+    reserve(field, k + 1, at + n);
+    memcpy(field->vertices + 2 * at, from->vertices + 2 * first, 2 * (size_t)n * sizeof *field->vertices);
+    memcpy(field->pose + 3 * k, from->pose + 3 * i, 3 * sizeof *field->pose);
+    field->thickness[k] = from->thickness[i];
+    field->area[k] = from->area[i];
+    field->offsets[k + 1] = at + n;
+    field->n++;
 }
 
 // Spread the low 32 bits of x to the even bits.
@@ -179,12 +179,12 @@ static int by_code(const void *a, const void *b)
     return (p->i > q->i) - (p->i < q->i);
 }
 
-void bt_field_sort(bt_field *f, const bt_region *y)
+void bt_field_sort(bt_field *f, const bt_region *region)
 {
-    double side = bt_max(y->x1 - y->x0, y->y1 - y->y0);
+    double side = bt_max(region->x1 - region->x0, region->y1 - region->y0);
     key *order = bt_alloc((size_t)f->n, sizeof *order);
     for (bt_idx i = 0; i < f->n; i++) {
-        double u = (f->pose[3 * i] - y->x0) / side, w = (f->pose[3 * i + 1] - y->y0) / side;
+        double u = (f->pose[3 * i] - region->x0) / side, w = (f->pose[3 * i + 1] - region->y0) / side;
         uint64_t a = (uint64_t)(bt_min(bt_max(u, 0), 1) * 0xffffffff),
                  b = (uint64_t)(bt_min(bt_max(w, 0), 1) * 0xffffffff);
         order[i] = (key){spread_bits(a) | spread_bits(b) << 1, i};

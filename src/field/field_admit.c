@@ -13,18 +13,19 @@
 #include "field/map_crs.h"
 #include "base/elementary.h"
 
-void bt_refuse(bt_refusals *r, const char *fmt, ...)
+void bt_refuse(bt_refusals *refusals, const char *fmt, ...)
 {
-    r->status = BT_ERR_CASE;
-    if (r->said > BT_MOST_MESSAGES) return;
+    refusals->status = BT_ERR_CASE;
+    if (refusals->said > BT_MOST_MESSAGES) return;
     char text[640];
     va_list ap;
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    if (r->said++ == BT_MOST_MESSAGES)
-        bt_errors_add(r->err, "%s: more of the same; only the first %d are shown", r->path, BT_MOST_MESSAGES);
-    else bt_errors_add(r->err, "%s: %s", r->path, text);
+    if (refusals->said++ == BT_MOST_MESSAGES)
+        bt_errors_add(refusals->err, "%s: more of the same; only the first %d are shown", refusals->path,
+                      BT_MOST_MESSAGES);
+    else bt_errors_add(refusals->err, "%s: %s", refusals->path, text);
 }
 
 // Corners that coordinates of so many digits cannot tell from convex ones: 1e-7 degrees are a centimetre. A thousandth
@@ -78,11 +79,11 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
         return NULL;
     }
     case BT_NONCONVEX_SPLIT: {
-        bt_parts p;
-        if (!bt_outline_split(*n, v, &p))
+        bt_parts parts;
+        if (!bt_outline_split(*n, v, &parts))
             return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
         counts->split++;
-        counts->parts += p.n;
+        counts->parts += parts.n;
         return NULL;
     }
     }
@@ -105,29 +106,29 @@ typedef struct place {
 /// One convex piece of a floe.
 typedef struct piece { int n; double v[2 * BT_MAX_VERTICES]; } piece;
 
-static int n_pieces(const place *p, bt_idx i) { return p->parts[i] ? p->parts[i]->n : 1; }
+static int n_pieces(const place *where, bt_idx i) { return where->parts[i] ? where->parts[i]->n : 1; }
 
-static void take_piece(const place *p, bt_idx i, int k, piece *out)
+static void take_piece(const place *where, bt_idx i, int k, piece *out)
 {
-    const int64_t first = p->f->offsets[i];
-    const bt_parts *parts = p->parts[i];
+    const int64_t first = where->f->offsets[i];
+    const bt_parts *parts = where->parts[i];
     int from = 0;
     for (int j = 0; parts && j < k; j++) from += parts->count[j];
-    out->n = parts ? parts->count[k] : (int)(p->f->offsets[i + 1] - first);
+    out->n = parts ? parts->count[k] : (int)(where->f->offsets[i + 1] - first);
     for (int j = 0; j < out->n; j++) {
         const int64_t at = first + (parts ? parts->corner[from + j] : j);
-        out->v[2 * j] = p->outline[2 * at];
-        out->v[2 * j + 1] = p->outline[2 * at + 1];
+        out->v[2 * j] = where->outline[2 * at];
+        out->v[2 * j + 1] = where->outline[2 * at + 1];
     }
 }
 
 /// Depth of floe i in a convex body b, (dx, dy) from the centroid of i to the origin of b.
-static double depth_in(const place *p, bt_idx i, int nb, const double *b, double dx, double dy)
+static double depth_in(const place *where, bt_idx i, int nb, const double *b, double dx, double dy)
 {
     double deepest = 0;
-    for (int k = 0; k < n_pieces(p, i); k++) {
+    for (int k = 0; k < n_pieces(where, i); k++) {
         piece a;
-        take_piece(p, i, k, &a);
+        take_piece(where, i, k, &a);
         deepest = bt_max(deepest, -bt_apart_of(a.n, a.v, nb, b, dx, dy).gap);
     }
     return deepest;
@@ -135,114 +136,117 @@ static double depth_in(const place *p, bt_idx i, int nb, const double *b, double
 
 static void visit(void *context, bt_idx i, bt_idx j, double dx, double dy)
 {
-    place *p = context;
+    place *where = context;
     double deepest = 0;
-    for (int k = 0; k < n_pieces(p, j); k++) {
+    for (int k = 0; k < n_pieces(where, j); k++) {
         piece b;
-        take_piece(p, j, k, &b);
-        deepest = bt_max(deepest, depth_in(p, i, b.n, b.v, dx, dy));
+        take_piece(where, j, k, &b);
+        deepest = bt_max(deepest, depth_in(where, i, b.n, b.v, dx, dy));
     }
-    if (!(deepest > p->allowed)) return;
-    p->overlapping++;
-    p->deepest = bt_max(p->deepest, deepest);
-    bt_refuse(p->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s", p->noun,
-              (int)(i < j ? i : j), p->noun, (int)(i < j ? j : i), deepest, p->allowed,
-              p->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
+    if (!(deepest > where->allowed)) return;
+    where->overlapping++;
+    where->deepest = bt_max(where->deepest, deepest);
+    bt_refuse(where->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s",
+              where->noun, (int)(i < j ? i : j), where->noun, (int)(i < j ? j : i), deepest, where->allowed,
+              where->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
 }
 
-static void check_bounds(const bt_case *c, const place *p, bt_idx i)
+static void check_bounds(const bt_case *input, const place *where, bt_idx i)
 {
-    const bt_field *f = p->f;
-    const double x = f->pose[3 * i], y = f->pose[3 * i + 1], slack = 1e-9 * (c->domain.length + c->domain.width);
-    const double x1 = c->domain.x0 + c->domain.length, y1 = c->domain.y0 + c->domain.width;
+    const bt_field *field = where->f;
+    const double x = field->pose[3 * i], y = field->pose[3 * i + 1],
+                 slack = 1e-9 * (input->domain.length + input->domain.width);
+    const double x1 = input->domain.x0 + input->domain.length, y1 = input->domain.y0 + input->domain.width;
     double low[2] = {x, y}, high[2] = {x, y}; // walls hold the whole outline, other boundaries the centroid
-    for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++)
+    for (int64_t k = field->offsets[i]; k < field->offsets[i + 1]; k++)
         for (int a = 0; a < 2; a++) {
-            if ((a ? c->domain.sides : c->domain.ends) != BT_BOUND_WALL) continue;
-            const double q = (a ? y : x) + p->outline[2 * k + a];
+            if ((a ? input->domain.sides : input->domain.ends) != BT_BOUND_WALL) continue;
+            const double q = (a ? y : x) + where->outline[2 * k + a];
             low[a] = bt_min(low[a], q), high[a] = bt_max(high[a], q);
         }
-    if (low[0] < c->domain.x0 - slack || high[0] > x1 + slack)
-        bt_refuse(p->r,
+    if (low[0] < input->domain.x0 - slack || high[0] > x1 + slack)
+        bt_refuse(where->r,
                   "%s %d, x %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge "
                   "the domain",
-                  p->noun, (int)i, low[0], high[0], c->domain.x0, x1);
-    else if (low[1] < c->domain.y0 - slack || high[1] > y1 + slack)
-        bt_refuse(p->r,
+                  where->noun, (int)i, low[0], high[0], input->domain.x0, x1);
+    else if (low[1] < input->domain.y0 - slack || high[1] > y1 + slack)
+        bt_refuse(where->r,
                   "%s %d, y %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge "
                   "the domain",
-                  p->noun, (int)i, low[1], high[1], c->domain.y0, y1);
+                  where->noun, (int)i, low[1], high[1], input->domain.y0, y1);
 }
 
-/// Ready for pairs of floes of f, wherever in the domain they lie.
-static void begin_places(place *p, bt_region *y, const bt_case *c, const bt_field *f)
+/// Ready for pairs of floes of `field`, wherever in the domain they lie.
+static void begin_places(place *where, bt_region *region, const bt_case *input, const bt_field *field)
 {
-    bt_region_of_domain(y, c);
-    p->allowed = bt_max(c->solver.slop, 1e-9) * bt_field_mean_size(f);
-    p->parts = bt_alloc((size_t)f->n, sizeof *p->parts);
-    for (bt_idx i = 0; i < f->n; i++) {
-        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
-        const double *v = f->vertices + 2 * f->offsets[i];
+    bt_region_of_domain(region, input);
+    where->allowed = bt_max(input->solver.slop, 1e-9) * bt_field_mean_size(field);
+    where->parts = bt_alloc((size_t)field->n, sizeof *where->parts);
+    for (bt_idx i = 0; i < field->n; i++) {
+        const int n = (int)(field->offsets[i + 1] - field->offsets[i]);
+        const double *v = field->vertices + 2 * field->offsets[i];
         if (bt_outline_convex(n, v)) continue;
-        p->parts[i] = bt_alloc(1, sizeof *p->parts[i]);
-        bt_outline_split(n, v, p->parts[i]);
+        where->parts[i] = bt_alloc(1, sizeof *where->parts[i]);
+        bt_outline_split(n, v, where->parts[i]);
     }
 }
 
-static void check_pairs(place *p, const bt_region *y)
+static void check_pairs(place *where, const bt_region *region)
 {
-    bt_field_visit_pairs(y, p->f, p->outline, 1, visit, p);
-    if (p->overlapping <= 1) return;
+    bt_field_visit_pairs(region, where->f, where->outline, 1, visit, where);
+    if (where->overlapping <= 1) return;
     // A line of its own, whatever has been reported one by one.
-    bt_errors_add(p->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", p->r->path, (long long)p->overlapping,
-                  p->noun, p->deepest);
+    bt_errors_add(where->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", where->r->path,
+                  (long long)where->overlapping, where->noun, where->deepest);
 }
 
 /// Floes in the towed body or a floe given by hand.
-static void check_obstacles(const place *p, const bt_region *y)
+static void check_obstacles(const place *where, const bt_region *region)
 {
-    const bt_field *f = p->f;
-    for (bt_idx i = 0; i < f->n; i++) {
-        double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;
-        for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++)
-            radius = bt_max(radius, bt_hypot(p->outline[2 * k], p->outline[2 * k + 1]));
-        bt_region_wrap(y, &x, &z);
-        for (int o = 0; o < y->n_obstacles; o++) {
-            const bt_obstacle *b = &y->obstacles[o];
-            if (bt_hypot(b->x - x, b->y - z) >= radius + b->radius) continue;
-            piece rel = {.n = b->n};
-            for (int k = 0; k < b->n; k++) rel.v[2 * k] = b->v[2 * k] - b->x, rel.v[2 * k + 1] = b->v[2 * k + 1] - b->y;
-            const double depth = depth_in(p, i, rel.n, rel.v, b->x - x, b->y - z);
-            if (depth > p->allowed)
-                bt_refuse(p->r,
+    const bt_field *field = where->f;
+    for (bt_idx i = 0; i < field->n; i++) {
+        double x = field->pose[3 * i], z = field->pose[3 * i + 1], radius = 0;
+        for (int64_t k = field->offsets[i]; k < field->offsets[i + 1]; k++)
+            radius = bt_max(radius, bt_hypot(where->outline[2 * k], where->outline[2 * k + 1]));
+        bt_region_wrap(region, &x, &z);
+        for (int o = 0; o < region->n_obstacles; o++) {
+            const bt_obstacle *obstacle = &region->obstacles[o];
+            if (bt_hypot(obstacle->x - x, obstacle->y - z) >= radius + obstacle->radius) continue;
+            piece rel = {.n = obstacle->n};
+            for (int k = 0; k < obstacle->n; k++) rel.v[2 * k] = obstacle->v[2 * k] - obstacle->x,
+                     rel.v[2 * k + 1] = obstacle->v[2 * k + 1] - obstacle->y;
+            const double depth = depth_in(where, i, rel.n, rel.v, obstacle->x - x, obstacle->y - z);
+            if (depth > where->allowed)
+                bt_refuse(where->r,
                           "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); take it "
                           "out, or move the body",
-                          p->noun, (int)i, depth, p->allowed);
+                          where->noun, (int)i, depth, where->allowed);
         }
     }
 }
 
-static void check_places(const bt_case *c, const bt_field *f, const char *noun, bool obstacles, bt_refusals *r)
+static void check_places(const bt_case *input, const bt_field *field, const char *noun, bool obstacles,
+                         bt_refusals *refusals)
 {
-    double *outline = bt_field_outlines(f);
-    place p = {.f = f, .outline = outline, .noun = noun, .r = r};
-    bt_region y;
-    for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
-    begin_places(&p, &y, c, f);
-    check_pairs(&p, &y);
-    if (obstacles) check_obstacles(&p, &y);
-    for (bt_idx i = 0; i < f->n; i++) free(p.parts[i]);
-    free(p.parts);
+    double *outline = bt_field_outlines(field);
+    place where = {.f = field, .outline = outline, .noun = noun, .r = refusals};
+    bt_region region;
+    for (bt_idx i = 0; i < field->n; i++) check_bounds(input, &where, i);
+    begin_places(&where, &region, input, field);
+    check_pairs(&where, &region);
+    if (obstacles) check_obstacles(&where, &region);
+    for (bt_idx i = 0; i < field->n; i++) free(where.parts[i]);
+    free(where.parts);
     free(outline);
-    bt_region_free(&y);
+    bt_region_free(&region);
 }
 
-void bt_field_check_apart(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
+void bt_field_check_apart(const bt_case *input, const bt_field *field, const char *noun, bt_refusals *refusals)
 {
-    check_places(c, f, noun, false, r);
+    check_places(input, field, noun, false, refusals);
 }
 
-void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
+void bt_field_check_places(const bt_case *input, const bt_field *field, const char *noun, bt_refusals *refusals)
 {
-    check_places(c, f, noun, true, r);
+    check_places(input, field, noun, true, refusals);
 }

@@ -15,7 +15,7 @@ typedef struct bt_refusals {
     bt_status status;
 } bt_refusals;
 
-void bt_refuse(bt_refusals *r, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+void bt_refuse(bt_refusals *refusals, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
 /// May this outline be a floe? v [*n][2], clean and anticlockwise, becomes its hull if the case says so; what was done
 /// is counted. Returns why not, or NULL. Without bays but those that rounding makes it is taken for convex, and
@@ -25,10 +25,10 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
 /// Refuse floes outside the domain (walls hold the whole outline, other boundaries the centroid) and floes that overlap
 /// each other by more than the solver's slop: the first few one by one, and how many and how deep. `noun`: what the
 /// file calls a floe.
-void bt_field_check_apart(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r);
+void bt_field_check_apart(const bt_case *input, const bt_field *field, const char *noun, bt_refusals *refusals);
 
 /// The same, and floes in the towed body or a floe given by hand. Not of a field that was made before, out of which a
 /// lead may take them.
-void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r);
+void bt_field_check_places(const bt_case *input, const bt_field *field, const char *noun, bt_refusals *refusals);
 
 #endif

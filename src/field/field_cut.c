@@ -46,15 +46,16 @@ static axis axis_of(double low, double high, double from, double to, bool period
                   .at_low = differ && (periodic || low != from), .at_high = differ && (periodic || high != to)};
 }
 
-static bool in_obstacle(const bt_region *y, int n, const double *v, double x, double z, double radius)
+static bool in_obstacle(const bt_region *region, int n, const double *v, double x, double z, double radius)
 {
-    for (int k = 0; k < y->n_obstacles; k++) {
-        const bt_obstacle *o = &y->obstacles[k];
-        const double dx = o->x - x, dy = o->y - z, reach = o->radius + radius;
+    for (int k = 0; k < region->n_obstacles; k++) {
+        const bt_obstacle *obstacle = &region->obstacles[k];
+        const double dx = obstacle->x - x, dy = obstacle->y - z, reach = obstacle->radius + radius;
         if (dx * dx + dy * dy >= reach * reach) continue;
         double own[2 * BT_MAX_VERTICES];
-        for (int i = 0; i < o->n; i++) own[2 * i] = o->v[2 * i] - o->x, own[2 * i + 1] = o->v[2 * i + 1] - o->y;
-        if (bt_apart_of(n, v, o->n, own, dx, dy).gap < 0) return true;
+        for (int i = 0; i < obstacle->n; i++)
+            own[2 * i] = obstacle->v[2 * i] - obstacle->x, own[2 * i + 1] = obstacle->v[2 * i + 1] - obstacle->y;
+        if (bt_apart_of(n, v, obstacle->n, own, dx, dy).gap < 0) return true;
     }
     return false;
 }
@@ -68,15 +69,15 @@ static void reach_of(int n, const double *v, int k, double *low, double *high)
 
 /// What of the polygon v, in place, lies within the sides that it crosses; its vertices, 0 = nothing, into v. `crossed`
 /// is set when that is not all of it.
-static int part_within(const axis a[2], double clearance, int n, double *v, bool *crossed)
+static int part_within(const axis axes[2], double clearance, int n, double *v, bool *crossed)
 {
     double out[2 * BT_MAX_VERTICES + 16];
     for (int k = 0; k < 2; k++)
         for (int end = 0; end < 2; end++) {
             double low, high;
             reach_of(n, v, k, &low, &high);
-            const double sign = end ? 1 : -1, side = end ? a[k].high : a[k].low;
-            if (!(end ? a[k].at_high && high > side : a[k].at_low && low < side)) continue;
+            const double sign = end ? 1 : -1, side = end ? axes[k].high : axes[k].low;
+            if (!(end ? axes[k].at_high && high > side : axes[k].at_low && low < side)) continue;
             *crossed = true;
             n = bt_shape_clip(n, v, k ? 0 : sign, k ? sign : 0, sign * side - clearance, out);
             if (n < 3) return 0;
@@ -86,7 +87,7 @@ static int part_within(const axis a[2], double clearance, int n, double *v, bool
 }
 
 /// Add floe i of `from`, or one of its images (dx, dy) away, as far as it lies in the region.
-static void add_part(const bt_region *y, const axis a[2], const bt_field *from, const double *outline, bt_idx i,
+static void add_part(const bt_region *region, const axis axes[2], const bt_field *from, const double *outline, bt_idx i,
                      double dx, double dy, bt_field *to, bool **parted)
 {
     enum { MOST_CLEARED = 8 * BT_MAX_VERTICES };
@@ -98,10 +99,10 @@ static void add_part(const bt_region *y, const axis a[2], const bt_field *from, 
         radius = bt_max(radius, bt_hypot(own[2 * k], own[2 * k + 1]));
     }
     bool changed = false;
-    int n = part_within(a, y->clearance, all, v, &changed);
+    int n = part_within(axes, region->clearance, all, v, &changed);
     // a body that reaches over the seam of the domain stands where the extent had no image of it
-    if (n >= 3 && in_obstacle(y, all, own, x, z, radius)) {
-        n = bt_tessellation_clear(y, n, v, false);
+    if (n >= 3 && in_obstacle(region, all, own, x, z, radius)) {
+        n = bt_tessellation_clear(region, n, v, false);
         changed = true;
     }
     const bt_idx k = to->n;
@@ -109,63 +110,65 @@ static void add_part(const bt_region *y, const axis a[2], const bt_field *from, 
         bt_field_append(to, from, i);
         to->pose[3 * k] = x, to->pose[3 * k + 1] = z;
     } else {
-        bt_moments m = {0};
-        if (n >= 3) m = bt_shape_extent(n, v);
-        if (m.area < LEAST_PART * from->area[i]) return;
-        n = bt_tessellation_clean(n, v, SHORT_EDGE * 2 * sqrt(m.area / BT_PI), BT_MAX_VERTICES);
-        m = bt_shape_centre(n, v);
-        bt_field_add(to, n, v, m.cx, m.cy, 0, from->thickness[i]);
-        bt_region_wrap(y, &to->pose[3 * k], &to->pose[3 * k + 1]);
+        bt_moments moments = {0};
+        if (n >= 3) moments = bt_shape_extent(n, v);
+        if (moments.area < LEAST_PART * from->area[i]) return;
+        n = bt_tessellation_clean(n, v, SHORT_EDGE * 2 * sqrt(moments.area / BT_PI), BT_MAX_VERTICES);
+        moments = bt_shape_centre(n, v);
+        bt_field_add(to, n, v, moments.cx, moments.cy, 0, from->thickness[i]);
+        bt_region_wrap(region, &to->pose[3 * k], &to->pose[3 * k + 1]);
     }
     *parted = bt_realloc(*parted, (size_t)to->n, sizeof **parted);
     (*parted)[k] = changed;
 }
 
 /// Distance of a point from the nearest cut side, m.
-static double to_cut(const axis a[2], const double *at)
+static double to_cut(const axis axes[2], const double *at)
 {
     double least = INFINITY;
     for (int k = 0; k < 2; k++) {
-        if (a[k].at_low) least = bt_min(least, fabs(at[k] - a[k].low));
-        if (a[k].at_high) least = bt_min(least, fabs(a[k].high - at[k]));
+        if (axes[k].at_low) least = bt_min(least, fabs(at[k] - axes[k].low));
+        if (axes[k].at_high) least = bt_min(least, fabs(axes[k].high - at[k]));
     }
     return least;
 }
 
 /// How much each floe may be scaled, but for those held, so that none touches another and no area has changed by more
 /// than `change` from what it was.
-static void room_of(const bt_region *y, const bt_field *f, const double *first, double change, double *clearance)
+static void room_of(const bt_region *region, const bt_field *field, const double *first, double change,
+                    double *clearance)
 {
-    bt_field_growth(y, f, sqrt(1 + change), clearance);
-    for (bt_idx i = 0; i < f->n; i++)
-        clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + change) * first[i] / f->area[i]));
+    bt_field_growth(region, field, sqrt(1 + change), clearance);
+    for (bt_idx i = 0; i < field->n; i++)
+        clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + change) * first[i] / field->area[i]));
 }
 
 /// Scale the floes of the strip; the area reached, m².
-static double scale_strip(const bt_region *y, const axis a[2], const bool *parted, double size, double wanted,
-                          bt_field *f)
+static double scale_strip(const bt_region *region, const axis axes[2], const bool *parted, double size, double wanted,
+                          bt_field *field)
 {
-    double *clearance = bt_alloc((size_t)f->n, sizeof *clearance), *first = bt_alloc((size_t)f->n, sizeof *first),
-           widest = INFINITY, area = bt_field_floe_area(f);
-    bool *held = bt_alloc((size_t)f->n, sizeof *held);
-    memcpy(first, f->area, (size_t)f->n * sizeof *first);
+    double *clearance = bt_alloc((size_t)field->n, sizeof *clearance),
+           *first = bt_alloc((size_t)field->n, sizeof *first), widest = INFINITY, area = bt_field_floe_area(field);
+    bool *held = bt_alloc((size_t)field->n, sizeof *held);
+    memcpy(first, field->area, (size_t)field->n * sizeof *first);
     for (int k = 0; k < 2; k++)
-        if (a[k].at_low || a[k].at_high) widest = bt_min(widest, WIDEST * (a[k].high - a[k].low));
-    room_of(y, f, first, LAST_CHANGE, clearance);
-    for (f->strip = bt_min(size, widest);; f->strip = bt_min(f->strip + size, widest)) {
-        for (bt_idx i = 0; i < f->n; i++) held[i] = !parted[i] && !(to_cut(a, f->pose + 3 * i) < f->strip);
-        const double change = f->strip < widest ? MOST_CHANGE : LAST_CHANGE,
-                     low = bt_field_area_at(f, clearance, held, 1 - change),
-                     high = bt_field_area_at(f, clearance, held, 1 + change);
-        if ((low <= wanted && wanted <= high) || f->strip == widest) {
-            area = bt_field_fit(f, clearance, held, bt_max(low, wanted));
+        if (axes[k].at_low || axes[k].at_high) widest = bt_min(widest, WIDEST * (axes[k].high - axes[k].low));
+    room_of(region, field, first, LAST_CHANGE, clearance);
+    for (field->strip = bt_min(size, widest);; field->strip = bt_min(field->strip + size, widest)) {
+        for (bt_idx i = 0; i < field->n; i++)
+            held[i] = !parted[i] && !(to_cut(axes, field->pose + 3 * i) < field->strip);
+        const double change = field->strip < widest ? MOST_CHANGE : LAST_CHANGE,
+                     low = bt_field_area_at(field, clearance, held, 1 - change),
+                     high = bt_field_area_at(field, clearance, held, 1 + change);
+        if ((low <= wanted && wanted <= high) || field->strip == widest) {
+            area = bt_field_fit(field, clearance, held, bt_max(low, wanted));
             break;
         }
     }
     // What one neighbour does not take of the gap between two, the other may.
     for (int pass = 0; pass < MORE_PASSES && area < (1 - ROUND_OFF) * wanted; pass++) {
-        room_of(y, f, first, LAST_CHANGE, clearance);
-        area = bt_field_fit(f, clearance, held, wanted);
+        room_of(region, field, first, LAST_CHANGE, clearance);
+        area = bt_field_fit(field, clearance, held, wanted);
     }
     free(first);
     free(clearance);
@@ -173,33 +176,33 @@ static double scale_strip(const bt_region *y, const axis a[2], const bool *parte
     return area;
 }
 
-bt_status bt_field_cut(const bt_case *c, const bt_region *whole, const bt_region *y, double size, bt_field *f,
-                       bt_errors *err)
+bt_status bt_field_cut(const bt_case *input, const bt_region *whole, const bt_region *region, double size,
+                       bt_field *field, bt_errors *err)
 {
-    const axis a[2] = {axis_of(y->x0, y->x1, whole->x0, whole->x1, whole->periodic_x),
-                       axis_of(y->y0, y->y1, whole->y0, whole->y1, whole->periodic_y)};
-    if (!(a[0].at_low || a[0].at_high || a[1].at_low || a[1].at_high)) return BT_OK;
-    const int over_x = a[0].period > 0, over_y = a[1].period > 0;
-    double *outline = bt_field_outlines(f);
+    const axis axes[2] = {axis_of(region->x0, region->x1, whole->x0, whole->x1, whole->periodic_x),
+                          axis_of(region->y0, region->y1, whole->y0, whole->y1, whole->periodic_y)};
+    if (!(axes[0].at_low || axes[0].at_high || axes[1].at_low || axes[1].at_high)) return BT_OK;
+    const int over_x = axes[0].period > 0, over_y = axes[1].period > 0;
+    double *outline = bt_field_outlines(field);
     bool *parted = NULL;
     bt_field part;
     bt_field_init(&part);
-    for (bt_idx i = 0; i < f->n; i++)
+    for (bt_idx i = 0; i < field->n; i++)
         for (int ix = -over_x; ix <= over_x; ix++)
             for (int iy = -over_y; iy <= over_y; iy++)
-                add_part(y, a, f, outline, i, ix * a[0].period, iy * a[1].period, &part, &parted);
+                add_part(region, axes, field, outline, i, ix * axes[0].period, iy * axes[1].period, &part, &parted);
     free(outline);
-    const double wanted = c->ice.concentration * y->ice_area,
-                 area = part.n > 0 ? scale_strip(y, a, parted, size, wanted, &part) : 0, strip = part.strip;
+    const double wanted = input->ice.concentration * region->ice_area,
+                 area = part.n > 0 ? scale_strip(region, axes, parted, size, wanted, &part) : 0, strip = part.strip;
     free(parted);
-    bt_field_free(f);
-    *f = part;
-    bt_field_sort(f, y);
-    f->strip = strip;
+    bt_field_free(field);
+    *field = part;
+    bt_field_sort(field, region);
+    field->strip = strip;
     if (fabs(area - wanted) <= TOLERANCE * wanted) return BT_OK;
     bt_errors_add(err,
                   "%s: ice.extent: the field cut to the ice region has a concentration of %.4g, %g wanted, with floes "
                   "scaled within %.3g m of the cut; take another ice.seed, smaller floes, or a larger ice region",
-                  c->path ? c->path : "case", area / y->ice_area, c->ice.concentration, strip);
+                  input->path ? input->path : "case", area / region->ice_area, input->ice.concentration, strip);
     return BT_ERR_CASE;
 }

@@ -33,50 +33,50 @@
 
 static const char *const region_names[4] = {"x_min", "y_min", "x_max", "y_max"};
 
-const char *bt_field_frame(const bt_case *c)
+const char *bt_field_frame(const bt_case *input)
 {
-    return c->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic";
+    return input->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic";
 }
 
 // ---- write ----
 
-bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
+bt_status bt_field_write(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
     // Under another name until it is complete, so that a full disk never leaves half a field under the right one.
     size_t size = strlen(path) + sizeof ".part";
     char *part = bt_alloc(size, 1);
     snprintf(part, size, "%s.part", path);
-    bt_h5 h;
-    bt_status status = bt_h5_create(&h, part, err);
+    bt_h5 h5;
+    bt_status status = bt_h5_create(&h5, part, err);
     if (status == BT_OK) {
-        hsize_t n = (hsize_t)f->n, nv = (hsize_t)f->offsets[f->n];
-        bt_h5_group(&h, "/floes");
-        bt_h5_write(&h, "/floes/offsets", H5T_NATIVE_INT64, n + 1, 0, f->offsets);
-        bt_h5_write(&h, "/floes/vertices", H5T_NATIVE_DOUBLE, nv, 2, f->vertices);
-        bt_h5_write(&h, "/floes/pose", H5T_NATIVE_DOUBLE, n, 3, f->pose);
-        bt_h5_write(&h, "/floes/thickness", H5T_NATIVE_DOUBLE, n, 0, f->thickness);
-        bt_h5_write(&h, "/floes/area", H5T_NATIVE_DOUBLE, n, 0, f->area);
-        bt_h5_describe(&h, "/floes/offsets", "floe_end", "1",
+        hsize_t n = (hsize_t)field->n, nv = (hsize_t)field->offsets[field->n];
+        bt_h5_group(&h5, "/floes");
+        bt_h5_write(&h5, "/floes/offsets", H5T_NATIVE_INT64, n + 1, 0, field->offsets);
+        bt_h5_write(&h5, "/floes/vertices", H5T_NATIVE_DOUBLE, nv, 2, field->vertices);
+        bt_h5_write(&h5, "/floes/pose", H5T_NATIVE_DOUBLE, n, 3, field->pose);
+        bt_h5_write(&h5, "/floes/thickness", H5T_NATIVE_DOUBLE, n, 0, field->thickness);
+        bt_h5_write(&h5, "/floes/area", H5T_NATIVE_DOUBLE, n, 0, field->area);
+        bt_h5_describe(&h5, "/floes/offsets", "floe_end", "1",
                        "first vertex of each floe, and the number of vertices");
-        bt_h5_describe(&h, "/floes/vertices", "floe_vertex xy", "m",
+        bt_h5_describe(&h5, "/floes/vertices", "floe_vertex xy", "m",
                        "outlines, body frame, anticlockwise about the centroid");
-        bt_h5_describe(&h, "/floes/pose", "floe component", "m, m, rad", "x, y, yaw");
-        bt_h5_describe(&h, "/floes/thickness", "floe", "m", "thickness");
-        bt_h5_describe(&h, "/floes/area", "floe", "m2", "area");
-        bt_h5_attr_double(&h, "/floes", "ice_area", f->ice_area);
-        bt_h5_attr_double(&h, "/floes", "concentration", f->concentration);
-        bt_h5_attr_int(&h, "/floes", "n_floes", f->n);
-        const double own[4] = {c->ice.x_min, c->ice.y_min, c->ice.x_max, c->ice.y_max},
-                     *region = c->ice.field ? f->outlines.region : own;
-        for (int k = 0; k < 4; k++) bt_h5_attr_double(&h, "/floes", region_names[k], region[k]);
-        bt_h5_attr_word(&h, "/floes", "frame", bt_field_frame(c));
-        char *text = bt_case_resolved(c);
-        bt_h5_write_text(&h, "/case", text ? text : "");
-        bt_h5_describe(&h, "/case", NULL, NULL, "the case with every key, in SI units");
-        bt_h5_describe_file(&h, c->run.title);
+        bt_h5_describe(&h5, "/floes/pose", "floe component", "m, m, rad", "x, y, yaw");
+        bt_h5_describe(&h5, "/floes/thickness", "floe", "m", "thickness");
+        bt_h5_describe(&h5, "/floes/area", "floe", "m2", "area");
+        bt_h5_attr_double(&h5, "/floes", "ice_area", field->ice_area);
+        bt_h5_attr_double(&h5, "/floes", "concentration", field->concentration);
+        bt_h5_attr_int(&h5, "/floes", "n_floes", field->n);
+        const double own[4] = {input->ice.x_min, input->ice.y_min, input->ice.x_max, input->ice.y_max},
+                     *region = input->ice.field ? field->outlines.region : own;
+        for (int k = 0; k < 4; k++) bt_h5_attr_double(&h5, "/floes", region_names[k], region[k]);
+        bt_h5_attr_word(&h5, "/floes", "frame", bt_field_frame(input));
+        char *text = bt_case_resolved(input);
+        bt_h5_write_text(&h5, "/case", text ? text : "");
+        bt_h5_describe(&h5, "/case", NULL, NULL, "the case with every key, in SI units");
+        bt_h5_describe_file(&h5, input->run.title);
         free(text);
-        bt_h5_attr_text(&h, "/", "program", "bergtow " BT_VERSION);
-        status = bt_h5_close(&h);
+        bt_h5_attr_text(&h5, "/", "program", "bergtow " BT_VERSION);
+        status = bt_h5_close(&h5);
         if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_FIELD, err);
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
@@ -97,13 +97,13 @@ typedef struct reader {
 
 // Whole dataset of doubles or 64-bit integers with `width` columns (0: rank 1); NULL after a refusal. *rows: its
 // length.
-static void *read_dataset(reader *r, const char *name, bool integers, hsize_t width, hsize_t most, hsize_t *rows)
+static void *read_dataset(reader *in, const char *name, bool integers, hsize_t width, hsize_t most, hsize_t *rows)
 {
-    if (r->r.status != BT_OK) return NULL;
+    if (in->r.status != BT_OK) return NULL;
     void *data = NULL;
-    hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT);
+    hid_t d = H5Dopen2(in->file, name, H5P_DEFAULT);
     if (d < 0) {
-        bt_refuse(&r->r, "dataset %s: is missing or damaged; write the file with `bergtow field`, or add it", name);
+        bt_refuse(&in->r, "dataset %s: is missing or damaged; write the file with `bergtow field`, or add it", name);
         return NULL;
     }
     hid_t space = H5Dget_space(d), type = H5Dget_type(d);
@@ -112,22 +112,22 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
     int rank = H5Sget_simple_extent_dims(space, dims, NULL), wanted = width ? 2 : 1;
     bool counts = class == H5T_INTEGER, numbers = counts || class == H5T_FLOAT;
     if (integers ? !counts : !numbers) {
-        bt_refuse(&r->r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers",
+        bt_refuse(&in->r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers",
                   integers ? "int64" : "float64");
     } else if (rank != wanted || (width && dims[1] != width)) {
         if (width)
-            bt_refuse(&r->r, "dataset %s: must have two dimensions, the second of %llu", name,
+            bt_refuse(&in->r, "dataset %s: must have two dimensions, the second of %llu", name,
                       (unsigned long long)width);
-        else bt_refuse(&r->r, "dataset %s: must have one dimension", name);
+        else bt_refuse(&in->r, "dataset %s: must have one dimension", name);
     } else if (dims[0] > most) {
-        bt_refuse(&r->r, "dataset %s: %llu rows are more than %llu; the file is damaged or too large", name,
+        bt_refuse(&in->r, "dataset %s: %llu rows are more than %llu; the file is damaged or too large", name,
                (unsigned long long)dims[0], (unsigned long long)most);
     } else {
         *rows = dims[0];
         data = bt_alloc((size_t)(dims[0] * (width ? width : 1)) + 1, 8);
         if (dims[0] > 0 &&
             H5Dread(d, integers ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
-            bt_refuse(&r->r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
+            bt_refuse(&in->r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
     }
     H5Tclose(type);
     H5Sclose(space);
@@ -136,10 +136,10 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
 }
 
 /// A number of /floes; NaN where it is missing or none.
-static double read_number(const reader *r, const char *name)
+static double read_number(const reader *in, const char *name)
 {
     double number = NAN;
-    hid_t a = H5Aopen_by_name(r->file, "/floes", name, H5P_DEFAULT, H5P_DEFAULT);
+    hid_t a = H5Aopen_by_name(in->file, "/floes", name, H5P_DEFAULT, H5P_DEFAULT);
     if (a < 0) return number;
     hid_t space = H5Aget_space(a), type = H5Aget_type(a);
     H5T_class_t class = H5Tget_class(type);
@@ -153,11 +153,11 @@ static double read_number(const reader *r, const char *name)
 
 /// The frame that the file names, or "": those of other programs may not. Of fixed length: HDF5 1.10 may search for
 /// ever for a text of any length in a file with flipped bits.
-static void read_frame(const reader *r, char frame[16])
+static void read_frame(const reader *in, char frame[16])
 {
     *frame = 0;
-    if (r->r.status != BT_OK || H5Aexists_by_name(r->file, "/floes", "frame", H5P_DEFAULT) <= 0) return;
-    hid_t a = H5Aopen_by_name(r->file, "/floes", "frame", H5P_DEFAULT, H5P_DEFAULT), type = H5Aget_type(a),
+    if (in->r.status != BT_OK || H5Aexists_by_name(in->file, "/floes", "frame", H5P_DEFAULT) <= 0) return;
+    hid_t a = H5Aopen_by_name(in->file, "/floes", "frame", H5P_DEFAULT, H5P_DEFAULT), type = H5Aget_type(a),
           space = H5Aget_space(a);
     if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 && H5Tget_size(type) < 16 &&
         H5Sget_simple_extent_npoints(space) == 1 && H5Aread(a, type, frame) < 0)
@@ -169,113 +169,113 @@ static void read_frame(const reader *r, char frame[16])
 }
 
 /// The ice region, where the file says all of it: those of other programs may not.
-static void read_region(const reader *r, double region[4])
+static void read_region(const reader *in, double region[4])
 {
     double x[4];
     for (int k = 0; k < 4; k++) {
-        if (r->r.status != BT_OK || H5Aexists_by_name(r->file, "/floes", region_names[k], H5P_DEFAULT) <= 0) return;
-        x[k] = read_number(r, region_names[k]);
+        if (in->r.status != BT_OK || H5Aexists_by_name(in->file, "/floes", region_names[k], H5P_DEFAULT) <= 0) return;
+        x[k] = read_number(in, region_names[k]);
     }
     if (x[0] < x[2] && x[1] < x[3]) memcpy(region, x, sizeof x);
 }
 
-static double read_ice_area(reader *r)
+static double read_ice_area(reader *in)
 {
-    if (r->r.status != BT_OK) return NAN;
-    const double area = read_number(r, "ice_area");
+    if (in->r.status != BT_OK) return NAN;
+    const double area = read_number(in, "ice_area");
     if (isnan(area))
-        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
-                         "concentration refers to");
+        bt_refuse(&in->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
+                          "concentration refers to");
     return area;
 }
 
-static void check_offsets(reader *r, const int64_t *offsets, hsize_t n, hsize_t n_vertices)
+static void check_offsets(reader *in, const int64_t *offsets, hsize_t n, hsize_t n_vertices)
 {
-    if (r->r.status != BT_OK) return;
-    if (offsets[0] != 0) bt_refuse(&r->r, "dataset /floes/offsets: begins with %lld, not 0", (long long)offsets[0]);
+    if (in->r.status != BT_OK) return;
+    if (offsets[0] != 0) bt_refuse(&in->r, "dataset /floes/offsets: begins with %lld, not 0", (long long)offsets[0]);
     // Differences of hostile numbers overflow: compare, and only then subtract.
-    for (hsize_t i = 0; i < n && r->r.status == BT_OK; i++) {
+    for (hsize_t i = 0; i < n && in->r.status == BT_OK; i++) {
         int64_t a = offsets[i], b = offsets[i + 1];
         if (a < 0 || b <= a || (hsize_t)b > n_vertices)
-            bt_refuse(&r->r,
+            bt_refuse(&in->r,
                       "floe %llu: offsets %lld to %lld are refused: they must rise and stay within the %llu vertices",
                       (unsigned long long)i, (long long)a, (long long)b, (unsigned long long)n_vertices);
         else if (b - a > BT_MAX_VERTICES)
-            bt_refuse(&r->r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a),
+            bt_refuse(&in->r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a),
                       BT_MAX_VERTICES);
     }
-    if (r->r.status == BT_OK && (hsize_t)offsets[n] != n_vertices)
-        bt_refuse(&r->r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld",
+    if (in->r.status == BT_OK && (hsize_t)offsets[n] != n_vertices)
+        bt_refuse(&in->r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld",
                   (unsigned long long)n_vertices, (long long)offsets[n]);
 }
 
-static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *stored_area)
+static void check_floe(reader *in, const bt_field *field, bt_idx i, const double *stored_area)
 {
-    int n = (int)(f->offsets[i + 1] - f->offsets[i]);
-    const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * i;
+    int n = (int)(field->offsets[i + 1] - field->offsets[i]);
+    const double *v = field->vertices + 2 * field->offsets[i], *p = field->pose + 3 * i;
     const char *fault = bt_shape_fault(n, v);
     if (fault) {
         double own[2 * BT_MAX_VERTICES];
         int n_own = n;
         memcpy(own, v, 2 * (size_t)n * sizeof *v);
-        fault = bt_outline_admit(r->nonconvex, &n_own, own, &r->counts);
+        fault = bt_outline_admit(in->nonconvex, &n_own, own, &in->counts);
     }
     if (fault) {
-        bt_refuse(&r->r, "floe %d: its outline is refused: %s", i, fault);
+        bt_refuse(&in->r, "floe %d: its outline is refused: %s", i, fault);
         return;
     }
     char why[BT_ICE_WHY];
-    const bt_ice_floe given = {n, v, p[0], p[1], p[2], f->thickness[i], stored_area ? stored_area[i] : NAN, 1e-9};
-    if ((fault = bt_ice_floe_fault(&given, why, NULL))) bt_refuse(&r->r, "floe %d: %s", i, fault);
-    f->area[i] = stored_area ? stored_area[i] : bt_shape_centroid(n, v).area;
+    const bt_ice_floe given = {n, v, p[0], p[1], p[2], field->thickness[i], stored_area ? stored_area[i] : NAN, 1e-9};
+    if ((fault = bt_ice_floe_fault(&given, why, NULL))) bt_refuse(&in->r, "floe %d: %s", i, fault);
+    field->area[i] = stored_area ? stored_area[i] : bt_shape_centroid(n, v).area;
 }
 
-static void same_length(reader *r, const char *name, hsize_t rows, hsize_t n)
+static void same_length(reader *in, const char *name, hsize_t rows, hsize_t n)
 {
-    if (r->r.status == BT_OK && rows != n)
-        bt_refuse(&r->r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows,
+    if (in->r.status == BT_OK && rows != n)
+        bt_refuse(&in->r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows,
                   (unsigned long long)n);
 }
 
-static void read_floes(reader *r, bt_field *f)
+static void read_floes(reader *in, bt_field *field)
 {
     hsize_t n_offsets = 0, n_vertices = 0, n_pose = 0, n_thickness = 0, n_area = 0;
-    bt_field_free(f);
-    f->offsets = read_dataset(r, "/floes/offsets", true, 0, BT_MOST_FLOES + 1, &n_offsets);
-    if (r->r.status == BT_OK && n_offsets < 1)
-        bt_refuse(&r->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
+    bt_field_free(field);
+    field->offsets = read_dataset(in, "/floes/offsets", true, 0, BT_MOST_FLOES + 1, &n_offsets);
+    if (in->r.status == BT_OK && n_offsets < 1)
+        bt_refuse(&in->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
     hsize_t n = n_offsets ? n_offsets - 1 : 0;
-    f->vertices = read_dataset(r, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
-    check_offsets(r, f->offsets, n, n_vertices);
-    f->pose = read_dataset(r, "/floes/pose", false, 3, BT_MOST_FLOES, &n_pose);
-    same_length(r, "/floes/pose", n_pose, n);
-    f->thickness = read_dataset(r, "/floes/thickness", false, 0, BT_MOST_FLOES, &n_thickness);
-    same_length(r, "/floes/thickness", n_thickness, n);
+    field->vertices = read_dataset(in, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
+    check_offsets(in, field->offsets, n, n_vertices);
+    field->pose = read_dataset(in, "/floes/pose", false, 3, BT_MOST_FLOES, &n_pose);
+    same_length(in, "/floes/pose", n_pose, n);
+    field->thickness = read_dataset(in, "/floes/thickness", false, 0, BT_MOST_FLOES, &n_thickness);
+    same_length(in, "/floes/thickness", n_thickness, n);
     double *stored_area = NULL;
-    if (r->r.status == BT_OK && H5Lexists(r->file, "/floes/area", H5P_DEFAULT) > 0) {
-        stored_area = read_dataset(r, "/floes/area", false, 0, BT_MOST_FLOES, &n_area);
-        same_length(r, "/floes/area", n_area, n);
+    if (in->r.status == BT_OK && H5Lexists(in->file, "/floes/area", H5P_DEFAULT) > 0) {
+        stored_area = read_dataset(in, "/floes/area", false, 0, BT_MOST_FLOES, &n_area);
+        same_length(in, "/floes/area", n_area, n);
     }
-    f->ice_area = read_ice_area(r);
-    read_frame(r, f->frame);
-    read_region(r, r->counts.region);
-    if (r->r.status == BT_OK) {
-        f->n = f->cap = (bt_idx)n;
-        f->cap_vertices = (int64_t)n_vertices;
-        f->area = bt_alloc((size_t)n, sizeof *f->area);
+    field->ice_area = read_ice_area(in);
+    read_frame(in, field->frame);
+    read_region(in, in->counts.region);
+    if (in->r.status == BT_OK) {
+        field->n = field->cap = (bt_idx)n;
+        field->cap_vertices = (int64_t)n_vertices;
+        field->area = bt_alloc((size_t)n, sizeof *field->area);
         double sum = 0, size = 0;
-        for (bt_idx i = 0; i < f->n; i++) {
-            check_floe(r, f, i, stored_area);
-            sum += f->area[i];
-            size += sqrt(4 * f->area[i] / BT_PI);
+        for (bt_idx i = 0; i < field->n; i++) {
+            check_floe(in, field, i, stored_area);
+            sum += field->area[i];
+            size += sqrt(4 * field->area[i] / BT_PI);
         }
         // Of outlines with floes outside the ice region our own files have a concentration that is less.
-        f->concentration = sum / f->ice_area;
-        const double said = r->bare ? NAN : read_number(r, "concentration");
-        if (said < f->concentration * (1 - 1e-9)) f->concentration = said, sum = said * f->ice_area;
+        field->concentration = sum / field->ice_area;
+        const double said = in->bare ? NAN : read_number(in, "concentration");
+        if (said < field->concentration * (1 - 1e-9)) field->concentration = said, sum = said * field->ice_area;
         char why[BT_ICE_WHY];
-        if (r->r.status == BT_OK && bt_ice_field_fault(false, f->n, size, sum, f->ice_area, why))
-            bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
+        if (in->r.status == BT_OK && bt_ice_field_fault(false, field->n, size, sum, field->ice_area, why))
+            bt_refuse(&in->r, "attribute ice_area of /floes: %s", why);
     }
     free(stored_area);
 }
@@ -311,7 +311,7 @@ static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
     *f = g;
 }
 
-bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
+bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
     bool bare;
     const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
@@ -326,22 +326,22 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, b
     }
     int errnum = 0; // of a read that failed: then what was found in the file says nothing of it
     bt_errors found = {0};
-    reader r = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
-    r.file = bt_h5_open_file(path, &errnum);
-    if (r.file < 0) bt_errors_add(&found, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
-    else if ((r.r.status = bt_h5_whole(r.file, path, &found)) == BT_OK) read_floes(&r, f);
-    if (r.file >= 0) H5Fclose(r.file);
-    if (errnum) r.r.status = bt_file_fail(path, "read the file", errnum, err);
+    reader in = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
+    in.file = bt_h5_open_file(path, &errnum);
+    if (in.file < 0) bt_errors_add(&found, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
+    else if ((in.r.status = bt_h5_whole(in.file, path, &found)) == BT_OK) read_floes(&in, field);
+    if (in.file >= 0) H5Fclose(in.file);
+    if (errnum) in.r.status = bt_file_fail(path, "read the file", errnum, err);
     else bt_errors_move(err, &found);
     bt_errors_free(&found); // what was found in spite of errnum
-    if (r.r.status == BT_OK) {
-        if (r.counts.hulled || r.counts.rounded) take_admitted(f, nonconvex);
-        f->outlines = r.counts;
+    if (in.r.status == BT_OK) {
+        if (in.counts.hulled || in.counts.rounded) take_admitted(field, nonconvex);
+        field->outlines = in.counts;
     } else {
-        bt_field_free(f);
-        bt_field_init(f);
+        bt_field_free(field);
+        bt_field_init(field);
     }
-    return r.r.status;
+    return in.r.status;
 }
 
 // --- as fixed floes --------------------------------------------------------------------------------------------------
@@ -353,20 +353,21 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_nonconvex nonconvex, b
 
 bool bt_field_fixed_ours(const char *path) { return bt_file_begins(path, HEAD); }
 
-bt_status bt_field_write_fixed(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
+bt_status bt_field_write_fixed(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
     bt_text lines;
     bt_text_begin(&lines);
     FILE *out = lines.out;
-    const char *frame = bt_field_frame(c);
+    const char *frame = bt_field_frame(input);
     fprintf(out, HEAD BT_VERSION "\n# x and y in metres of the frame %s\ndomain: {frame: %s}\nfloes:\n", frame, frame);
-    for (bt_idx i = 0; i < f->n; i++) {
-        const double *p = f->pose + 3 * (size_t)i;
+    for (bt_idx i = 0; i < field->n; i++) {
+        const double *p = field->pose + 3 * (size_t)i;
         fprintf(out,
                 "  - {shape: polygon, fixed: true, x: %.17g, y: %.17g, yaw: %.17g rad, thickness: %.17g, vertices: [",
-                p[0], p[1], p[2], f->thickness[i]);
-        for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++)
-            fprintf(out, "%s[%.17g, %.17g]", k > f->offsets[i] ? ", " : "", f->vertices[2 * k], f->vertices[2 * k + 1]);
+                p[0], p[1], p[2], field->thickness[i]);
+        for (int64_t k = field->offsets[i]; k < field->offsets[i + 1]; k++)
+            fprintf(out, "%s[%.17g, %.17g]", k > field->offsets[i] ? ", " : "", field->vertices[2 * k],
+                    field->vertices[2 * k + 1]);
         fprintf(out, "]}\n");
     }
     char *text = bt_text_end(&lines);

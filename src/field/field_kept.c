@@ -47,7 +47,7 @@ static void write_keys(FILE *out, const bt_key *keys, int n, const void *base)
     }
 }
 
-void bt_field_digest(const bt_case *c, char digest[BT_CHECKSUM_DIGEST])
+void bt_field_digest(const bt_case *input, char digest[BT_CHECKSUM_DIGEST])
 {
     bt_text t;
     bt_text_begin(&t);
@@ -55,16 +55,16 @@ void bt_field_digest(const bt_case *c, char digest[BT_CHECKSUM_DIGEST])
     for (int k = 0; k < bt_n_case_keys - bt_schema_added(); k++) {
         const bt_key *key = &bt_case_keys[k];
         if (!BEGINS(key->name, sections) || BEGINS(key->name, idle)) continue;
-        write_keys(t.out, key, 1, c);
-        const char *path = bt_case_file(c, key);
+        write_keys(t.out, key, 1, input);
+        const char *path = bt_case_file(input, key);
         bt_errors unheard = {0}; // who reads it says so
         int64_t bytes;
         if (path && bt_checksum_digest_file(path, digest, &bytes, &unheard) == BT_OK) fprintf(t.out, "%s\n", digest);
         bt_errors_free(&unheard);
     }
-    for (bt_idx i = 0; i < c->n_floes; i++) write_keys(t.out, bt_floe_keys, bt_n_floe_keys, &c->floes[i]);
+    for (bt_idx i = 0; i < input->n_floes; i++) write_keys(t.out, bt_floe_keys, bt_n_floe_keys, &input->floes[i]);
     double v[2 * BT_MAX_VERTICES]; // a shape that a program adds is known by its name alone
-    const int n = bt_case_waterline(c, v);
+    const int n = bt_case_waterline(input, v);
     for (int k = 0; k < 2 * n; k++) fprintf(t.out, "%a\n", v[k]);
     char *text = bt_text_end(&t);
     bt_checksum_digest_text(text, strlen(text), digest);
@@ -84,20 +84,20 @@ static const size_t sealed = offsetof(head, name); ///< from here on the digest 
 
 typedef struct piece { void *at; size_t bytes; } piece;
 
-static void pieces_of(bt_field *f, int64_t n, int64_t n_vertices, piece p[ARRAYS])
+static void pieces_of(bt_field *field, int64_t n, int64_t n_vertices, piece p[ARRAYS])
 {
     const size_t row = (size_t)n * sizeof(double);
-    const piece all[ARRAYS] = {{f->offsets, row + sizeof *f->offsets},
-                               {f->vertices, 2 * (size_t)n_vertices * sizeof *f->vertices},
-                               {f->pose, 3 * row}, {f->thickness, row}, {f->area, row}};
+    const piece all[ARRAYS] = {{field->offsets, row + sizeof *field->offsets},
+                               {field->vertices, 2 * (size_t)n_vertices * sizeof *field->vertices},
+                               {field->pose, 3 * row}, {field->thickness, row}, {field->area, row}};
     memcpy(p, all, sizeof all);
 }
 
 /// The bytes of a file; the caller frees them.
-static char *packed(bt_field *f, const char *name, size_t *size)
+static char *packed(bt_field *field, const char *name, size_t *size)
 {
     piece p[ARRAYS];
-    pieces_of(f, f->n, f->offsets[f->n], p);
+    pieces_of(field, field->n, field->offsets[field->n], p);
     *size = sizeof(head);
     for (int k = 0; k < ARRAYS; k++) *size += p[k].bytes;
     char *bytes = bt_alloc(*size, 1), *to = bytes + sizeof(head);
@@ -105,10 +105,10 @@ static char *packed(bt_field *f, const char *name, size_t *size)
     head *h = (head *)bytes;
     memcpy(h->magic, MAGIC, sizeof MAGIC);
     memcpy(h->name, name, sizeof h->name);
-    h->n = f->n, h->n_vertices = f->offsets[f->n];
-    h->ice_area = f->ice_area, h->concentration = f->concentration, h->strip = f->strip;
-    memcpy(h->frame, f->frame, sizeof h->frame);
-    h->outlines = f->outlines;
+    h->n = field->n, h->n_vertices = field->offsets[field->n];
+    h->ice_area = field->ice_area, h->concentration = field->concentration, h->strip = field->strip;
+    memcpy(h->frame, field->frame, sizeof h->frame);
+    h->outlines = field->outlines;
     for (int k = 0; k < ARRAYS; to += p[k++].bytes)
         if (p[k].bytes > 0) memcpy(to, p[k].at, p[k].bytes);
     bt_checksum_digest_text(bytes + sealed, *size - sealed, h->digest);
@@ -116,7 +116,7 @@ static char *packed(bt_field *f, const char *name, size_t *size)
 }
 
 /// The field of a file's bytes; false: they are not those of a whole file of this name.
-static bool unpacked(bt_field *f, const char *name, const char *bytes, size_t size)
+static bool unpacked(bt_field *field, const char *name, const char *bytes, size_t size)
 {
     head h;
     char digest[BT_CHECKSUM_DIGEST];
@@ -127,31 +127,31 @@ static bool unpacked(bt_field *f, const char *name, const char *bytes, size_t si
         memcmp(h.name, name, sizeof h.name) || h.n < 0 || h.n > BT_MOST_FLOES || h.n_vertices < 0 ||
         h.n_vertices > BT_MOST_FLOES * (int64_t)BT_MAX_VERTICES)
         return false;
-    f->n = f->cap = (bt_idx)h.n, f->cap_vertices = h.n_vertices;
-    f->ice_area = h.ice_area, f->concentration = h.concentration, f->strip = h.strip;
-    memcpy(f->frame, h.frame, sizeof f->frame);
-    f->outlines = h.outlines;
-    f->offsets = bt_realloc(f->offsets, (size_t)h.n + 1, sizeof *f->offsets);
-    f->vertices = bt_alloc(2 * (size_t)h.n_vertices, sizeof *f->vertices);
-    f->pose = bt_alloc(3 * (size_t)h.n, sizeof *f->pose);
-    f->thickness = bt_alloc((size_t)h.n, sizeof *f->thickness);
-    f->area = bt_alloc((size_t)h.n, sizeof *f->area);
+    field->n = field->cap = (bt_idx)h.n, field->cap_vertices = h.n_vertices;
+    field->ice_area = h.ice_area, field->concentration = h.concentration, field->strip = h.strip;
+    memcpy(field->frame, h.frame, sizeof field->frame);
+    field->outlines = h.outlines;
+    field->offsets = bt_realloc(field->offsets, (size_t)h.n + 1, sizeof *field->offsets);
+    field->vertices = bt_alloc(2 * (size_t)h.n_vertices, sizeof *field->vertices);
+    field->pose = bt_alloc(3 * (size_t)h.n, sizeof *field->pose);
+    field->thickness = bt_alloc((size_t)h.n, sizeof *field->thickness);
+    field->area = bt_alloc((size_t)h.n, sizeof *field->area);
     piece p[ARRAYS];
-    pieces_of(f, h.n, h.n_vertices, p);
+    pieces_of(field, h.n, h.n_vertices, p);
     const char *from = bytes + sizeof h;
     for (int k = 0; k < ARRAYS; from += p[k++].bytes)
         if (p[k].bytes > 0) memcpy(p[k].at, from, p[k].bytes);
     return true;
 }
 
-static bool take(const char *path, const char *name, bt_field *f)
+static bool take(const char *path, const char *name, bt_field *field)
 {
     if (access(path, F_OK) != 0) return false;
     char *bytes = NULL;
     size_t size;
     bt_errors why = {0};
     const bool whole = bt_file_read_to(path, "a kept field", SIZE_MAX / 2, &bytes, &size, &why) == BT_OK &&
-                       unpacked(f, name, bytes, size);
+                       unpacked(field, name, bytes, size);
     free(bytes);
     bt_errors_free(&why);
     if (whole) return true;
@@ -162,10 +162,10 @@ static bool take(const char *path, const char *name, bt_field *f)
 }
 
 /// By way of a name of this process; not brought to the disk, for a file that is not whole is made anew.
-static void keep(const char *path, const char *name, bt_field *f)
+static void keep(const char *path, const char *name, bt_field *field)
 {
     size_t size;
-    char *bytes = packed(f, name, &size), *part = bt_text_of("%s.%ld.part", path, (long)getpid());
+    char *bytes = packed(field, name, &size), *part = bt_text_of("%s.%ld.part", path, (long)getpid());
     const int fd = bt_file_descriptor(part, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW);
     const bool written = fd >= 0 && bt_file_put(fd, 0, bytes, size) == 0;
     if (fd >= 0 && (bt_file_close(fd) != 0 || !written || rename(part, path) != 0)) unlink(part);
@@ -173,19 +173,19 @@ static void keep(const char *path, const char *name, bt_field *f)
     free(bytes);
 }
 
-bt_status bt_field_load_kept(const char *dir, const bt_case *c, bt_field *f, bt_errors *err)
+bt_status bt_field_load_kept(const char *dir, const bt_case *input, bt_field *field, bt_errors *err)
 {
-    if (!dir) return bt_field_load(c, f, err);
+    if (!dir) return bt_field_load(input, field, err);
     char name[BT_CHECKSUM_DIGEST];
-    bt_field_digest(c, name); // first: a file of the ice that changes later then gives another digest
+    bt_field_digest(input, name); // first: a file of the ice that changes later then gives another digest
     char *path = bt_text_of("%s/%s", dir, name);
     bt_errors unheard = {0};
     const bool room = bt_file_make_dir(dir, &unheard) == BT_OK;
     bt_errors_free(&unheard);
     bt_status status = BT_OK;
-    if (!room || !take(path, name, f)) {
-        status = bt_field_load(c, f, err);
-        if (status == BT_OK && room) keep(path, name, f);
+    if (!room || !take(path, name, field)) {
+        status = bt_field_load(input, field, err);
+        if (status == BT_OK && room) keep(path, name, field);
     }
     free(path);
     return status;

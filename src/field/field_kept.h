@@ -17,11 +17,11 @@
 #include "bergtow/field.h"
 
 /// The digest of what the field of a case follows from.
-void bt_field_digest(const bt_case *c, char digest[BT_CHECKSUM_DIGEST]);
+void bt_field_digest(const bt_case *input, char digest[BT_CHECKSUM_DIGEST]);
 
 /// As bt_field_load, by way of the folder dir, which is made if missing; NULL = none. What cannot be kept there is used
 /// all the same.
-bt_status bt_field_load_kept(const char *dir, const bt_case *c, bt_field *f, bt_errors *err);
+bt_status bt_field_load_kept(const char *dir, const bt_case *input, bt_field *field, bt_errors *err);
 
 /// Remove the folder and the fields in it; what else is there stays.
 void bt_field_forget_kept(const char *dir);

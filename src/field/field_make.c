@@ -26,23 +26,23 @@
 
 #define LEAST_SPREAD 1e-6 // a distribution narrower than this has numbers that no double holds: 1/spread²
 
-double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id)
+double bt_sizes_draw(const bt_sizes *sizes, int64_t seed, int64_t id)
 {
-    bt_rng r = bt_rng_start(seed, BT_RNG_SIZE, id);
-    if (s->law == BT_SIZE_POWER) {
+    bt_rng rng = bt_rng_start(seed, BT_RNG_SIZE, id);
+    if (sizes->law == BT_SIZE_POWER) {
         // inverse of P(>d) = u
-        double q = bt_pow(s->max / s->min, -s->exponent), u = 1 - bt_rng_uniform(&r);
-        return s->min * bt_pow(q + u * (1 - q), -1 / s->exponent);
+        double q = bt_pow(sizes->max / sizes->min, -sizes->exponent), u = 1 - bt_rng_uniform(&rng);
+        return sizes->min * bt_pow(q + u * (1 - q), -1 / sizes->exponent);
     }
-    if (s->spread < LEAST_SPREAD) return s->mean;
+    if (sizes->spread < LEAST_SPREAD) return sizes->mean;
     for (;;) {
         double d;
-        if (s->law == BT_SIZE_LOGNORMAL) {
-            d = bt_exp(s->mu + s->sigma * bt_rng_normal(&r));
-            if (d >= s->min && (s->max <= 0 || d <= s->max)) return d;
+        if (sizes->law == BT_SIZE_LOGNORMAL) {
+            d = bt_exp(sizes->mu + sizes->sigma * bt_rng_normal(&rng));
+            if (d >= sizes->min && (sizes->max <= 0 || d <= sizes->max)) return d;
         } else {
-            d = s->scale * bt_rng_gamma(&r, 1 / (s->spread * s->spread));
-            if (d >= BT_SINGLE_LEAST * s->mean) return d;
+            d = sizes->scale * bt_rng_gamma(&rng, 1 / (sizes->spread * sizes->spread));
+            if (d >= BT_SINGLE_LEAST * sizes->mean) return d;
         }
     }
 }
@@ -53,27 +53,28 @@ double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id)
 #define BELOW_SLACK 1e-2 // of size_min: a common factor near 1 brings the areas to the concentration
 
 /// Every floe is one that the size law drew, put into a cell.
-static bool as_drawn(const bt_case *c) { return !bt_case_reads_field(c) && c->lead.mode == BT_LEAD_NONE; }
+static bool as_drawn(const bt_case *input) { return !bt_case_reads_field(input) && input->lead.mode == BT_LEAD_NONE; }
 
-bt_field_sizes bt_field_sizes_of(const bt_case *c, const bt_field *f)
+bt_field_sizes bt_field_sizes_of(const bt_case *input, const bt_field *field)
 {
-    const double limit = as_drawn(c) && c->ice.size_law != BT_SIZE_SINGLE ? (1 - BELOW_SLACK) * c->ice.size_min : 0;
-    bt_field_sizes s = {.n = f->n, .mean = bt_field_mean_size(f), .least = INFINITY};
-    for (bt_idx i = 0; i < f->n; i++) {
-        const double d = sqrt(4 * f->area[i] / BT_PI);
-        s.below += d < limit;
-        s.least = bt_min(s.least, d);
+    const double limit = as_drawn(input) && input->ice.size_law != BT_SIZE_SINGLE
+                         ? (1 - BELOW_SLACK) * input->ice.size_min : 0;
+    bt_field_sizes sizes = {.n = field->n, .mean = bt_field_mean_size(field), .least = INFINITY};
+    for (bt_idx i = 0; i < field->n; i++) {
+        const double d = sqrt(4 * field->area[i] / BT_PI);
+        sizes.below += d < limit;
+        sizes.least = bt_min(sizes.least, d);
     }
-    return s;
+    return sizes;
 }
 
-void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors *warnings)
+void bt_field_size_warn(const bt_case *input, const bt_field_sizes *found, bt_errors *warnings)
 {
-    bt_sizes s;
+    bt_sizes sizes;
     bt_errors refused = {0}; // such a case makes no ice
     const bt_idx n = found->n;
-    if (as_drawn(c) && n > 0 && bt_sizes_init(&s, c, &refused) == BT_OK) {
-        const double mean = bt_sizes_mean(&s), second = bt_sizes_mean_area(&s) * 4 / BT_PI;
+    if (as_drawn(input) && n > 0 && bt_sizes_init(&sizes, input, &refused) == BT_OK) {
+        const double mean = bt_sizes_mean(&sizes), second = bt_sizes_mean_area(&sizes) * 4 / BT_PI;
         const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = found->mean - mean;
         if (fabs(off) > SIZE_OFF * mean && fabs(off) > 2 * scatter)
             bt_warn(warnings, BT_WARN_MEAN_SIZE,
@@ -81,15 +82,15 @@ void bt_field_size_warn(const bt_case *c, const bt_field_sizes *found, bt_errors
                     "wide spread small floes are drawn again, or find no place; %s, or "
                     "count on the diameter that was made",
                     (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less",
-                    s.law == BT_SIZE_POWER ? "narrow ice.size_min to size_max" : "lower ice.size_spread");
+                    sizes.law == BT_SIZE_POWER ? "narrow ice.size_min to size_max" : "lower ice.size_spread");
         const double spread = sqrt(bt_max(second - mean * mean, 0)) / mean;
-        if (s.law != BT_SIZE_POWER && spread < (1 - SPREAD_OFF) * s.spread)
+        if (sizes.law != BT_SIZE_POWER && spread < (1 - SPREAD_OFF) * sizes.spread)
             bt_warn(warnings, BT_WARN_SPREAD,
                     "%s the sizes a spread of %.2g, where ice.size_spread asks for %.2g: all that is drawn "
                     "beyond is drawn again; %slower ice.size_spread",
-                    s.law == BT_SIZE_LOGNORMAL ? "ice.size_min and ice.size_max leave"
-                                               : "a least size of a tenth of the mean leaves",
-                    spread, s.spread, s.law == BT_SIZE_LOGNORMAL ? "move them apart, or " : "");
+                    sizes.law == BT_SIZE_LOGNORMAL ? "ice.size_min and ice.size_max leave"
+                                                   : "a least size of a tenth of the mean leaves",
+                    spread, sizes.spread, sizes.law == BT_SIZE_LOGNORMAL ? "move them apart, or " : "");
         if (found->below > BELOW_OFF * n)
             bt_warn(warnings, BT_WARN_SMALL_FLOES,
                     "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes "
@@ -111,9 +112,9 @@ static const double MORE_GAPS = 10;    // by which floes fly on that a shake has
 static const double MOST = 0.06;      // and at most this part of the size: a step turns a floe by a tenth of a radian
 enum { GROWTH_STAGES = 120, MORE_SHAKES = 3 };
 
-static const char *path_of(const bt_case *c) { return c->path ? c->path : "case"; }
+static const char *path_of(const bt_case *input) { return input->path ? input->path : "case"; }
 
-static bt_status cannot_pack(const bt_case *c, double reached, bt_errors *err)
+static bt_status cannot_pack(const bt_case *input, double reached, bt_errors *err)
 {
     static const char *const names[] = {[BT_ICE_VORONOI] = "voronoi floes", [BT_ICE_RECTANGLES] = "rectangles",
                                         [BT_ICE_POLYGONS] = "regular polygons"};
@@ -121,19 +122,19 @@ static bt_status cannot_pack(const bt_case *c, double reached, bt_errors *err)
         err,
         "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
         "ice.shape, size or region",
-        path_of(c), names[c->ice.shape], c->ice.concentration, floor(reached * 99) / 100);
+        path_of(input), names[input->ice.shape], input->ice.concentration, floor(reached * 99) / 100);
     return BT_ERR_CASE;
 }
 
 // Target areas of all floes, m²; [*n], caller frees.
-static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n,
+static bt_status draw_targets(const bt_case *input, const bt_sizes *sizes, double wanted, double **target, bt_idx *n,
                               bt_errors *err)
 {
-    double expected = wanted / bt_sizes_mean_area(s);
+    double expected = wanted / bt_sizes_mean_area(sizes);
     if (expected > BT_MOST_FLOES) {
         bt_errors_add(
             err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
-            path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
+            path_of(input), bt_sizes_mean(sizes), expected, BT_MOST_FLOES);
         return BT_ERR_CASE;
     }
     size_t cap = 64;
@@ -141,7 +142,7 @@ static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted
     *n = 0;
     double sum = 0;
     for (;;) {
-        double d = bt_sizes_draw(s, c->ice.seed, *n), a = BT_PI / 4 * d * d;
+        double d = bt_sizes_draw(sizes, input->ice.seed, *n), a = BT_PI / 4 * d * d;
         if (*n > 0 && wanted - sum < a / 2) break; // nearer without it
         if ((size_t)*n == cap) *target = bt_realloc(*target, cap *= 2, sizeof **target);
         (*target)[(*n)++] = a;
@@ -153,7 +154,7 @@ static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted
             err,
             "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
             "a larger region, or ice.concentration: 0",
-            path_of(c), bt_sizes_mean(s), wanted);
+            path_of(input), bt_sizes_mean(sizes), wanted);
         free(*target);
         return BT_ERR_CASE;
     }
@@ -161,56 +162,57 @@ static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted
     return BT_OK;
 }
 
-static double total_area(const bt_field *f)
+static double total_area(const bt_field *field)
 {
     double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++) sum += f->area[i];
+    for (bt_idx i = 0; i < field->n; i++) sum += field->area[i];
     return sum;
 }
 
-static double mean_gap(const bt_region *y, const bt_field *f, double *size)
+static double mean_gap(const bt_region *region, const bt_field *field, double *size)
 {
-    double d = 0, area = total_area(f);
-    for (bt_idx i = 0; i < f->n; i++) d += 2 * sqrt(f->area[i] / BT_PI) / f->n;
+    double d = 0, area = total_area(field);
+    for (bt_idx i = 0; i < field->n; i++) d += 2 * sqrt(field->area[i] / BT_PI) / field->n;
     *size = d;
-    double root = sqrt(area / y->ice_area);
+    double root = sqrt(area / region->ice_area);
     // Between floes of diameter d in cells of diameter d/√c; far apart, a third of the spacing stands for it, so
     // that a shake of fifteen gaps is five spacings, which is enough to forget a lattice.
     return d / root * bt_min(1 - root, 1.0 / 3);
 }
 
 // Cells of the case's kind. wanted: area of all floes, m².
-static bt_tessellation make_cells(const bt_case *c, const bt_region *y, bt_idx n, const double *target, double wanted)
+static bt_tessellation make_cells(const bt_case *input, const bt_region *region, bt_idx n, const double *target,
+                                  double wanted)
 {
-    if (c->ice.shape != BT_ICE_RECTANGLES) return bt_tessellation_tessellate(y, n, target, c->ice.seed);
-    double aspect = c->ice.aspect > 0 ? bt_max(c->ice.aspect, 1 / c->ice.aspect) : 1;
+    if (input->ice.shape != BT_ICE_RECTANGLES) return bt_tessellation_tessellate(region, n, target, input->ice.seed);
+    double aspect = input->ice.aspect > 0 ? bt_max(input->ice.aspect, 1 / input->ice.aspect) : 1;
     // Around an obstacle rectangles stay rectangles, unless that wastes too much water.
     for (int effort = 0;; effort++) {
-        bt_tessellation cells = bt_tessellation_saw(y, n, target, aspect, c->ice.seed, effort);
+        bt_tessellation cells = bt_tessellation_saw(region, n, target, aspect, input->ice.seed, effort);
         double fill = 0;
         for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_centroid(cells.nv[i], cells.v[i]).area;
-        if (y->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
+        if (region->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
         bt_tessellation_free(&cells);
     }
 }
 
 // One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.
-static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
-                                  bt_field *f, bt_errors *err)
+static bt_status floes_from_cells(const bt_case *input, const bt_region *region, const bt_tessellation *cells,
+                                  double wanted, bt_field *field, bt_errors *err)
 {
     double *clearance = bt_alloc((size_t)cells->n, sizeof *clearance);
     for (bt_idx i = 0; i < cells->n; i++) {
         if (cells->nv[i] < 3) continue;
-        bt_idx k = f->n;
-        bt_field_add(f, cells->nv[i], cells->v[i], 0, 0, 0, 0);
-        bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
-        double s = sqrt(cells->target[i] / f->area[k]);
-        bt_field_scale(f, k, s);
+        bt_idx k = field->n;
+        bt_field_add(field, cells->nv[i], cells->v[i], 0, 0, 0, 0);
+        bt_region_wrap(region, &field->pose[3 * k], &field->pose[3 * k + 1]);
+        double s = sqrt(cells->target[i] / field->area[k]);
+        bt_field_scale(field, k, s);
         clearance[k] = (1 - 1e-6) / s;
     }
-    double reached = bt_field_fit(f, clearance, NULL, wanted);
+    double reached = bt_field_fit(field, clearance, NULL, wanted);
     free(clearance);
-    return reached > (1 - 1e-6) * wanted ? BT_OK : cannot_pack(c, reached / y->ice_area, err);
+    return reached > (1 - 1e-6) * wanted ? BT_OK : cannot_pack(input, reached / region->ice_area, err);
 }
 
 // Largest factor by which polygon v, centred at (x, y), fits into the cell.
@@ -228,13 +230,13 @@ static double fit_into(int nc, const double *cell, double x, double y, int n, co
 }
 
 // Regular polygons where they fit in their cells, then grown between shakes until every one has its target area.
-static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
-                                   bt_field *f, bt_errors *err)
+static bt_status polygons_in_cells(const bt_case *input, const bt_region *region, const bt_tessellation *cells,
+                                   double wanted, bt_field *field, bt_errors *err)
 {
-    int sides = (int)c->ice.sides;
-    if (c->ice.sides < 3 || c->ice.sides > 32) {
-        bt_errors_add(err, "%s: ice.sides: %lld is refused: a regular polygon has 3 to 32 sides here", path_of(c),
-                      (long long)c->ice.sides);
+    int sides = (int)input->ice.sides;
+    if (input->ice.sides < 3 || input->ice.sides > 32) {
+        bt_errors_add(err, "%s: ice.sides: %lld is refused: a regular polygon has 3 to 32 sides here", path_of(input),
+                      (long long)input->ice.sides);
         return BT_ERR_CASE;
     }
     double sum = 0, v[2 * 32];
@@ -243,44 +245,45 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
     double *goal = bt_alloc((size_t)cells->n, sizeof *goal), *clearance = bt_alloc((size_t)cells->n, sizeof *clearance);
     for (bt_idx i = 0; i < cells->n; i++) {
         if (cells->nv[i] < 3) continue;
-        bt_moments m = bt_shape_centroid(cells->nv[i], cells->v[i]);
-        bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_ORIENT, i);
-        double yaw = 2 * BT_PI * bt_rng_uniform(&r);
-        bt_idx k = f->n;
+        bt_moments moments = bt_shape_centroid(cells->nv[i], cells->v[i]);
+        bt_rng rng = bt_rng_start(input->ice.seed, BT_RNG_ORIENT, i);
+        double yaw = 2 * BT_PI * bt_rng_uniform(&rng);
+        bt_idx k = field->n;
         goal[k] = cells->target[i] * wanted / sum;
         bt_shape_regular(sides, goal[k], v);
-        double t = fit_into(cells->nv[i], cells->v[i], m.cx, m.cy, sides, v, bt_cos(yaw), bt_sin(yaw));
-        bt_field_add(f, sides, v, m.cx, m.cy, yaw, 0);
-        bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
-        bt_field_scale(f, k, bt_min(1, 0.999 * t));
+        double t = fit_into(cells->nv[i], cells->v[i], moments.cx, moments.cy, sides, v, bt_cos(yaw), bt_sin(yaw));
+        bt_field_add(field, sides, v, moments.cx, moments.cy, yaw, 0);
+        bt_region_wrap(region, &field->pose[3 * k], &field->pose[3 * k + 1]);
+        bt_field_scale(field, k, bt_min(1, 0.999 * t));
     }
     bt_status status = BT_OK;
     double best_area = 0, best_least = 0;
     int idle = 0;
     for (int stage = 1; status == BT_OK; stage++) {
-        bt_field_growth(y, f, 2, clearance);
+        bt_field_growth(region, field, 2, clearance);
         double least = 1; // part of its goal that the smallest floe has
-        for (bt_idx i = 0; i < f->n; i++) {
-            if (clearance[i] < 1) bt_field_scale(f, i, TOUCH * clearance[i]);
-            least = bt_min(least, f->area[i] / goal[i]);
+        for (bt_idx i = 0; i < field->n; i++) {
+            if (clearance[i] < 1) bt_field_scale(field, i, TOUCH * clearance[i]);
+            least = bt_min(least, field->area[i] / goal[i]);
         }
-        double area = total_area(f);
+        double area = total_area(field);
         // A shake leaves overlaps of about its slop, which have just cost that much of the area: settle makes it up.
         if (least > 1 - GROWN) break;
         idle = area > best_area * (1 + 2e-4) || least > best_least + 2e-3 ? 0 : idle + 1;
         best_area = bt_max(best_area, area);
         best_least = bt_max(best_least, least);
         if (stage > GROWTH_STAGES || idle > 8) {
-            status = cannot_pack(c, best_area / y->ice_area, err);
+            status = cannot_pack(input, best_area / region->ice_area, err);
             break;
         }
-        double size, gap = mean_gap(y, f, &size);
-        for (bt_idx i = 0; i < f->n; i++) {
+        double size, gap = mean_gap(region, field, &size);
+        for (bt_idx i = 0; i < field->n; i++) {
             // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so
             // that grown floes do not trap it.
-            bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (clearance[i] - 1))));
+            bt_field_scale(field, i,
+                           bt_min(sqrt(goal[i] / field->area[i]), bt_max(PUSH, 1 + 0.8 * (clearance[i] - 1))));
         }
-        status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
+        status = bt_field_shake(input, region, field, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
     }
     free(goal);
     free(clearance);
@@ -289,98 +292,100 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
 
 // Take out what overlap the shake has left, and bring the area back to what was asked; false, with the reason, where
 // that cannot be done.
-static bool settled(const bt_region *y, bt_field *f, double wanted, char why[160])
+static bool settled(const bt_region *region, bt_field *field, double wanted, char why[160])
 {
-    double *clearance = bt_alloc((size_t)f->n, sizeof *clearance);
-    bt_field_growth(y, f, 1.2, clearance);
+    double *clearance = bt_alloc((size_t)field->n, sizeof *clearance);
+    bt_field_growth(region, field, 1.2, clearance);
     bool good = true;
-    for (bt_idx i = 0; i < f->n && good; i++) {
+    for (bt_idx i = 0; i < field->n && good; i++) {
         clearance[i] *= TOUCH;
         good = clearance[i] > 0.9;
         if (!good) snprintf(why, 160, "floe %lld is stuck in another after the shake", (long long)i);
     }
-    const double reached = good ? bt_field_fit(f, clearance, NULL, wanted) : wanted;
+    const double reached = good ? bt_field_fit(field, clearance, NULL, wanted) : wanted;
     if (reached < 0.995 * wanted) {
-        snprintf(why, 160, "concentration %g after the shake, %g wanted", reached / y->ice_area, wanted / y->ice_area);
+        snprintf(why, 160, "concentration %g after the shake, %g wanted", reached / region->ice_area,
+                 wanted / region->ice_area);
         good = false;
     }
     free(clearance);
     return good;
 }
 
-double bt_field_thickness(const bt_case *c, bt_idx i)
+double bt_field_thickness(const bt_case *input, bt_idx i)
 {
     // ln h ~ N(μ, σ) with the mean and standard deviation asked for
-    double h = c->ice.thickness, s2 = bt_log1p(c->ice.thickness_spread * c->ice.thickness_spread);
-    if (c->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
-    bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_THICKNESS, i);
+    double h = input->ice.thickness, s2 = bt_log1p(input->ice.thickness_spread * input->ice.thickness_spread);
+    if (input->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
+    bt_rng rng = bt_rng_start(input->ice.seed, BT_RNG_THICKNESS, i);
     double least, most;
     bt_ice_thickness_range(&least, &most);
-    return bt_min(most, bt_max(least, h * bt_exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2)));
+    return bt_min(most, bt_max(least, h * bt_exp(sqrt(s2) * bt_rng_normal(&rng) - s2 / 2)));
 }
 
-static void set_thickness(const bt_case *c, bt_field *f)
+static void set_thickness(const bt_case *input, bt_field *field)
 {
-    for (bt_idx i = 0; i < f->n; i++) f->thickness[i] = bt_field_thickness(c, i);
+    for (bt_idx i = 0; i < field->n; i++) field->thickness[i] = bt_field_thickness(input, i);
 }
 
-static bt_status make(const bt_case *c, const bt_region *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)
+static bt_status make(const bt_case *input, const bt_region *region, const bt_sizes *sizes, bt_field *field,
+                      bt_errors *err)
 {
-    double wanted = c->ice.concentration * y->ice_area, *target;
+    double wanted = input->ice.concentration * region->ice_area, *target;
     bt_idx n;
-    bt_status status = draw_targets(c, sizes, wanted, &target, &n, err);
+    bt_status status = draw_targets(input, sizes, wanted, &target, &n, err);
     if (status != BT_OK) return status;
-    bt_tessellation cells = make_cells(c, y, n, target, wanted);
+    bt_tessellation cells = make_cells(input, region, n, target, wanted);
     free(target);
-    status = c->ice.shape == BT_ICE_POLYGONS ? polygons_in_cells(c, y, &cells, wanted, f, err)
-                                             : floes_from_cells(c, y, &cells, wanted, f, err);
+    status = input->ice.shape == BT_ICE_POLYGONS ? polygons_in_cells(input, region, &cells, wanted, field, err)
+                                                 : floes_from_cells(input, region, &cells, wanted, field, err);
     bt_tessellation_free(&cells);
     if (status != BT_OK) return status;
-    bt_field_sort(f, y);
-    double size, gap = mean_gap(y, f, &size);
+    bt_field_sort(field, region);
+    double size, gap = mean_gap(region, field, &size);
     // A floe that turns fast may be deep in another for a moment. Flying on parts the two, and resting does not: rarely
     // (one of 1,500 random cases) the shake ends in such a moment.
     for (int again = 0; status == BT_OK && again <= MORE_SHAKES; again++) {
-        const double length = again ? MORE_GAPS : c->ice.shake;
-        status = bt_field_shake(c, y, f, length * gap, bt_min(STRIDE * gap, MOST * size),
+        const double length = again ? MORE_GAPS : input->ice.shake;
+        status = bt_field_shake(input, region, field, length * gap, bt_min(STRIDE * gap, MOST * size),
                                 again ? GROWTH_STAGES + 1 + again : 0, err);
         char why[160];
-        if (status != BT_OK || settled(y, f, wanted, why)) break;
-        if (again < MORE_SHAKES && c->ice.shake > 0) continue;
-        bt_errors_add(err, "%s: ice field: %s; change ice.seed, or lower ice.shake", path_of(c), why);
+        if (status != BT_OK || settled(region, field, wanted, why)) break;
+        if (again < MORE_SHAKES && input->ice.shake > 0) continue;
+        bt_errors_add(err, "%s: ice field: %s; change ice.seed, or lower ice.shake", path_of(input), why);
         status = BT_ERR_NUMERIC;
     }
     if (status != BT_OK) return status;
-    bt_field_sort(f, y);
-    set_thickness(c, f);
+    bt_field_sort(field, region);
+    set_thickness(input, field);
     return BT_OK;
 }
 
-bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err)
+bt_status bt_field_generate(const bt_case *input, bt_field *field, bt_errors *err)
 {
-    bt_field_free(f);
-    bt_field_init(f);
+    bt_field_free(field);
+    bt_field_init(field);
     bt_sizes sizes;
-    bt_status status = bt_sizes_init(&sizes, c, err);
+    bt_status status = bt_sizes_init(&sizes, input, err);
     if (status != BT_OK) return status;
     // The field is that of the extent; where it is larger than the ice region, it is cut to it afterwards.
-    const bt_case whole = bt_case_of_extent(c);
-    bt_region y, of;
-    status = bt_region_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
+    const bt_case whole = bt_case_of_extent(input);
+    bt_region region, of;
+    status = bt_region_init(&region, input, CLEARANCE * bt_sizes_mean(&sizes), err);
     if (status == BT_OK) {
-        status = bt_region_init(&of, &whole, y.clearance, err);
-        if (status == BT_OK && c->ice.concentration > 0) {
-            status = make(&whole, &of, &sizes, f, err);
-            if (status == BT_OK) status = bt_field_cut(c, &of, &y, bt_sizes_mean(&sizes), f, err);
+        status = bt_region_init(&of, &whole, region.clearance, err);
+        if (status == BT_OK && input->ice.concentration > 0) {
+            status = make(&whole, &of, &sizes, field, err);
+            if (status == BT_OK) status = bt_field_cut(input, &of, &region, bt_sizes_mean(&sizes), field, err);
         }
         bt_region_free(&of);
     }
-    f->ice_area = y.ice_area;
-    f->concentration = y.ice_area > 0 ? total_area(f) / y.ice_area : 0;
-    bt_region_free(&y);
+    field->ice_area = region.ice_area;
+    field->concentration = region.ice_area > 0 ? total_area(field) / region.ice_area : 0;
+    bt_region_free(&region);
     if (status != BT_OK) {
-        bt_field_free(f);
-        bt_field_init(f);
+        bt_field_free(field);
+        bt_field_init(field);
     }
     return status;
 }

@@ -26,16 +26,16 @@ typedef struct bt_region {
 } bt_region;
 
 /// Region, obstacles and ice area of a case. clearance: m. Errors: BT_ERR_CASE.
-bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err);
+bt_status bt_region_init(bt_region *region, const bt_case *input, double clearance, bt_errors *err);
 /// The whole domain as a region, for ice that is there: no room for more is no error.
-void bt_region_of_domain(bt_region *y, const bt_case *c);
-void bt_region_free(bt_region *y);
+void bt_region_of_domain(bt_region *region, const bt_case *input);
+void bt_region_free(bt_region *region);
 /// Area of a polygon within the region, m², with its images over the edges at which the domain of the case wraps.
-double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const double *v);
+double bt_region_area_of(const bt_region *region, const bt_case *input, int n, const double *v);
 /// Bring a point into the region along its periodic directions.
-void bt_region_wrap(const bt_region *y, double *px, double *py);
+void bt_region_wrap(const bt_region *region, double *px, double *py);
 
-double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id); ///< diameter of floe id, m
+double bt_sizes_draw(const bt_sizes *sizes, int64_t seed, int64_t id); ///< diameter of floe id, m
 
 #define BT_TESSELLATION_VERTICES 12 ///< most vertices of a made floe
 
@@ -47,50 +47,50 @@ typedef struct bt_tessellation {
     double *target;  ///< [n] area asked for, m²
 } bt_tessellation;
 
-void bt_tessellation_free(bt_tessellation *c);
+void bt_tessellation_free(bt_tessellation *cells);
 /// Cells of a power diagram whose areas approach target[n] × a common factor. The cells own a copy of target.
-bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed);
+bt_tessellation bt_tessellation_tessellate(const bt_region *region, bt_idx n, const double *target, int64_t seed);
 /// Rectangles sawn from strips along x with areas target[n] × a common factor. effort to fill the water beside
 /// obstacles: 0 keeps rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
-bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed,
-                                    int effort);
+bt_tessellation bt_tessellation_saw(const bt_region *region, bt_idx n, const double *target, double aspect,
+                                    int64_t seed, int effort);
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
-int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed);
+int bt_tessellation_clear(const bt_region *region, int n, double *v, bool boxed);
 /// Remove edges shorter than this, m, and vertices beyond `most` inwards; returns the new count.
 int bt_tessellation_clean(int n, double *v, double shortest, int most);
 
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
-double *bt_field_outlines(const bt_field *f);
+double *bt_field_outlines(const bt_field *field);
 
 /// Calls visit for each pair of floes i, j whose bounding boxes, scaled by `limit` about the centroids, meet; (dx, dy)
 /// points from i to (an image of) j. A pair across a periodic edge comes twice. Independent of the contact code's pair
 /// search.
 typedef void bt_pair_visit(void *context, bt_idx i, bt_idx j, double dx, double dy);
-void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit,
+void bt_field_visit_pairs(const bt_region *region, const bt_field *field, const double *outline, double limit,
                           bt_pair_visit *visit, void *context);
 
 /// clearance[i] <= limit: every floe i may be scaled about its centroid by any factor up to clearance[i], all at the
 /// same time, without touching another floe, an obstacle or an edge of the region. clearance[i] < 1: floe i overlaps
 /// something.
-void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *clearance);
+void bt_field_growth(const bt_region *region, const bt_field *field, double limit, double *clearance);
 
 /// Scale floe i about its centroid.
-void bt_field_scale(bt_field *f, bt_idx i, double s);
+void bt_field_scale(bt_field *field, bt_idx i, double s);
 /// Area with every floe but those held scaled by min(clearance, √λ), m². held: NULL = none.
-double bt_field_area_at(const bt_field *f, const double *clearance, const bool *held, double lambda);
+double bt_field_area_at(const bt_field *field, const double *clearance, const bool *held, double lambda);
 /// Scale them so by the λ that makes Σ area = wanted; returns the area reached.
-double bt_field_fit(bt_field *f, const double *clearance, const bool *held, double wanted);
+double bt_field_fit(bt_field *field, const double *clearance, const bool *held, double wanted);
 /// Append floe i of another field as it is, to the bit.
-void bt_field_append(bt_field *f, const bt_field *from, bt_idx i);
-/// Cut the field of region `whole` to the region y of case c, with its concentration; size: mean diameter, m.
-bt_status bt_field_cut(const bt_case *c, const bt_region *whole, const bt_region *y, double size, bt_field *f,
-                       bt_errors *err);
+void bt_field_append(bt_field *field, const bt_field *from, bt_idx i);
+/// Cut the field of region `whole` to the region of the case, with its concentration; size: mean diameter, m.
+bt_status bt_field_cut(const bt_case *input, const bt_region *whole, const bt_region *region, double size,
+                       bt_field *field, bt_errors *err);
 /// Sort floes along a Morton curve.
-void bt_field_sort(bt_field *f, const bt_region *y);
+void bt_field_sort(bt_field *f, const bt_region *region);
 
 /// Move floes about by free flight and elastic collisions over `length` metres of mean path, in steps of `stride` m.
-bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, double length, double stride, int64_t stage,
-                         bt_errors *err);
+bt_status bt_field_shake(const bt_case *input, const bt_region *region, bt_field *field, double length, double stride,
+                         int64_t stage, bt_errors *err);
 
 #endif

@@ -21,41 +21,41 @@ static void place(int n, double *v, double x, double y, double yaw)
 }
 
 // Area of a polygon within the region.
-static double area_inside(const bt_region *y, int n, const double *v)
+static double area_inside(const bt_region *region, int n, const double *v)
 {
     double a[2 * (BT_MAX_VERTICES + 4)], b[2 * (BT_MAX_VERTICES + 4)];
-    n = bt_shape_clip(n, v, -1, 0, -y->x0, a);
-    n = bt_shape_clip(n, a, 1, 0, y->x1, b);
-    n = bt_shape_clip(n, b, 0, -1, -y->y0, a);
-    n = bt_shape_clip(n, a, 0, 1, y->y1, b);
+    n = bt_shape_clip(n, v, -1, 0, -region->x0, a);
+    n = bt_shape_clip(n, a, 1, 0, region->x1, b);
+    n = bt_shape_clip(n, b, 0, -1, -region->y0, a);
+    n = bt_shape_clip(n, a, 0, 1, region->y1, b);
     return n >= 3 ? bt_shape_centroid(n, b).area : 0;
 }
 
 // Of a convex part of a floe, with its images over the edges at which the domain wraps.
-static double part_inside(const bt_region *y, const bt_case *c, int n, const double *v)
+static double part_inside(const bt_region *region, const bt_case *input, int n, const double *v)
 {
-    const int over_x = bt_bound_wraps(c->domain.ends), over_y = c->domain.sides == BT_BOUND_PERIODIC;
+    const int over_x = bt_bound_wraps(input->domain.ends), over_y = input->domain.sides == BT_BOUND_PERIODIC;
     double sum = 0, at[2 * BT_MAX_VERTICES];
     for (int ix = -over_x; ix <= over_x; ix++)
         for (int iy = -over_y; iy <= over_y; iy++) {
             for (int k = 0; k < n; k++) {
-                at[2 * k] = v[2 * k] + ix * c->domain.length;
-                at[2 * k + 1] = v[2 * k + 1] + iy * c->domain.width;
+                at[2 * k] = v[2 * k] + ix * input->domain.length;
+                at[2 * k + 1] = v[2 * k + 1] + iy * input->domain.width;
             }
-            sum += area_inside(y, n, at);
+            sum += area_inside(region, n, at);
         }
     return sum;
 }
 
-double bt_region_area_of(const bt_region *y, const bt_case *c, int n, const double *v)
+double bt_region_area_of(const bt_region *region, const bt_case *input, int n, const double *v)
 {
-    bt_parts p;
-    if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &p)) return part_inside(y, c, n, v);
+    bt_parts parts;
+    if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &parts)) return part_inside(region, input, n, v);
     double sum = 0;
-    for (int i = 0, at = 0; i < p.n; at += p.count[i++]) {
+    for (int i = 0, at = 0; i < parts.n; at += parts.count[i++]) {
         double part[2 * BT_MAX_VERTICES];
-        for (int k = 0; k < p.count[i]; k++) memcpy(part + 2 * k, v + 2 * p.corner[at + k], 2 * sizeof *v);
-        sum += part_inside(y, c, p.count[i], part);
+        for (int k = 0; k < parts.count[i]; k++) memcpy(part + 2 * k, v + 2 * parts.corner[at + k], 2 * sizeof *v);
+        sum += part_inside(region, input, parts.count[i], part);
     }
     return sum;
 }
@@ -85,44 +85,45 @@ static void box_about(int n, const double *v, double clearance, double box[8])
 // cover. False for a body so slender that room for the clearance cannot be made by scaling: it would keep floes away
 // all along its line, and its images would be without number. A part so slender is a sliver along an edge, and gets a
 // box.
-static bool add_obstacle(bt_region *y, int n, const double *v, bool part)
+static bool add_obstacle(bt_region *region, int n, const double *v, bool part)
 {
-    double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
-    bt_moments m = bt_shape_extent(n, v);
+    double lx = region->x1 - region->x0, ly = region->y1 - region->y0;
+    bt_moments moments = bt_shape_extent(n, v);
     // Scaling about the centroid by 1 + clearance/inradius moves every edge out by at least the clearance.
-    double grow = 1 + y->clearance / bt_max(m.inradius, 1e-9 * m.radius);
+    double grow = 1 + region->clearance / bt_max(moments.inradius, 1e-9 * moments.radius);
     const bool sliver = grow > MOST_GROWTH;
     if (sliver && !part) return false;
-    double box[8], r = m.radius * grow;
+    double box[8], r = moments.radius * grow;
     if (sliver) {
-        box_about(n, v, y->clearance, box);
-        r = bt_shape_extent(4, box).radius + m.radius;
+        box_about(n, v, region->clearance, box);
+        r = bt_shape_extent(4, box).radius + moments.radius;
     }
     // A body far outside a periodic domain is brought back first, so that images next to it suffice.
-    double wx = m.cx, wy = m.cy;
-    bt_region_wrap(y, &wx, &wy);
-    int reach_x = y->periodic_x ? 1 + (int)(r / lx) : 0, reach_y = y->periodic_y ? 1 + (int)(r / ly) : 0;
+    double wx = moments.cx, wy = moments.cy;
+    bt_region_wrap(region, &wx, &wy);
+    int reach_x = region->periodic_x ? 1 + (int)(r / lx) : 0, reach_y = region->periodic_y ? 1 + (int)(r / ly) : 0;
     for (int ix = -reach_x; ix <= reach_x; ix++)
         for (int iy = -reach_y; iy <= reach_y; iy++) {
             double cx = wx + ix * lx, cy = wy + iy * ly;
             // Floes at home reach over a periodic edge by less than half a period.
-            double over_x = y->periodic_x ? lx / 2 : 0, over_y = y->periodic_y ? ly / 2 : 0;
-            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y ||
-                cy - r > y->y1 + over_y)
+            double over_x = region->periodic_x ? lx / 2 : 0, over_y = region->periodic_y ? ly / 2 : 0;
+            if (cx + r < region->x0 - over_x || cx - r > region->x1 + over_x || cy + r < region->y0 - over_y ||
+                cy - r > region->y1 + over_y)
                 continue;
-            y->obstacles = bt_realloc(y->obstacles, (size_t)y->n_obstacles + 1, sizeof *y->obstacles);
-            bt_obstacle *o = &y->obstacles[y->n_obstacles++];
-            *o = (bt_obstacle){.n = n, .x = cx, .y = cy, .radius = r};
+            region->obstacles = bt_realloc(region->obstacles, (size_t)region->n_obstacles + 1,
+                                           sizeof *region->obstacles);
+            bt_obstacle *obstacle = &region->obstacles[region->n_obstacles++];
+            *obstacle = (bt_obstacle){.n = n, .x = cx, .y = cy, .radius = r};
             for (int k = 0; k < n; k++) {
-                o->v[2 * k] = cx + (v[2 * k] - m.cx);
-                o->v[2 * k + 1] = cy + (v[2 * k + 1] - m.cy);
+                obstacle->v[2 * k] = cx + (v[2 * k] - moments.cx);
+                obstacle->v[2 * k + 1] = cy + (v[2 * k + 1] - moments.cy);
             }
-            y->ice_area -= area_inside(y, n, o->v);
+            region->ice_area -= area_inside(region, n, obstacle->v);
             const double *outer = sliver ? box : v, by = sliver ? 1 : grow;
-            o->n = sliver ? 4 : n;
-            for (int k = 0; k < o->n; k++) {
-                o->v[2 * k] = cx + by * (outer[2 * k] - m.cx);
-                o->v[2 * k + 1] = cy + by * (outer[2 * k + 1] - m.cy);
+            obstacle->n = sliver ? 4 : n;
+            for (int k = 0; k < obstacle->n; k++) {
+                obstacle->v[2 * k] = cx + by * (outer[2 * k] - moments.cx);
+                obstacle->v[2 * k + 1] = cy + by * (outer[2 * k + 1] - moments.cy);
             }
         }
     return true;
@@ -133,83 +134,87 @@ static bool spans(double a0, double a1, double d0, double length)
     return fabs(a0 - d0) <= 1e-9 * length && fabs(a1 - d0 - length) <= 1e-9 * length;
 }
 
-static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
+static bool add_body(bt_region *region, const bt_case *input, int n, const double *own, double x, double z, double yaw)
 {
     // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
-    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x,
-        over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
+    int over_x = bt_bound_wraps(input->domain.ends) && !region->periodic_x,
+        over_y = input->domain.sides == BT_BOUND_PERIODIC && !region->periodic_y;
     for (int ix = -over_x; ix <= over_x; ix++)
         for (int iy = -over_y; iy <= over_y; iy++) {
             double v[2 * BT_MAX_VERTICES];
             memcpy(v, own, 2 * (size_t)n * sizeof *v);
-            place(n, v, x + ix * c->domain.length, z + iy * c->domain.width, yaw);
-            bt_parts p;
-            if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &p)) {
-                if (!add_obstacle(y, n, v, false)) return false;
+            place(n, v, x + ix * input->domain.length, z + iy * input->domain.width, yaw);
+            bt_parts parts;
+            if (bt_outline_convex(n, v) || !bt_outline_split(n, v, &parts)) {
+                if (!add_obstacle(region, n, v, false)) return false;
                 continue;
             }
-            for (int i = 0, at = 0; i < p.n; at += p.count[i++]) {
+            for (int i = 0, at = 0; i < parts.n; at += parts.count[i++]) {
                 double part[2 * BT_MAX_VERTICES];
-                for (int k = 0; k < p.count[i]; k++) memcpy(part + 2 * k, v + 2 * p.corner[at + k], 2 * sizeof *v);
-                if (!add_obstacle(y, p.count[i], part, true)) return false;
+                for (int k = 0; k < parts.count[i]; k++)
+                    memcpy(part + 2 * k, v + 2 * parts.corner[at + k], 2 * sizeof *v);
+                if (!add_obstacle(region, parts.count[i], part, true)) return false;
             }
         }
     return true;
 }
 
-bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err)
+bt_status bt_region_init(bt_region *region, const bt_case *input, double clearance, bt_errors *err)
 {
-    *y = (bt_region){
-        .x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
-    if (!(y->x1 > y->x0 && y->y1 > y->y0)) {
+    *region = (bt_region){
+        .x0 = input->ice.x_min, .x1 = input->ice.x_max, .y0 = input->ice.y_min, .y1 = input->ice.y_max,
+        .clearance = clearance};
+    if (!(region->x1 > region->x0 && region->y1 > region->y0)) {
         bt_errors_add(
             err,
             "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
-            c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
+            input->path ? input->path : "case", region->x0, region->x1, region->y0, region->y1);
         return BT_ERR_CASE;
     }
-    y->periodic_x = bt_bound_wraps(c->domain.ends) && spans(y->x0, y->x1, c->domain.x0, c->domain.length);
-    y->periodic_y = c->domain.sides == BT_BOUND_PERIODIC && spans(y->y0, y->y1, c->domain.y0, c->domain.width);
-    y->ice_area = (y->x1 - y->x0) * (y->y1 - y->y0);
+    region->periodic_x = bt_bound_wraps(input->domain.ends) &&
+                         spans(region->x0, region->x1, input->domain.x0, input->domain.length);
+    region->periodic_y = input->domain.sides == BT_BOUND_PERIODIC &&
+                         spans(region->y0, region->y1, input->domain.y0, input->domain.width);
+    region->ice_area = (region->x1 - region->x0) * (region->y1 - region->y0);
 
     double v[2 * BT_MAX_VERTICES];
-    int nv = bt_case_waterline(c, v);
-    bool wide = nv < 3 || add_body(y, c, nv, v, c->body.x, c->body.y, c->body.yaw);
-    for (bt_idx i = 0; i < c->n_floes && wide; i++) {
-        const bt_floe_def *d = &c->floes[i];
-        nv = bt_case_floe_outline(d, v);
-        wide = nv < 3 || add_body(y, c, nv, v, d->x, d->y, d->yaw);
+    int nv = bt_case_waterline(input, v);
+    bool wide = nv < 3 || add_body(region, input, nv, v, input->body.x, input->body.y, input->body.yaw);
+    for (bt_idx i = 0; i < input->n_floes && wide; i++) {
+        const bt_floe_def *floe = &input->floes[i];
+        nv = bt_case_floe_outline(floe, v);
+        wide = nv < 3 || add_body(region, input, nv, v, floe->x, floe->y, floe->yaw);
     }
     if (!wide) {
         bt_errors_add(err,
                       "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m "
                       "between it and the ice; take a wider one, or smaller floes (ice.size)",
-                      c->path ? c->path : "case", clearance);
+                      input->path ? input->path : "case", clearance);
         return BT_ERR_CASE;
     }
-    if (!(y->ice_area > 0)) {
+    if (!(region->ice_area > 0)) {
         bt_errors_add(err,
                       "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
-                      c->path ? c->path : "case");
+                      input->path ? input->path : "case");
         return BT_ERR_CASE;
     }
     return BT_OK;
 }
 
-void bt_region_of_domain(bt_region *y, const bt_case *c)
+void bt_region_of_domain(bt_region *region, const bt_case *input)
 {
-    bt_case whole = *c;
+    bt_case whole = *input;
     bt_errors ignored = {0};
-    whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
-    whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
-    bt_region_init(y, &whole, 0, &ignored);
+    whole.ice.x_min = input->domain.x0, whole.ice.x_max = input->domain.x0 + input->domain.length;
+    whole.ice.y_min = input->domain.y0, whole.ice.y_max = input->domain.y0 + input->domain.width;
+    bt_region_init(region, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 }
 
-void bt_region_free(bt_region *y)
+void bt_region_free(bt_region *region)
 {
-    free(y->obstacles);
-    *y = (bt_region){0};
+    free(region->obstacles);
+    *region = (bt_region){0};
 }
 
 static double wrap(double x, double low, double high)
@@ -219,10 +224,10 @@ static double wrap(double x, double low, double high)
     return x < high ? x : low; // round-off may land on the upper edge
 }
 
-void bt_region_wrap(const bt_region *y, double *px, double *py)
+void bt_region_wrap(const bt_region *region, double *px, double *py)
 {
-    if (y->periodic_x) *px = wrap(*px, y->x0, y->x1);
-    if (y->periodic_y) *py = wrap(*py, y->y0, y->y1);
+    if (region->periodic_x) *px = wrap(*px, region->x0, region->x1);
+    if (region->periodic_y) *py = wrap(*py, region->y0, region->y1);
 }
 
 // Area left of a cell cut by edge e of a polygon (outer side kept).
@@ -247,28 +252,29 @@ static bool edge_separates(int n, const double *v, int m, const double *o)
     return false;
 }
 
-int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed)
+int bt_tessellation_clear(const bt_region *region, int n, double *v, bool boxed)
 {
     enum { CAP = 2 * BT_MAX_VERTICES };
     double trial[2 * CAP], best[2 * CAP];
-    for (int k = 0; k < y->n_obstacles && n >= 3; k++) {
+    for (int k = 0; k < region->n_obstacles && n >= 3; k++) {
         if (n > 4 * BT_TESSELLATION_VERTICES) // many obstacles around one cell
             n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
-        const bt_obstacle *o = &y->obstacles[k];
+        const bt_obstacle *obstacle = &region->obstacles[k];
         double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
         for (int i = 0; i < n; i++) {
             x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
             y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
         }
-        if (x0 > o->x + o->radius || x1 < o->x - o->radius || y0 > o->y + o->radius || y1 < o->y - o->radius) continue;
-        const double *outline = o->v;
-        int m = o->n;
+        if (x0 > obstacle->x + obstacle->radius || x1 < obstacle->x - obstacle->radius ||
+            y0 > obstacle->y + obstacle->radius || y1 < obstacle->y - obstacle->radius) continue;
+        const double *outline = obstacle->v;
+        int m = obstacle->n;
         double box[8];
         if (boxed) {
             double bx0 = INFINITY, bx1 = -INFINITY, by0 = INFINITY, by1 = -INFINITY;
-            for (int i = 0; i < o->n; i++) {
-                bx0 = bt_min(bx0, o->v[2 * i]), bx1 = bt_max(bx1, o->v[2 * i]);
-                by0 = bt_min(by0, o->v[2 * i + 1]), by1 = bt_max(by1, o->v[2 * i + 1]);
+            for (int i = 0; i < obstacle->n; i++) {
+                bx0 = bt_min(bx0, obstacle->v[2 * i]), bx1 = bt_max(bx1, obstacle->v[2 * i]);
+                by0 = bt_min(by0, obstacle->v[2 * i + 1]), by1 = bt_max(by1, obstacle->v[2 * i + 1]);
             }
             memcpy(box, (double[8]){bx0, by0, bx1, by0, bx1, by1, bx0, by1}, sizeof box);
             outline = box;

@@ -128,32 +128,33 @@ static int coordinates_of(bt_features *features, size_t i, double *v, const char
 }
 
 /// A vertex of feature i into the survey.
-static void see(survey *b, size_t i, double x, double y, double lon)
+static void see(survey *seen, size_t i, double x, double y, double lon)
 {
     const double q[4] = {x, y, x < 0 ? x + 360 : x, x > 180 ? x - 360 : x};
-    for (int a = 0; a < 4; a++) b->low[a] = bt_min(b->low[a], q[a]), b->high[a] = bt_max(b->high[a], q[a]);
-    if (b->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90)) b->feature = i, b->odd[0] = x, b->odd[1] = y;
+    for (int a = 0; a < 4; a++) seen->low[a] = bt_min(seen->low[a], q[a]), seen->high[a] = bt_max(seen->high[a], q[a]);
+    if (seen->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90))
+        seen->feature = i, seen->odd[0] = x, seen->odd[1] = y;
 }
 
 /// Box of all coordinates; lon: the farthest longitude that is one.
 static survey look_over(bt_features *features, double lon)
 {
-    survey b = {.low = {INFINITY, INFINITY, INFINITY, INFINITY},
-                .high = {-INFINITY, -INFINITY, -INFINITY, -INFINITY},
-                .feature = SIZE_MAX};
+    survey seen = {.low = {INFINITY, INFINITY, INFINITY, INFINITY},
+                   .high = {-INFINITY, -INFINITY, -INFINITY, -INFINITY},
+                   .feature = SIZE_MAX};
     for (size_t i = 0; i < features->n; i++) {
         const char *why;
         size_t n;
         const double *read = bt_features_ring(features, i, &n);
-        for (size_t k = 0; read && k < n; k++) see(&b, i, read[2 * k], read[2 * k + 1], lon);
+        for (size_t k = 0; read && k < n; k++) see(&seen, i, read[2 * k], read[2 * k + 1], lon);
         const json_t *ring = read ? NULL : ring_of(bt_features_at(features, i), &why);
         for (size_t k = 0; ring && k < json_array_size(ring); k++) {
             const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
             // others are reported with their feature
-            if (json_is_number(x) && json_is_number(y)) see(&b, i, json_number_value(x), json_number_value(y), lon);
+            if (json_is_number(x) && json_is_number(y)) see(&seen, i, json_number_value(x), json_number_value(y), lon);
         }
     }
-    return b;
+    return seen;
 }
 
 /// The origin in the mark that this program leaves in its files, if there is one.
@@ -170,35 +171,35 @@ static void take_origin(const json_t *mark, double origin[2])
 /// Degrees out of range, or latitude before longitude; and the place of x = y = 0: the case's, that of the
 /// file's mark, or the middle of all coordinates. Rings that lie on both sides of 180° would have it on the wrong side
 /// of the earth: they are taken with longitudes from 0° to 360° when that makes the box smaller.
-static void begin_degrees(reader *s, bt_features *features, const json_t *mark)
+static void begin_degrees(reader *in, bt_features *features, const json_t *mark)
 {
-    const bt_case *c = s->c;
-    const survey b = look_over(features, s->assumed ? 180 : 360);
-    const bool given = !isnan(c->ice.origin_lon), swapped = bt_max(fabs(b.low[0]), fabs(b.high[0])) <= 90 &&
-                                                            bt_max(fabs(b.low[1]), fabs(b.high[1])) <= 360;
-    if (!isnan(c->ice.origin_east))
-        bt_refuse(&s->r, "its coordinates are degrees, and ice.origin_east and ice.origin_north are metres; give "
-                         "ice.origin_lon and ice.origin_lat, or none");
-    if (b.feature != SIZE_MAX) {
+    const bt_case *input = in->c;
+    const survey seen = look_over(features, in->assumed ? 180 : 360);
+    const bool given = !isnan(input->ice.origin_lon), swapped = bt_max(fabs(seen.low[0]), fabs(seen.high[0])) <= 90 &&
+                                                                bt_max(fabs(seen.low[1]), fabs(seen.high[1])) <= 360;
+    if (!isnan(input->ice.origin_east))
+        bt_refuse(&in->r, "its coordinates are degrees, and ice.origin_east and ice.origin_north are metres; give "
+                          "ice.origin_lon and ice.origin_lat, or none");
+    if (seen.feature != SIZE_MAX) {
         bt_refuse(
-            &s->r,
+            &in->r,
             "feature %zu has a vertex [%g, %g], which is not longitude and latitude in degrees, in this order: %s",
-            b.feature, b.odd[0], b.odd[1],
+            seen.feature, seen.odd[0], seen.odd[1],
             swapped      ? "latitude seems to come first; swap the two numbers of every position"
-            : s->assumed ? "without a crs coordinates are degrees within 180 and 90 (RFC 7946); for metres east and "
-                           "north give the file its crs, or set ice.outlines_crs: plane; "
-                           "for longitudes from 0 to 360 set ice.outlines_crs: lonlat"
-                         : "correct it, or say what its coordinates are");
+            : in->assumed ? "without a crs coordinates are degrees within 180 and 90 (RFC 7946); for metres east and "
+                            "north give the file its crs, or set ice.outlines_crs: plane; "
+                            "for longitudes from 0 to 360 set ice.outlines_crs: lonlat"
+                          : "correct it, or say what its coordinates are");
         return;
     }
-    int a = b.high[2] - b.low[2] < b.high[0] - b.low[0] ? 2 : 0;
-    if (b.high[3] - b.low[3] < b.high[a] - b.low[a]) a = 3;
-    double middle[2] = {(b.low[a] + b.high[a]) / 2, (b.low[1] + b.high[1]) / 2};
-    if (!(b.low[0] <= b.high[0])) middle[0] = middle[1] = 0; // no place at all
+    int a = seen.high[2] - seen.low[2] < seen.high[0] - seen.low[0] ? 2 : 0;
+    if (seen.high[3] - seen.low[3] < seen.high[a] - seen.low[a]) a = 3;
+    double middle[2] = {(seen.low[a] + seen.high[a]) / 2, (seen.low[1] + seen.high[1]) / 2};
+    if (!(seen.low[0] <= seen.high[0])) middle[0] = middle[1] = 0; // no place at all
     // No sea ice is there, and the other way round it could be: nearest to the equator is the ice of the Bohai Sea, at
     // 37° N, and of South Georgia, at 54° S.
     if (!given && middle[1] > -53 && middle[1] < 30 && fabs(middle[0]) >= 30 && swapped) {
-        bt_refuse(&s->r,
+        bt_refuse(&in->r,
                   "its outlines lie about latitude %.4g, longitude %.4g, where no sea ice is: latitude seems to come "
                   "first; write [longitude, latitude], or give "
                   "ice.origin_lon and ice.origin_lat if the place is right",
@@ -207,79 +208,80 @@ static void begin_degrees(reader *s, bt_features *features, const json_t *mark)
     }
     if (middle[0] > 180) middle[0] -= 360;
     take_origin(mark, middle);
-    s->lon0 = given ? c->ice.origin_lon : middle[0] * DEGREE;
-    s->lat0 = given ? c->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE;
+    in->lon0 = given ? input->ice.origin_lon : middle[0] * DEGREE;
+    in->lat0 = given ? input->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE;
 }
 
 /// The place of x = y = 0 in a plane: the case's, that of the file's mark, the middle where the crs is a projection,
 /// whose zeros are far away; otherwise zero.
-static void begin_plane(reader *s, bt_features *features, const json_t *mark)
+static void begin_plane(reader *in, bt_features *features, const json_t *mark)
 {
-    const bt_case *c = s->c;
-    const survey b = look_over(features, 180);
-    const bool given = !isnan(c->ice.origin_east), projected = s->crs.kind == BT_MAP_PLANE;
-    if (!isnan(c->ice.origin_lon) && s->kind == PLANE)
-        bt_refuse(&s->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "
-                         "ice.origin_east and ice.origin_north, or none");
-    if (given && s->kind == FRAME)
-        bt_refuse(&s->r, "its coordinates are metres of the case's frame, whose origin they have; remove "
-                         "ice.origin_east and ice.origin_north");
-    const bool any = b.low[0] <= b.high[0];
-    if (projected && any && b.feature == SIZE_MAX)
-        bt_refuse(&s->r,
+    const bt_case *input = in->c;
+    const survey seen = look_over(features, 180);
+    const bool given = !isnan(input->ice.origin_east), projected = in->crs.kind == BT_MAP_PLANE;
+    if (!isnan(input->ice.origin_lon) && in->kind == PLANE)
+        bt_refuse(&in->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "
+                          "ice.origin_east and ice.origin_north, or none");
+    if (given && in->kind == FRAME)
+        bt_refuse(&in->r, "its coordinates are metres of the case's frame, whose origin they have; remove "
+                          "ice.origin_east and ice.origin_north");
+    const bool any = seen.low[0] <= seen.high[0];
+    if (projected && any && seen.feature == SIZE_MAX)
+        bt_refuse(&in->r,
                   "its crs is %s, in metres, and all its coordinates lie within 180 and 90, as degrees do; correct the "
                   "crs of the file",
-                  s->crs.name);
-    if (s->r.status != BT_OK) return;
+                  in->crs.name);
+    if (in->r.status != BT_OK) return;
     double origin[2] = {0, 0};
-    if (projected && any) origin[0] = (b.low[0] + b.high[0]) / 2, origin[1] = (b.low[1] + b.high[1]) / 2;
+    if (projected && any) origin[0] = (seen.low[0] + seen.high[0]) / 2, origin[1] = (seen.low[1] + seen.high[1]) / 2;
     take_origin(mark, origin);
-    s->east0 = given ? c->ice.origin_east : origin[0];
-    s->north0 = given ? c->ice.origin_north : origin[1];
-    if (s->kind == FRAME || !any) return;
-    const bool basin = c->domain.frame == BT_FRAME_BASIN; // the domain on the map
-    const double east = basin ? c->domain.x0 : c->domain.y0, north = basin ? c->domain.y0 : c->domain.x0;
-    const double far_east = east + (basin ? c->domain.length : c->domain.width),
-                 far_north = north + (basin ? c->domain.width : c->domain.length);
-    if (b.low[0] - s->east0 > far_east || b.high[0] - s->east0 < east || b.low[1] - s->north0 > far_north ||
-        b.high[1] - s->north0 < north)
-        bt_refuse(&s->r,
+    in->east0 = given ? input->ice.origin_east : origin[0];
+    in->north0 = given ? input->ice.origin_north : origin[1];
+    if (in->kind == FRAME || !any) return;
+    const bool basin = input->domain.frame == BT_FRAME_BASIN; // the domain on the map
+    const double east = basin ? input->domain.x0 : input->domain.y0,
+                 north = basin ? input->domain.y0 : input->domain.x0;
+    const double far_east = east + (basin ? input->domain.length : input->domain.width),
+                 far_north = north + (basin ? input->domain.width : input->domain.length);
+    if (seen.low[0] - in->east0 > far_east || seen.high[0] - in->east0 < east || seen.low[1] - in->north0 > far_north ||
+        seen.high[1] - in->north0 < north)
+        bt_refuse(&in->r,
                   "all outlines, east %.10g to %.10g m, north %.10g to %.10g m, lie outside the domain, which is east "
                   "%.10g to %.10g m, north %.10g to %.10g m on the map; say "
                   "where x = y = 0 is with ice.origin_east and ice.origin_north",
-                  b.low[0], b.high[0], b.low[1], b.high[1], east + s->east0, far_east + s->east0, north + s->north0,
-                  far_north + s->north0);
+                  seen.low[0], seen.high[0], seen.low[1], seen.high[1], east + in->east0, far_east + in->east0,
+                  north + in->north0, far_north + in->north0);
 }
 
 /// A vertex on the map to the case's frame.
-static void to_frame(const bt_case *c, double east, double north, double v[2])
+static void to_frame(const bt_case *input, double east, double north, double v[2])
 {
-    const bool basin = c->domain.frame == BT_FRAME_BASIN;
+    const bool basin = input->domain.frame == BT_FRAME_BASIN;
     v[0] = basin ? east : north;
     v[1] = basin ? north : east;
 }
 
 /// To metres in the case's frame, in place; why not, or NULL.
-static const char *place(const reader *s, int n, double *v)
+static const char *place(const reader *in, int n, double *v)
 {
-    for (int i = 0; i < n && s->kind == PLANE; i++)
-        to_frame(s->c, v[2 * i] - s->east0, v[2 * i + 1] - s->north0, v + 2 * i);
-    for (int i = 0; i < n && s->kind == DEGREES; i++) {
+    for (int i = 0; i < n && in->kind == PLANE; i++)
+        to_frame(in->c, v[2 * i] - in->east0, v[2 * i + 1] - in->north0, v + 2 * i);
+    for (int i = 0; i < n && in->kind == DEGREES; i++) {
         double north, east, swapped_north, swapped_east;
-        bt_outline_project(v[2 * i] * DEGREE, v[2 * i + 1] * DEGREE, s->lon0, s->lat0, &north, &east);
-        bt_outline_project(v[2 * i + 1] * DEGREE, v[2 * i] * DEGREE, s->lon0, s->lat0, &swapped_north, &swapped_east);
+        bt_outline_project(v[2 * i] * DEGREE, v[2 * i + 1] * DEGREE, in->lon0, in->lat0, &north, &east);
+        bt_outline_project(v[2 * i + 1] * DEGREE, v[2 * i] * DEGREE, in->lon0, in->lat0, &swapped_north, &swapped_east);
         if (!(bt_hypot(north, east) <= BT_MAP_FARTHEST)) {
             if (fabs(v[2 * i]) <= 90 && bt_hypot(swapped_north, swapped_east) <= BT_MAP_FARTHEST)
                 return "it is more than 100 km from the origin, and near it with latitude and longitude swapped; write "
                        "[longitude, latitude]";
-            return s->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "
-                                "longer holds; set ice.origin_lon and ice.origin_lat, or take it out; "
-                                "if its coordinates are metres, east and north, give the file its crs or set "
-                                "ice.outlines_crs: plane"
-                              : "it is more than 100 km from the origin, where the projection of a small area no "
-                                "longer holds; set ice.origin_lon and ice.origin_lat, or take it out";
+            return in->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "
+                                 "longer holds; set ice.origin_lon and ice.origin_lat, or take it out; "
+                                 "if its coordinates are metres, east and north, give the file its crs or set "
+                                 "ice.outlines_crs: plane"
+                               : "it is more than 100 km from the origin, where the projection of a small area no "
+                                 "longer holds; set ice.origin_lon and ice.origin_lat, or take it out";
         }
-        to_frame(s->c, east, north, v + 2 * i);
+        to_frame(in->c, east, north, v + 2 * i);
     }
     return NULL;
 }
@@ -311,9 +313,9 @@ static bool is_nearly_thickness(const char *name)
 }
 
 /// Count a feature that has no thickness but one of nearly this name, and keep the first such names.
-static void look_for_thickness(reader *s, const json_t *properties)
+static void look_for_thickness(reader *in, const json_t *properties)
 {
-    bt_outline_counts *o = &s->f->outlines;
+    bt_outline_counts *counts = &in->f->outlines;
     const char *name;
     json_t *value;
     bool any = false;
@@ -324,244 +326,248 @@ static void look_for_thickness(reader *s, const json_t *properties)
         snprintf(entry, sizeof entry, "`%.40s`", name);
         for (char *c = entry; *c; c++)
             if ((unsigned char)*c < 0x20 || (unsigned char)*c >= 0x7F) *c = '?';
-        if (strstr(o->nearly, entry) || strlen(o->nearly) + strlen(entry) + 3 > sizeof o->nearly) continue;
-        if (s->names++) strcat(o->nearly, ", ");
-        strcat(o->nearly, entry);
+        if (strstr(counts->nearly, entry) || strlen(counts->nearly) + strlen(entry) + 3 > sizeof counts->nearly)
+            continue;
+        if (in->names++) strcat(counts->nearly, ", ");
+        strcat(counts->nearly, entry);
     }
-    o->unnamed += any;
+    counts->unnamed += any;
 }
 
-static void read_feature(reader *s, bt_features *features, size_t index, double *v)
+static void read_feature(reader *in, bt_features *features, size_t index, double *v)
 {
     char name[96], text[BT_ICE_WHY];
     const json_t *feature = bt_features_at(features, index);
     const char *why = NULL;
     int n = coordinates_of(features, index, v, &why);
-    if (n) why = place(s, n, v);
-    bt_outline_counts *counts = &s->f->outlines;
+    if (n) why = place(in, n, v);
+    bt_outline_counts *counts = &in->f->outlines;
     if (!why) {
         const int clean = bt_outline_clean(n, v);
         counts->dropped += n - clean;
         n = clean;
         // Anticlockwise on the map is clockwise in the geographic frame.
         const bool clockwise = bt_outline_area2(n, v) < 0,
-                   mirrored = s->kind != FRAME && s->c->domain.frame == BT_FRAME_GEOGRAPHIC;
+                   mirrored = in->kind != FRAME && in->c->domain.frame == BT_FRAME_GEOGRAPHIC;
         if (clockwise) turn_round(n, v);
         counts->turned += clockwise != mirrored;
-        why = bt_outline_admit(s->c->ice.nonconvex, &n, v, counts);
+        why = bt_outline_admit(in->c->ice.nonconvex, &n, v, counts);
     }
     if (why) {
-        bt_refuse(&s->r, "%s is refused: %s", name_of(feature, index, name), why);
+        bt_refuse(&in->r, "%s is refused: %s", name_of(feature, index, name), why);
         return;
     }
     const json_t *properties = json_object_get(feature, "properties"),
                  *given = json_object_get(properties, "thickness");
     if (json_is_string(given)) {
-        bt_refuse(&s->r, "%s: thickness is a text, \"%.20s\"; write the number of metres without quotes",
+        bt_refuse(&in->r, "%s: thickness is a text, \"%.20s\"; write the number of metres without quotes",
                   name_of(feature, index, name), json_string_value(given));
         return;
     }
     double thickness;
     if (given && !json_is_null(given)) thickness = json_is_number(given) ? json_number_value(given) : NAN;
     else {
-        look_for_thickness(s, properties), counts->bare++;
-        if (isnan(s->c->ice.thickness)) return; // check_thickness
-        thickness = bt_field_thickness(s->c, s->f->n);
+        look_for_thickness(in, properties), counts->bare++;
+        if (isnan(in->c->ice.thickness)) return; // check_thickness
+        thickness = bt_field_thickness(in->c, in->f->n);
     }
-    const bt_idx i = s->f->n;
-    bt_field_add(s->f, n, v, 0, 0, 0, thickness);
+    const bt_idx i = in->f->n;
+    bt_field_add(in->f, n, v, 0, 0, 0, thickness);
     counts->read++;
-    const bt_field *f = s->f;
+    const bt_field *field = in->f;
     const bt_ice_floe floe = {n,
-                              f->vertices + 2 * f->offsets[i],
-                              f->pose[3 * i],
-                              f->pose[3 * i + 1],
-                              f->pose[3 * i + 2],
+                              field->vertices + 2 * field->offsets[i],
+                              field->pose[3 * i],
+                              field->pose[3 * i + 1],
+                              field->pose[3 * i + 2],
                               thickness,
-                              f->area[i],
+                              field->area[i],
                               1e-6};
-    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&s->r, "%s: %s", name_of(feature, index, name), why);
+    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&in->r, "%s: %s", name_of(feature, index, name), why);
 }
 
 /// Metres as the case calls them, of a file that does not say it.
-static void choose_metres(reader *s)
+static void choose_metres(reader *in)
 {
-    s->kind = s->c->ice.outlines_crs == BT_CRS_PLANE ? PLANE : FRAME;
-    snprintf(s->crs.name, sizeof s->crs.name, "local");
+    in->kind = in->c->ice.outlines_crs == BT_CRS_PLANE ? PLANE : FRAME;
+    snprintf(in->crs.name, sizeof in->crs.name, "local");
 }
 
 /// What the coordinates are: by the file's crs, or the case; a file that contradicts the case is refused.
-static void choose_coordinates(reader *s, const json_t *root)
+static void choose_coordinates(reader *in, const json_t *root)
 {
     const json_t *crs = json_object_get(root, "crs"), *mark = json_object_get(root, "bergtow");
     const char *type = json_string_value(json_object_get(crs, "type")),
                *name = json_string_value(json_object_get(json_object_get(crs, "properties"), "name"));
     const char *frame = json_string_value(json_object_get(mark, "frame"));
-    const bt_crs key = s->c->ice.outlines_crs;
-    const bool basin = s->c->domain.frame == BT_FRAME_BASIN, degrees = key == BT_CRS_LONLAT,
+    const bt_crs key = in->c->ice.outlines_crs;
+    const bool basin = in->c->domain.frame == BT_FRAME_BASIN, degrees = key == BT_CRS_LONLAT,
                metres = key != BT_CRS_FILE && key != BT_CRS_LONLAT;
-    s->crs.kind = BT_MAP_LOCAL;
+    in->crs.kind = BT_MAP_LOCAL;
     if (crs && (!type || strcmp(type, "name") || !name) && key == BT_CRS_FILE) {
-        bt_refuse(&s->r, "its crs is not given by a name ({\"type\": \"name\", \"properties\": {\"name\": "
-                         "\"EPSG:32633\"}}); give it so, or take it out and set ice.outlines_crs: lonlat or plane");
+        bt_refuse(&in->r, "its crs is not given by a name ({\"type\": \"name\", \"properties\": {\"name\": "
+                          "\"EPSG:32633\"}}); give it so, or take it out and set ice.outlines_crs: lonlat or plane");
         return;
     }
-    if (crs && name) s->crs = bt_map_crs_of(name);
-    const bool said = crs && name && s->crs.kind != BT_MAP_UNKNOWN;
-    if (said && s->crs.kind == BT_MAP_LOCAL) {
-        s->kind = PLANE;
-        snprintf(s->crs.name, sizeof s->crs.name, "local");
+    if (crs && name) in->crs = bt_map_crs_of(name);
+    const bool said = crs && name && in->crs.kind != BT_MAP_UNKNOWN;
+    if (said && in->crs.kind == BT_MAP_LOCAL) {
+        in->kind = PLANE;
+        snprintf(in->crs.name, sizeof in->crs.name, "local");
         if (degrees || key == BT_CRS_FRAME)
-            bt_refuse(&s->r,
+            bt_refuse(&in->r,
                       "its coordinates are metres east and north, written by bergtow; remove ice.outlines_crs: %s",
                       degrees ? "lonlat" : "frame");
         else if (frame && strcmp(frame, basin ? "basin" : "geographic"))
-            bt_refuse(&s->r,
+            bt_refuse(&in->r,
                       "its coordinates are metres of the frame %.20s; set domain.frame: %.20s, or make the field for "
                       "this frame",
                       frame, frame);
-    } else if (said && s->crs.kind == BT_MAP_WARPED) {
-        bt_refuse(&s->r,
+    } else if (said && in->crs.kind == BT_MAP_WARPED) {
+        bt_refuse(&in->r,
                   "its crs is %s, Mercator, whose metres are not those on the ground: shorter by the cosine of the "
                   "latitude; transform the file to degrees (ogr2ogr -t_srs EPSG:4326) or to UTM",
-                  s->crs.name);
+                  in->crs.name);
     } else if (said) {
-        s->kind = s->crs.kind == BT_MAP_DEGREES ? DEGREES : PLANE;
-        if (s->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME)
+        in->kind = in->crs.kind == BT_MAP_DEGREES ? DEGREES : PLANE;
+        if (in->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME)
             bt_refuse(
-                &s->r,
+                &in->r,
                 "its crs is %s, in %s, and ice.outlines_crs says else; remove the key, or correct the crs of the file",
-                s->crs.name, s->kind == DEGREES ? "degrees" : "metres east and north");
+                in->crs.name, in->kind == DEGREES ? "degrees" : "metres east and north");
     } else if (crs && key == BT_CRS_FILE) {
-        bt_refuse(&s->r,
+        bt_refuse(&in->r,
                   "its crs, %.100s, is not known here as degrees or as metres east and north; transform the file to "
                   "degrees (ogr2ogr -t_srs EPSG:4326), or set ice.outlines_crs: plane if its "
                   "coordinates are metres east and north",
                   name);
     } else if (metres) {
-        choose_metres(s);
+        choose_metres(in);
     } else {
-        s->kind = DEGREES;
-        s->assumed = !degrees;
-        snprintf(s->crs.name, sizeof s->crs.name, "OGC:CRS84");
+        in->kind = DEGREES;
+        in->assumed = !degrees;
+        snprintf(in->crs.name, sizeof in->crs.name, "OGC:CRS84");
     }
 }
 
 /// Area of floe i within the ice region, m²; to the bit that of the floe where nothing of it is outside.
-static double area_in_region(reader *s, const bt_region *y, bt_idx i)
+static double area_in_region(reader *s, const bt_region *region, bt_idx i)
 {
-    const bt_field *f = s->f;
-    const double *p = f->pose + 3 * (size_t)i, *own = f->vertices + 2 * f->offsets[i];
-    const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+    const bt_field *field = s->f;
+    const double *p = field->pose + 3 * (size_t)i, *own = field->vertices + 2 * field->offsets[i];
+    const int n = (int)(field->offsets[i + 1] - field->offsets[i]);
     double v[2 * BT_MAX_VERTICES];
     bool in = true;
     for (int k = 0; k < n; k++) { // outlines have no yaw
         v[2 * k] = p[0] + own[2 * k], v[2 * k + 1] = p[1] + own[2 * k + 1];
-        in = in && (y->periodic_x || (v[2 * k] >= y->x0 && v[2 * k] <= y->x1)) &&
-             (y->periodic_y || (v[2 * k + 1] >= y->y0 && v[2 * k + 1] <= y->y1));
+        in = in && (region->periodic_x || (v[2 * k] >= region->x0 && v[2 * k] <= region->x1)) &&
+             (region->periodic_y || (v[2 * k + 1] >= region->y0 && v[2 * k + 1] <= region->y1));
     }
-    if (in) return f->area[i];
+    if (in) return field->area[i];
     double x = p[0], z = p[1];
-    bt_region_wrap(y, &x, &z);
-    s->f->outlines.outside += !(x >= y->x0 && x <= y->x1 && z >= y->y0 && z <= y->y1);
-    return bt_region_area_of(y, s->c, n, v);
+    bt_region_wrap(region, &x, &z);
+    s->f->outlines.outside += !(x >= region->x0 && x <= region->x1 && z >= region->y0 && z <= region->y1);
+    return bt_region_area_of(region, s->c, n, v);
 }
 
 /// What lies outside the region is there, and is no part of a concentration in it.
-static void set_concentration(reader *s)
+static void set_concentration(reader *in)
 {
-    bt_region y;
-    const bt_status status = bt_region_init(&y, s->c, 0, s->r.err);
-    if (status != BT_OK) s->r.status = status;
+    bt_region region;
+    const bt_status status = bt_region_init(&region, in->c, 0, in->r.err);
+    if (status != BT_OK) in->r.status = status;
     double sum = 0, whole = 0;
-    for (bt_idx i = 0; i < s->f->n && status == BT_OK; i++) {
-        sum += area_in_region(s, &y, i);
-        whole += s->f->area[i];
+    for (bt_idx i = 0; i < in->f->n && status == BT_OK; i++) {
+        sum += area_in_region(in, &region, i);
+        whole += in->f->area[i];
     }
-    s->f->ice_area = y.ice_area;
-    s->f->concentration = status == BT_OK ? sum / y.ice_area : 0;
-    s->f->outlines.outside_area = whole - sum;
-    bt_region_free(&y);
+    in->f->ice_area = region.ice_area;
+    in->f->concentration = status == BT_OK ? sum / region.ice_area : 0;
+    in->f->outlines.outside_area = whole - sum;
+    bt_region_free(&region);
 }
 
 /// Floes without a thickness in a case that has none.
-static void check_thickness(reader *s, size_t features)
+static void check_thickness(reader *in, size_t features)
 {
-    const bt_outline_counts *o = &s->f->outlines;
-    if (!isnan(s->c->ice.thickness) || !o->bare) return;
-    bt_refuse(&s->r,
+    const bt_outline_counts *counts = &in->f->outlines;
+    if (!isnan(in->c->ice.thickness) || !counts->bare) return;
+    bt_refuse(&in->r,
               "%lld of %zu outlines have no property `thickness`%s%s%s, and the case has no ice.thickness, for which "
               "domain.frame: geographic has no default; give it, as in 1 m",
-              (long long)o->bare, features, *o->nearly ? " (but " : "", o->nearly, *o->nearly ? ")" : "");
+              (long long)counts->bare, features, *counts->nearly ? " (but " : "", counts->nearly,
+              *counts->nearly ? ")" : "");
 }
 
 /// What the floes are together: far too small or large, they are in other units.
-static void check_whole(reader *s)
+static void check_whole(reader *in)
 {
     double size = 0, thickness = 0;
-    for (bt_idx i = 0; i < s->f->n; i++) size += sqrt(4 * s->f->area[i] / BT_PI), thickness += s->f->thickness[i];
+    for (bt_idx i = 0; i < in->f->n; i++) size += sqrt(4 * in->f->area[i] / BT_PI), thickness += in->f->thickness[i];
     char why[BT_ICE_WHY];
-    if (bt_ice_domain_fault(s->c, s->f, why))
-        bt_refuse(&s->r, "%s%s", why,
-                  s->assumed ? "; without a crs they are degrees (RFC 7946): if they are metres, give the file its crs "
-                               "or set ice.outlines_crs: plane"
-                             : "");
-    else if (s->kind != DEGREES && size < 0.1 * thickness)
-        bt_refuse(&s->r,
+    if (bt_ice_domain_fault(in->c, in->f, why))
+        bt_refuse(&in->r, "%s%s", why,
+                  in->assumed
+                  ? "; without a crs they are degrees (RFC 7946): if they are metres, give the file its crs "
+                                "or set ice.outlines_crs: plane"
+                              : "");
+    else if (in->kind != DEGREES && size < 0.1 * thickness)
+        bt_refuse(&in->r,
                   "its floes are %.3g m in size and %.3g m thick in the mean, as floes whose coordinates are degrees "
                   "look in metres; if they are degrees, take out its crs and ice.outlines_crs",
-                  size / s->f->n, thickness / s->f->n);
+                  size / in->f->n, thickness / in->f->n);
 }
 
-static void read_features(reader *s, bt_features *features)
+static void read_features(reader *in, bt_features *features)
 {
     const json_t *root = features->root, *mark = json_object_get(root, "bergtow");
     const char *type = json_string_value(json_object_get(root, "type"));
     if (!type || strcmp(type, "FeatureCollection") || !features->listed) {
-        bt_refuse(&s->r,
+        bt_refuse(&in->r,
                   "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
         return;
     }
     if (features->n == 0 || features->n > BT_MOST_FLOES) {
-        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n,
+        bt_refuse(&in->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n,
                   BT_MOST_FLOES);
         return;
     }
-    choose_coordinates(s, root);
-    if (s->r.status == BT_OK && s->kind == DEGREES) begin_degrees(s, features, mark);
-    else if (s->r.status == BT_OK) begin_plane(s, features, mark);
-    if (s->r.status != BT_OK) return;
+    choose_coordinates(in, root);
+    if (in->r.status == BT_OK && in->kind == DEGREES) begin_degrees(in, features, mark);
+    else if (in->r.status == BT_OK) begin_plane(in, features, mark);
+    if (in->r.status != BT_OK) return;
     double *v = bt_alloc(2 * (BT_MOST_RING + 1), sizeof *v);
-    for (size_t i = 0; i < features->n; i++) read_feature(s, features, i, v);
+    for (size_t i = 0; i < features->n; i++) read_feature(in, features, i, v);
     free(v);
-    check_thickness(s, features->n);
-    bt_outline_counts *o = &s->f->outlines;
-    o->lon = s->kind == DEGREES ? s->lon0 : NAN;
-    o->lat = s->kind == DEGREES ? s->lat0 : NAN;
-    o->east = s->kind == PLANE ? s->east0 : NAN;
-    o->north = s->kind == PLANE ? s->north0 : NAN;
-    snprintf(o->crs, sizeof o->crs, "%s", s->crs.name);
-    if (s->r.status != BT_OK) return;
-    set_concentration(s);
-    if (s->r.status == BT_OK) check_whole(s);
+    check_thickness(in, features->n);
+    bt_outline_counts *counts = &in->f->outlines;
+    counts->lon = in->kind == DEGREES ? in->lon0 : NAN;
+    counts->lat = in->kind == DEGREES ? in->lat0 : NAN;
+    counts->east = in->kind == PLANE ? in->east0 : NAN;
+    counts->north = in->kind == PLANE ? in->north0 : NAN;
+    snprintf(counts->crs, sizeof counts->crs, "%s", in->crs.name);
+    if (in->r.status != BT_OK) return;
+    set_concentration(in);
+    if (in->r.status == BT_OK) check_whole(in);
     // Numbers of floes are those of features only when none is missing.
-    if (s->r.status == BT_OK) bt_field_check_places(s->c, s->f, "feature", &s->r);
+    if (in->r.status == BT_OK) bt_field_check_places(in->c, in->f, "feature", &in->r);
 }
 
-bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err)
+bt_status bt_field_read_outlines(const bt_case *input, bt_field *field, bt_errors *err)
 {
-    const char *path = c->ice.outlines;
-    bt_field_free(f);
-    bt_field_init(f);
+    const char *path = input->ice.outlines;
+    bt_field_free(field);
+    bt_field_init(field);
     bt_features features;
-    reader s = {.c = c, .r = {.path = path, .err = err, .status = bt_features_open(&features, path, err)}, .f = f};
-    if (s.r.status == BT_OK) read_features(&s, &features);
+    reader in = {.c = input, .r = {.path = path, .err = err, .status = bt_features_open(&features, path, err)},
+                 .f = field};
+    if (in.r.status == BT_OK) read_features(&in, &features);
     bt_features_close(&features);
-    if (s.r.status != BT_OK) {
-        bt_field_free(f);
-        bt_field_init(f);
+    if (in.r.status != BT_OK) {
+        bt_field_free(field);
+        bt_field_init(field);
     }
-    return s.r.status;
+    return in.r.status;
 }
 
 // --- write -----------------------------------------------------------------------------------------------------------
@@ -588,16 +594,16 @@ static void write_position(FILE *out, const map *m, double x, double y)
 
 static void write_floe(FILE *out, const map *m, bt_idx i)
 {
-    const bt_field *f = m->f;
-    const double *p = f->pose + 3 * (size_t)i, c = bt_cos(p[2]), s = bt_sin(p[2]);
-    const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
+    const bt_field *field = m->f;
+    const double *p = field->pose + 3 * (size_t)i, c = bt_cos(p[2]), s = bt_sin(p[2]);
+    const int64_t first = field->offsets[i], n = field->offsets[i + 1] - first;
     const bool mirrored = m->c->domain.frame == BT_FRAME_GEOGRAPHIC; // anticlockwise on the map [RFC 7946, 3.1.6]
     fprintf(out,
             "%s\n{\"type\":\"Feature\",\"id\":%d,\"properties\":{\"thickness\":%.17g},\"geometry\":{\"type\":"
             "\"Polygon\",\"coordinates\":[[",
-            i ? "," : "", (int)i, f->thickness[i]);
+            i ? "," : "", (int)i, field->thickness[i]);
     for (int64_t k = 0; k <= n; k++) { // the first once more: a ring is closed
-        const double *v = f->vertices + 2 * (first + (mirrored ? (2 * n - 1 - k) % n : k % n));
+        const double *v = field->vertices + 2 * (first + (mirrored ? (2 * n - 1 - k) % n : k % n));
         if (k) fputc(',', out);
         write_position(out, m, p[0] + c * v[0] - s * v[1], p[1] + s * v[0] + c * v[1]);
     }
@@ -609,25 +615,25 @@ static void write_floe(FILE *out, const map *m, bt_idx i)
 
 bool bt_field_outlines_ours(const char *path) { return bt_file_begins(path, HEAD); }
 
-bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
+bt_status bt_field_write_outlines(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
     bt_text lines;
     bt_text_begin(&lines);
     FILE *out = lines.out;
-    const bt_map_place place = bt_map_place_of(&f->outlines, c);
+    const bt_map_place place = bt_map_place_of(&field->outlines, input);
     const bool known = place.kind == BT_MAP_DEGREES;
-    const map m = {.f = f, .c = c, .place = place};
+    const map m = {.f = field, .c = input, .place = place};
     fprintf(out,
             HEAD "{\"version\":\"%s\",\"coordinates\":\"%s\",\"origin\":[%.17g,%.17g],\"frame\":\"%s\",\"ice_"
                  "area_m2\":%.17g},\n",
             BT_VERSION, known ? "longitude and latitude, degrees" : "east and north, metres",
             known ? place.first / DEGREE : place.first, known ? place.second / DEGREE : place.second,
-            c->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic", f->ice_area);
+            input->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic", field->ice_area);
     if (!known)
         fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n",
                 place.crs ? place.crs : BT_MAP_LOCAL_NAME);
     fprintf(out, "\"features\":[");
-    for (bt_idx i = 0; i < f->n; i++) write_floe(out, &m, i);
+    for (bt_idx i = 0; i < field->n; i++) write_floe(out, &m, i);
     fprintf(out, "\n]}\n");
     char *text = bt_text_end(&lines);
     const bt_status status = bt_file_write(path, text, err);

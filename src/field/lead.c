@@ -31,12 +31,12 @@ typedef struct {
     int n;
 } strip;
 
-static strip make_strip(const bt_lead *l)
+static strip make_strip(const bt_lead *lead)
 {
-    strip s = {.l = l, .parts = bt_alloc(2 * (size_t)l->n, sizeof *s.parts)};
-    const double half = 0.5 * l->width;
-    for (int i = 0; i + 1 < l->n; i++) {
-        const double *p = l->path + 2 * i, *q = p + 2, dx = q[0] - p[0], dy = q[1] - p[1], length = bt_hypot(dx, dy);
+    strip s = {.l = lead, .parts = bt_alloc(2 * (size_t)lead->n, sizeof *s.parts)};
+    const double half = 0.5 * lead->width;
+    for (int i = 0; i + 1 < lead->n; i++) {
+        const double *p = lead->path + 2 * i, *q = p + 2, dx = q[0] - p[0], dy = q[1] - p[1], length = bt_hypot(dx, dy);
         if (length > 0) {
             const double ax = 0.5 * dx, ay = 0.5 * dy, bx = -half * dy / length, by = half * dx / length;
             s.parts[s.n++] = (part){.n = 4,
@@ -128,13 +128,14 @@ static void cut(const saw *k, int n, const double *v)
 {
     double own[2 * ROOM], world[2 * ROOM], half[2 * ROOM], axis[2];
     memcpy(own, v, 2 * (size_t)n * sizeof *v);
-    const bt_moments m = bt_shape_centre(n, own);
+    const bt_moments moments = bt_shape_centre(n, own);
     for (int i = 0; i < n; i++) {
         world[2 * i] = k->c * own[2 * i] - k->sine * own[2 * i + 1];
         world[2 * i + 1] = k->sine * own[2 * i] + k->c * own[2 * i + 1];
     }
-    const double x = k->x + k->c * m.cx - k->sine * m.cy, y = k->y + k->sine * m.cx + k->c * m.cy;
-    if (m.area <= k->largest || !overlaps(k->s, n, world, m.radius, x, y)) {
+    const double x = k->x + k->c * moments.cx - k->sine * moments.cy,
+                 y = k->y + k->sine * moments.cx + k->c * moments.cy;
+    if (moments.area <= k->largest || !overlaps(k->s, n, world, moments.radius, x, y)) {
         bt_field_add(k->out, n, v, k->x, k->y, k->yaw, k->thickness);
         return;
     }
@@ -143,14 +144,14 @@ static void cut(const saw *k, int n, const double *v)
     for (int side = -1; side <= 1; side += 2) {
         int nh = bt_shape_clip(n, own, side * axis[0], side * axis[1], -0.5 * slit, half);
         nh = drop_short_edges(nh, half);
-        for (int i = 0; i < nh; i++) half[2 * i] += m.cx, half[2 * i + 1] += m.cy;
+        for (int i = 0; i < nh; i++) half[2 * i] += moments.cx, half[2 * i + 1] += moments.cy;
         cut(k, nh, half);
     }
 }
 
-static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
+static void cut_floe(const strip *s, const bt_field *field, bt_idx i, bt_field *out)
 {
-    const double *pose = f->pose + 3 * (size_t)i, size = s->l->floe_size;
+    const double *pose = field->pose + 3 * (size_t)i, size = s->l->floe_size;
     const saw k = {.s = s,
                    .largest = BT_PI / 4 * size * size,
                    .x = pose[0],
@@ -158,15 +159,15 @@ static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
                    .c = bt_cos(pose[2]),
                    .sine = bt_sin(pose[2]),
                    .yaw = pose[2],
-                   .thickness = f->thickness[i],
+                   .thickness = field->thickness[i],
                    .out = out};
     const bt_idx first = out->n;
-    cut(&k, (int)(f->offsets[i + 1] - f->offsets[i]), f->vertices + 2 * f->offsets[i]);
+    cut(&k, (int)(field->offsets[i + 1] - field->offsets[i]), field->vertices + 2 * field->offsets[i]);
     double area = 0;
     for (bt_idx p = first; p < out->n; p++) area += out->area[p];
     const double low[2] = {s->l->x0, s->l->y0}, period[2] = {s->l->period_x, s->l->period_y};
     for (bt_idx p = first; p < out->n; p++) {
-        out->thickness[p] *= f->area[i] / area;
+        out->thickness[p] *= field->area[i] / area;
         for (size_t d = 0; d < 2; d++) { // a piece of a floe on a periodic edge may lie beyond it
             double *at = &out->pose[3 * (size_t)p + d];
             if (period[d] > 0) *at -= period[d] * floor((*at - low[d]) / period[d]);
@@ -175,73 +176,75 @@ static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
 }
 
 /// Floes that overlap the strip, and their area.
-static void mark(const strip *s, const bt_field *f, uint8_t *taken, bt_lead_stats *st)
+static void mark(const strip *s, const bt_field *field, uint8_t *taken, bt_lead_stats *st)
 {
-    double *outline = bt_field_outlines(f);
-    for (bt_idx i = 0; i < f->n; i++) {
-        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
-        const double *v = outline + 2 * f->offsets[i];
-        taken[i] = overlaps(s, n, v, bt_shape_extent(n, v).radius, f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1]);
+    double *outline = bt_field_outlines(field);
+    for (bt_idx i = 0; i < field->n; i++) {
+        const int n = (int)(field->offsets[i + 1] - field->offsets[i]);
+        const double *v = outline + 2 * field->offsets[i];
+        taken[i] = overlaps(s, n, v, bt_shape_extent(n, v).radius, field->pose[3 * (size_t)i],
+                            field->pose[3 * (size_t)i + 1]);
         if (!taken[i]) continue;
         st->taken++;
-        st->area_taken += f->area[i];
+        st->area_taken += field->area[i];
     }
     free(outline);
 }
 
-static void copy(const bt_field *f, bt_idx i, bt_field *out)
+static void copy(const bt_field *field, bt_idx i, bt_field *out)
 {
-    const int64_t n = f->offsets[i + 1] - f->offsets[i], at = out->offsets[out->n];
+    const int64_t n = field->offsets[i + 1] - field->offsets[i], at = out->offsets[out->n];
     const bt_idx k = out->n;
-    bt_field_add(out, (int)n, f->vertices + 2 * f->offsets[i], f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1],
-                 f->pose[3 * (size_t)i + 2], f->thickness[i]);
+    bt_field_add(out, (int)n, field->vertices + 2 * field->offsets[i], field->pose[3 * (size_t)i],
+                 field->pose[3 * (size_t)i + 1], field->pose[3 * (size_t)i + 2], field->thickness[i]);
     // As it was, to the bit: adding has centred it once more.
-    memcpy(out->vertices + 2 * at, f->vertices + 2 * f->offsets[i], 2 * (size_t)n * sizeof *f->vertices);
-    memcpy(out->pose + 3 * (size_t)k, f->pose + 3 * (size_t)i, 3 * sizeof *f->pose);
-    out->area[k] = f->area[i];
+    memcpy(out->vertices + 2 * at, field->vertices + 2 * field->offsets[i], 2 * (size_t)n * sizeof *field->vertices);
+    memcpy(out->pose + 3 * (size_t)k, field->pose + 3 * (size_t)i, 3 * sizeof *field->pose);
+    out->area[k] = field->area[i];
 }
 
-bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_errors *err)
+bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, bt_errors *err)
 {
-    *st = (bt_lead_stats){.mode = l->mode,
-                          .width = l->width,
-                          .concentration_before = f->concentration,
-                          .concentration_after = f->concentration};
-    for (int i = 0; i + 1 < l->n; i++)
-        st->length += bt_hypot(l->path[2 * i + 2] - l->path[2 * i], l->path[2 * i + 3] - l->path[2 * i + 1]);
-    if (l->mode == BT_LEAD_NONE || f->n == 0) return BT_OK;
-    strip s = make_strip(l);
-    uint8_t *taken = bt_alloc((size_t)f->n, sizeof *taken);
-    mark(&s, f, taken, st);
+    *st = (bt_lead_stats){.mode = lead->mode,
+                          .width = lead->width,
+                          .concentration_before = field->concentration,
+                          .concentration_after = field->concentration};
+    for (int i = 0; i + 1 < lead->n; i++)
+        st->length += bt_hypot(lead->path[2 * i + 2] - lead->path[2 * i],
+                               lead->path[2 * i + 3] - lead->path[2 * i + 1]);
+    if (lead->mode == BT_LEAD_NONE || field->n == 0) return BT_OK;
+    strip s = make_strip(lead);
+    uint8_t *taken = bt_alloc((size_t)field->n, sizeof *taken);
+    mark(&s, field, taken, st);
     // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only what is larger
     // than allowed is cut.
     const double most =
-        l->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * l->floe_size * l->floe_size) : 0;
+        lead->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * lead->floe_size * lead->floe_size) : 0;
     bt_status status = BT_OK;
     if (most > BT_MOST_FLOES) {
         bt_errors_add(err,
                       "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, "
                       "or a narrower or shorter lead",
-                      l->name, l->floe_size, most, BT_MOST_FLOES);
+                      lead->name, lead->floe_size, most, BT_MOST_FLOES);
         status = BT_ERR_CASE;
     }
     if (status == BT_OK) {
         bt_field out;
         bt_field_init(&out);
-        out.ice_area = f->ice_area;
+        out.ice_area = field->ice_area;
         double pieces = 0;
-        for (bt_idx i = 0; i < f->n; i++) {
+        for (bt_idx i = 0; i < field->n; i++) {
             const bt_idx first = out.n;
-            if (!taken[i]) copy(f, i, &out);
-            else if (l->mode == BT_LEAD_MANAGED) cut_floe(&s, f, i, &out);
+            if (!taken[i]) copy(field, i, &out);
+            else if (lead->mode == BT_LEAD_MANAGED) cut_floe(&s, field, i, &out);
             for (bt_idx p = first; taken[i] && p < out.n; p++, st->pieces++) pieces += sqrt(4 * out.area[p] / BT_PI);
         }
         out.concentration = st->concentration_after =
-            f->ice_area > 0 ? bt_field_floe_area(&out) / f->ice_area : 0;
+            field->ice_area > 0 ? bt_field_floe_area(&out) / field->ice_area : 0;
         st->mean_piece = st->pieces > 0 ? pieces / (double)st->pieces : 0;
-        out.outlines = f->outlines;
-        bt_field_free(f);
-        *f = out;
+        out.outlines = field->outlines;
+        bt_field_free(field);
+        *field = out;
     }
     free(taken);
     free(s.parts);
@@ -250,18 +253,18 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
 
 /// Area of the floes within the ice region, m²: of ice that was read a part may lie outside, which is no part of a
 /// concentration in it.
-static double area_in_region(const bt_case *c, const bt_region *y, const bt_field *f)
+static double area_in_region(const bt_case *input, const bt_region *region, const bt_field *field)
 {
     double area = 0, v[2 * BT_MAX_VERTICES];
-    for (bt_idx i = 0; i < f->n; i++) {
-        const double *p = f->pose + 3 * (size_t)i, s = bt_sin(p[2]), k = bt_cos(p[2]);
-        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+    for (bt_idx i = 0; i < field->n; i++) {
+        const double *p = field->pose + 3 * (size_t)i, s = bt_sin(p[2]), k = bt_cos(p[2]);
+        const int n = (int)(field->offsets[i + 1] - field->offsets[i]);
         for (int j = 0; j < n; j++) {
-            const double *own = f->vertices + 2 * (f->offsets[i] + j);
+            const double *own = field->vertices + 2 * (field->offsets[i] + j);
             v[2 * j] = p[0] + k * own[0] - s * own[1];
             v[2 * j + 1] = p[1] + s * own[0] + k * own[1];
         }
-        area += bt_region_area_of(y, c, n, v);
+        area += bt_region_area_of(region, input, n, v);
     }
     return area;
 }
@@ -287,24 +290,24 @@ static void go_on(planned *p, double x, double y)
 
 /// From the body to where the towing end starts, and along its path, arcs in pieces; lead.length in all. Without
 /// way-points straight on from the body. Caller frees; NULL with the reason in why.
-static double *planned_path(const bt_case *c, int *n, char why[200])
+static double *planned_path(const bt_case *input, int *n, char why[200])
 {
     enum { PIECES = 64 }; // of an arc: 3e-4 of its radius off, for half a turn
     bt_path path;
-    if (!bt_case_tow_path(c, &path, why)) return NULL;
-    planned p = {.at = bt_alloc(2 + PIECES * (size_t)path.n, 2 * sizeof *p.at), .n = 1, .left = c->lead.length};
-    p.at[0] = c->body.x;
-    p.at[1] = c->body.y;
-    if (c->tow.n_waypoints == 0)
-        go_on(&p, c->body.x + c->lead.length * bt_cos(c->tow.direction),
-              c->body.y + c->lead.length * bt_sin(c->tow.direction));
-    for (int k = 0; c->tow.n_waypoints > 0 && k < path.n; k++) {
-        const bt_leg *l = &path.leg[k];
-        const int pieces = l->turn != 0 ? PIECES : 1;
-        go_on(&p, l->x, l->y);
+    if (!bt_case_tow_path(input, &path, why)) return NULL;
+    planned p = {.at = bt_alloc(2 + PIECES * (size_t)path.n, 2 * sizeof *p.at), .n = 1, .left = input->lead.length};
+    p.at[0] = input->body.x;
+    p.at[1] = input->body.y;
+    if (input->tow.n_waypoints == 0)
+        go_on(&p, input->body.x + input->lead.length * bt_cos(input->tow.direction),
+              input->body.y + input->lead.length * bt_sin(input->tow.direction));
+    for (int k = 0; input->tow.n_waypoints > 0 && k < path.n; k++) {
+        const bt_leg *leg = &path.leg[k];
+        const int pieces = leg->turn != 0 ? PIECES : 1;
+        go_on(&p, leg->x, leg->y);
         for (int i = 1; i <= pieces && p.left > 0; i++) {
             double at[2], tangent[2];
-            bt_path_at(&path, l->way + (isinf(l->length) ? p.left : l->length * i / pieces), at, tangent);
+            bt_path_at(&path, leg->way + (isinf(leg->length) ? p.left : leg->length * i / pieces), at, tangent);
             go_on(&p, at[0], at[1]);
         }
     }
@@ -313,69 +316,70 @@ static double *planned_path(const bt_case *c, int *n, char why[200])
     return p.at;
 }
 
-bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_errors *err)
+bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *stats, bt_errors *err)
 {
-    *s = (bt_lead_stats){0};
-    if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
-    if (f->outlines.split > 0) {
+    *stats = (bt_lead_stats){0};
+    if (input->lead.mode == BT_LEAD_NONE) return BT_OK;
+    if (field->outlines.split > 0) {
         bt_errors_add(err,
                       "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set "
                       "ice.nonconvex to hull, or draw the lead in the file",
-                      c->path ? c->path : "case", (long long)f->outlines.split);
+                      input->path ? input->path : "case", (long long)field->outlines.split);
         return BT_ERR_CASE;
     }
     int n;
     char why[200];
-    double *path = planned_path(c, &n, why);
+    double *path = planned_path(input, &n, why);
     if (!path) {
-        bt_errors_add(err, "%s: tow.waypoints: %s", c->path ? c->path : "case", why);
+        bt_errors_add(err, "%s: tow.waypoints: %s", input->path ? input->path : "case", why);
         return BT_ERR_CASE;
     }
-    const bt_lead l = {
-        .name = c->path ? c->path : "case",
-        .mode = c->lead.mode,
-        .width = c->lead.width,
-        .floe_size = c->lead.floe_size,
+    const bt_lead lead = {
+        .name = input->path ? input->path : "case",
+        .mode = input->lead.mode,
+        .width = input->lead.width,
+        .floe_size = input->lead.floe_size,
         .n = n,
         .path = path,
-        .x0 = c->domain.x0,
-        .y0 = c->domain.y0,
+        .x0 = input->domain.x0,
+        .y0 = input->domain.y0,
         // A moving window, too: a floe at its back reaches over the seam into a lead that ends at its front, and what
         // it lets in is cut as far as the lead goes beyond that, along x (case/case_environment.c).
-        .period_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
-        .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
+        .period_x = bt_bound_wraps(input->domain.ends) ? input->domain.length : 0,
+        .period_y = input->domain.sides == BT_BOUND_PERIODIC ? input->domain.width : 0,
     };
-    const double whole = bt_field_floe_area(f);
-    const bool outside = whole - f->concentration * f->ice_area > 1e-9 * whole;
-    bt_status status = bt_lead_cut(&l, f, s, err);
+    const double whole = bt_field_floe_area(field);
+    const bool outside = whole - field->concentration * field->ice_area > 1e-9 * whole;
+    bt_status status = bt_lead_cut(&lead, field, stats, err);
     free(path);
     if (status != BT_OK || !outside) return status;
-    bt_case of = *c; // with the region that the concentration refers to
-    if (c->ice.field) {
-        const double *r = bt_outline_region(&f->outlines);
+    bt_case of = *input; // with the region that the concentration refers to
+    if (input->ice.field) {
+        const double *r = bt_outline_region(&field->outlines);
         if (!r) { // a file that does not say: as if the lead took as large a share in it as beyond it
-            f->concentration = s->concentration_before * (bt_field_floe_area(f) / whole);
-            s->concentration_after = NAN;
+            field->concentration = stats->concentration_before * (bt_field_floe_area(field) / whole);
+            stats->concentration_after = NAN;
             return BT_OK;
         }
         of.ice.x_min = r[0], of.ice.y_min = r[1], of.ice.x_max = r[2], of.ice.y_max = r[3];
     }
-    bt_region y;
-    status = bt_region_init(&y, &of, 0, err);
-    if (status == BT_OK) f->concentration = s->concentration_after = area_in_region(&of, &y, f) / y.ice_area;
-    bt_region_free(&y);
+    bt_region region;
+    status = bt_region_init(&region, &of, 0, err);
+    if (status == BT_OK)
+        field->concentration = stats->concentration_after = area_in_region(&of, &region, field) / region.ice_area;
+    bt_region_free(&region);
     return status;
 }
 
-void bt_lead_stats_print(const bt_lead_stats *s)
+void bt_lead_stats_print(const bt_lead_stats *stats)
 {
-    if (s->mode == BT_LEAD_NONE) return;
-    printf("  lead                %.4g m wide, %.4g m long: %lld floes (%.4g m2) ", s->width, s->length,
-           (long long)s->taken, s->area_taken);
-    if (s->mode == BT_LEAD_CHANNEL) printf("removed");
-    else printf("cut into %lld pieces of %.3g m", (long long)s->pieces, s->mean_piece);
-    if (isnan(s->concentration_after))
+    if (stats->mode == BT_LEAD_NONE) return;
+    printf("  lead                %.4g m wide, %.4g m long: %lld floes (%.4g m2) ", stats->width, stats->length,
+           (long long)stats->taken, stats->area_taken);
+    if (stats->mode == BT_LEAD_CHANNEL) printf("removed");
+    else printf("cut into %lld pieces of %.3g m", (long long)stats->pieces, stats->mean_piece);
+    if (isnan(stats->concentration_after))
         printf("; concentration of the field's ice region, which its file does not name");
-    else printf("; concentration %.4g", s->concentration_after);
-    printf(", was %.4g\n", s->concentration_before);
+    else printf("; concentration %.4g", stats->concentration_after);
+    printf(", was %.4g\n", stats->concentration_before);
 }

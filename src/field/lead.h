@@ -42,13 +42,13 @@ typedef struct bt_lead_stats {
 /// Cut the lead into a field: floes keep their order, pieces stand in the place of their floe. ice_area of the field
 /// stays, its concentration is renewed. Errors: BT_ERR_CASE (more pieces than can be simulated; the field is left as it
 /// was).
-bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *s, bt_errors *err);
+bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *stats, bt_errors *err);
 
 /// The lead of a case, along the planned path of the body; without one (lead.mode none) nothing is done. Errors as
 /// above.
-bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_errors *err);
+bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *stats, bt_errors *err);
 
 /// One line on stdout, as in the summary; nothing without a lead.
-void bt_lead_stats_print(const bt_lead_stats *s);
+void bt_lead_stats_print(const bt_lead_stats *stats);
 
 #endif

@@ -117,13 +117,14 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
 
 // Where x = y = 0 of a case lies on the earth: map_crs.h.
 
-bt_map_place bt_map_place_of(const bt_outline_counts *o, const bt_case *c)
+bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *input)
 {
-    const bool read = o && o->read;
-    const bool plane = read && isfinite(o->east);
-    if (read && isfinite(o->lon)) return (bt_map_place){BT_MAP_DEGREES, o->lon, o->lat, NULL};
-    if (read && bt_map_crs_of(o->crs).kind == BT_MAP_PLANE)
-        return (bt_map_place){BT_MAP_PLANE, plane ? o->east : 0, plane ? o->north : 0, o->crs};
-    if (!isnan(c->ice.origin_lon)) return (bt_map_place){BT_MAP_DEGREES, c->ice.origin_lon, c->ice.origin_lat, NULL};
-    return (bt_map_place){BT_MAP_LOCAL, plane ? o->east : 0, plane ? o->north : 0, NULL};
+    const bool read = counts && counts->read;
+    const bool plane = read && isfinite(counts->east);
+    if (read && isfinite(counts->lon)) return (bt_map_place){BT_MAP_DEGREES, counts->lon, counts->lat, NULL};
+    if (read && bt_map_crs_of(counts->crs).kind == BT_MAP_PLANE)
+        return (bt_map_place){BT_MAP_PLANE, plane ? counts->east : 0, plane ? counts->north : 0, counts->crs};
+    if (!isnan(input->ice.origin_lon))
+        return (bt_map_place){BT_MAP_DEGREES, input->ice.origin_lon, input->ice.origin_lat, NULL};
+    return (bt_map_place){BT_MAP_LOCAL, plane ? counts->east : 0, plane ? counts->north : 0, NULL};
 }

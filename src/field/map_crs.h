@@ -51,6 +51,6 @@ typedef struct bt_map_place {
 } bt_map_place;
 
 /// The map from which the outlines came (NULL or all 0: there is none) goes before ice.origin_lon and ice.origin_lat.
-bt_map_place bt_map_place_of(const bt_outline_counts *o, const bt_case *c);
+bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *input);
 
 #endif

@@ -18,74 +18,74 @@
 /// A stretch of text that is being gone through; p == NULL: it is not what was looked for.
 typedef struct scan { const char *p, *end; } scan;
 
-static char peek(const scan *s) { return s->p && s->p < s->end ? *s->p : '\0'; }
+static char peek(const scan *at) { return at->p && at->p < at->end ? *at->p : '\0'; }
 
-static void skip_space(scan *s)
+static void skip_space(scan *at)
 {
-    while (s->p && s->p < s->end && (*s->p == ' ' || *s->p == '\n' || *s->p == '\t' || *s->p == '\r')) s->p++;
+    while (at->p && at->p < at->end && (*at->p == ' ' || *at->p == '\n' || *at->p == '\t' || *at->p == '\r')) at->p++;
 }
 
 /// Take the character c, with the space behind it.
-static bool take(scan *s, char c)
+static bool take(scan *at, char c)
 {
-    if (peek(s) != c) return false;
-    s->p++;
-    skip_space(s);
+    if (peek(at) != c) return false;
+    at->p++;
+    skip_space(at);
     return true;
 }
 
-static void skip_string(scan *s)
+static void skip_string(scan *at)
 {
-    for (s->p++; s->p < s->end && *s->p != '"'; s->p++)
-        if (*s->p == '\\') s->p++;
-    s->p = s->p < s->end ? s->p + 1 : NULL;
+    for (at->p++; at->p < at->end && *at->p != '"'; at->p++)
+        if (*at->p == '\\') at->p++;
+    at->p = at->p < at->end ? at->p + 1 : NULL;
 }
 
 /// A value, and the space behind it.
-static void skip_value(scan *s)
+static void skip_value(scan *at)
 {
     static const bool marks[UCHAR_MAX + 1] = {['"'] = true, ['['] = true, [']'] = true, ['{'] = true, ['}'] = true};
     int64_t depth = 0;
-    const char *begin = s->p;
+    const char *begin = at->p;
     do {
-        while (depth > 0 && s->p < s->end && !marks[(unsigned char)*s->p]) s->p++; // what most of the text is
-        const char c = peek(s);
+        while (depth > 0 && at->p < at->end && !marks[(unsigned char)*at->p]) at->p++; // what most of the text is
+        const char c = peek(at);
         if (c == '"') {
-            skip_string(s);
+            skip_string(at);
             continue;
         }
         if (c == '[' || c == '{') depth++;
         else if (c == ']' || c == '}') depth--;
         else if (depth == 0 && (c == ',' || c == ':' || c == ' ' || c == '\n' || c == '\t' || c == '\r')) break;
-        if (depth < 0 || s->p >= s->end) break;
-        s->p++;
-    } while (s->p && (depth > 0 || (s->p[-1] != ']' && s->p[-1] != '}' && s->p[-1] != '"')));
-    if (depth > 0 || s->p == begin) s->p = NULL;
-    skip_space(s);
+        if (depth < 0 || at->p >= at->end) break;
+        at->p++;
+    } while (at->p && (depth > 0 || (at->p[-1] != ']' && at->p[-1] != '}' && at->p[-1] != '"')));
+    if (depth > 0 || at->p == begin) at->p = NULL;
+    skip_space(at);
 }
 
 /// The next key of an object, up to its value: is it this one, in plain letters? False also when there is no more.
-static bool take_key(scan *s, const char *name, bool *is)
+static bool take_key(scan *at, const char *name, bool *is)
 {
-    if (peek(s) != '"') return false;
-    const char *begin = s->p + 1;
-    skip_string(s);
-    if (!s->p) return false;
-    const size_t n = (size_t)(s->p - 1 - begin);
+    if (peek(at) != '"') return false;
+    const char *begin = at->p + 1;
+    skip_string(at);
+    if (!at->p) return false;
+    const size_t n = (size_t)(at->p - 1 - begin);
     *is = n == strlen(name) && !memcmp(begin, name, n);
-    skip_space(s);
-    return take(s, ':');
+    skip_space(at);
+    return take(at, ':');
 }
 
 /// In the object that begins here, to the value of a key in plain letters.
-static bool find_value(scan *s, const char *name)
+static bool find_value(scan *at, const char *name)
 {
     bool is;
-    if (!take(s, '{')) return false;
-    while (take_key(s, name, &is)) {
+    if (!take(at, '{')) return false;
+    while (take_key(at, name, &is)) {
         if (is) return true;
-        skip_value(s);
-        if (!take(s, ',')) return false;
+        skip_value(at);
+        if (!take(at, ',')) return false;
     }
     return false;
 }
@@ -120,30 +120,30 @@ static const char *take_digits(const char *p, const char *end, uint64_t *w)
 }
 
 /// A number as JSON has it [RFC 8259], of those that jansson takes for the same.
-static bool take_number(scan *s, double *x)
+static bool take_number(scan *at, double *x)
 {
     enum { MOST = 63, DIGITS = 15 };
     char copy[MOST + 1];
-    const char *p = s->p, *begin = p;
-    if (p < s->end && *p == '-') p++;
+    const char *p = at->p, *begin = p;
+    if (p < at->end && *p == '-') p++;
     const char *digits = p;
     uint64_t w = 0, power = 0;
-    p = take_digits(p, s->end, &w);
+    p = take_digits(p, at->end, &w);
     ptrdiff_t places = p - digits, behind = 0; // behind the point
     if (places == 0 || (*digits == '0' && places > 1)) return false;
     bool whole = true, exponent = false;
-    if (p < s->end && *p == '.') {
+    if (p < at->end && *p == '.') {
         const char *first = p + 1;
-        p = take_digits(first, s->end, &w);
+        p = take_digits(first, at->end, &w);
         behind = p - first, places += behind;
         if (behind == 0) return false;
         whole = false;
     }
-    if (p < s->end && (*p == 'e' || *p == 'E')) {
+    if (p < at->end && (*p == 'e' || *p == 'E')) {
         p++;
-        if (p < s->end && (*p == '+' || *p == '-')) p++;
+        if (p < at->end && (*p == '+' || *p == '-')) p++;
         const char *first = p;
-        p = take_digits(p, s->end, &power);
+        p = take_digits(p, at->end, &power);
         if (p == first) return false;
         whole = false, exponent = true;
     }
@@ -159,137 +159,142 @@ static bool take_number(scan *s, double *x)
         bt_point_end(locale);
     }
     *x += whole ? 0.0 : -0.0; // there is no whole −0
-    s->p = p;
-    skip_space(s);
+    at->p = p;
+    skip_space(at);
     return isfinite(*x);
 }
 
 /// [east, north] or [east, north, height, ...].
-static bool take_position(scan *s, double v[2])
+static bool take_position(scan *at, double v[2])
 {
     double more;
-    if (!take(s, '[') || !take_number(s, &v[0]) || !take(s, ',') || !take_number(s, &v[1])) return false;
-    while (take(s, ','))
-        if (!take_number(s, &more)) return false;
-    return take(s, ']');
+    if (!take(at, '[') || !take_number(at, &v[0]) || !take(at, ',') || !take_number(at, &v[1])) return false;
+    while (take(at, ','))
+        if (!take_number(at, &more)) return false;
+    return take(at, ']');
 }
 
-static double *next_vertex(bt_features *f)
+static double *next_vertex(bt_features *features)
 {
-    if (f->n_vertices == f->cap_vertices) {
-        f->cap_vertices = f->cap_vertices ? f->cap_vertices + f->cap_vertices / 2 : 1024;
-        f->ring = bt_realloc(f->ring, 2 * (size_t)f->cap_vertices, sizeof *f->ring);
+    if (features->n_vertices == features->cap_vertices) {
+        features->cap_vertices = features->cap_vertices ? features->cap_vertices + features->cap_vertices / 2 : 1024;
+        features->ring = bt_realloc(features->ring, 2 * (size_t)features->cap_vertices, sizeof *features->ring);
     }
-    return f->ring + 2 * f->n_vertices++;
+    return features->ring + 2 * features->n_vertices++;
 }
 
 /// Coordinates of one ring at `depth` lists within lists, the last ones its positions.
-static bool take_ring(bt_features *f, scan *s, int depth)
+static bool take_ring(bt_features *features, scan *at, int depth)
 {
     for (int k = 0; k < depth; k++)
-        if (!take(s, '[')) return false;
-    const int64_t first = f->n_vertices;
+        if (!take(at, '[')) return false;
+    const int64_t first = features->n_vertices;
     do {
-        if (f->n_vertices - first > BT_MOST_RING || !take_position(s, next_vertex(f))) return false;
-    } while (take(s, ','));
+        if (features->n_vertices - first > BT_MOST_RING || !take_position(at, next_vertex(features))) return false;
+    } while (take(at, ','));
     for (int k = 0; k < depth; k++)
-        if (!take(s, ']')) return false;
-    return f->n_vertices - first <= BT_MOST_RING;
+        if (!take(at, ']')) return false;
+    return features->n_vertices - first <= BT_MOST_RING;
 }
 
 // --- features --------------------------------------------------------------------------------------------------------
 
-const json_t *bt_features_at(bt_features *f, size_t i)
+const json_t *bt_features_at(bt_features *features, size_t i)
 {
-    if (!f->span) return json_array_get(json_object_get(f->root, "features"), i);
-    const bt_feature_span *s = &f->span[i];
-    const bool cut = s->cut_end > s->cut;
-    const size_t before = (cut ? s->cut : s->end) - s->begin, after = cut ? s->end - s->cut_end : 0,
+    if (!features->span) return json_array_get(json_object_get(features->root, "features"), i);
+    const bt_feature_span *span = &features->span[i];
+    const bool cut = span->cut_end > span->cut;
+    const size_t before = (cut ? span->cut : span->end) - span->begin, after = cut ? span->end - span->cut_end : 0,
                  n = before + after + (cut ? 4 : 0);
-    const char *head = f->text + s->begin, *tail = f->text + s->cut_end;
+    const char *head = features->text + span->begin, *tail = features->text + span->cut_end;
     // Features of one program differ in their coordinates, and often in nothing else.
-    if (f->parsed && n == f->n_lean && !memcmp(f->lean, head, before) &&
-        (!cut || (!memcmp(f->lean + before, "null", 4) && !memcmp(f->lean + before + 4, tail, after))))
-        return f->parsed;
-    if (n > f->cap_lean) f->lean = bt_realloc(f->lean, f->cap_lean = 2 * n, 1);
-    f->n_lean = n;
-    memcpy(f->lean, head, before);
+    if (features->parsed && n == features->n_lean && !memcmp(features->lean, head, before) &&
+        (!cut || (!memcmp(features->lean + before, "null", 4) && !memcmp(features->lean + before + 4, tail, after))))
+        return features->parsed;
+    if (n > features->cap_lean) features->lean = bt_realloc(features->lean, features->cap_lean = 2 * n, 1);
+    features->n_lean = n;
+    memcpy(features->lean, head, before);
     if (cut) {
-        memcpy(f->lean + before, "null", 4);
-        memcpy(f->lean + before + 4, tail, after);
+        memcpy(features->lean + before, "null", 4);
+        memcpy(features->lean + before + 4, tail, after);
     }
-    json_decref(f->parsed);
-    f->parsed = json_loadb(f->lean, n, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, NULL);
-    return f->parsed;
+    json_decref(features->parsed);
+    features->parsed = json_loadb(features->lean, n, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, NULL);
+    return features->parsed;
 }
 
-const double *bt_features_ring(const bt_features *f, size_t i, size_t *n)
+const double *bt_features_ring(const bt_features *features, size_t i, size_t *n)
 {
-    if (!f->span || f->span[i].cut == f->span[i].cut_end) return NULL;
-    const int64_t first = f->span[i].vertex, end = i + 1 < f->n ? f->span[i + 1].vertex : f->n_vertices;
+    if (!features->span || features->span[i].cut == features->span[i].cut_end) return NULL;
+    const int64_t first = features->span[i].vertex, end = i + 1 < features->n
+                                                          ? features->span[i + 1].vertex : features->n_vertices;
     *n = (size_t)(end - first);
-    return f->ring + 2 * first;
+    return features->ring + 2 * first;
 }
 
 /// Take the coordinates out of the last feature if they are those of one ring, as deep as its type says.
-static void cut_ring(bt_features *f, bt_feature_span *s)
+static void cut_ring(bt_features *features, bt_feature_span *span)
 {
     static const struct { const char *type; int depth; } kinds[] = {{"Polygon", 2}, {"MultiPolygon", 3}};
     for (int k = 0; k < 2; k++) {
-        scan c = {f->text + s->begin, f->text + s->end};
-        if (!find_value(&c, "geometry") || !find_value(&c, "coordinates")) return;
-        const char *begin = c.p;
-        f->n_vertices = s->vertex;
-        if (!take_ring(f, &c, kinds[k].depth)) continue;
-        s->cut = (uint32_t)(begin - f->text);
-        s->cut_end = (uint32_t)(c.p - f->text);
+        scan at = {features->text + span->begin, features->text + span->end};
+        if (!find_value(&at, "geometry") || !find_value(&at, "coordinates")) return;
+        const char *begin = at.p;
+        features->n_vertices = span->vertex;
+        if (!take_ring(features, &at, kinds[k].depth)) continue;
+        span->cut = (uint32_t)(begin - features->text);
+        span->cut_end = (uint32_t)(at.p - features->text);
         const char *type =
-            json_string_value(json_object_get(json_object_get(bt_features_at(f, f->n - 1), "geometry"), "type"));
+            json_string_value(json_object_get(json_object_get(bt_features_at(features, features->n - 1), "geometry"),
+                                              "type"));
         if (type && !strcmp(type, kinds[k].type)) return;
         break;
     }
-    f->n_vertices = s->vertex;
-    s->cut = s->cut_end = 0;
+    features->n_vertices = span->vertex;
+    span->cut = span->cut_end = 0;
 }
 
 /// One feature from here on. False: it is none that the parser takes.
-static bool add_feature(bt_features *f, scan *s)
+static bool add_feature(bt_features *features, scan *at)
 {
-    const char *begin = s->p;
-    skip_value(s);
-    if (!s->p) return false;
-    if (f->n == f->cap) f->span = bt_realloc(f->span, f->cap = f->cap ? f->cap + f->cap / 2 : 256, sizeof *f->span);
-    bt_feature_span *span = &f->span[f->n++];
+    const char *begin = at->p;
+    skip_value(at);
+    if (!at->p) return false;
+    if (features->n == features->cap)
+        features->span = bt_realloc(features->span, features->cap = features->cap
+                                    ? features->cap + features->cap / 2 : 256, sizeof *features->span);
+    bt_feature_span *span = &features->span[features->n++];
     *span = (bt_feature_span){
-        .begin = (uint32_t)(begin - f->text), .end = (uint32_t)(s->p - f->text), .vertex = f->n_vertices};
-    cut_ring(f, span);
-    return bt_features_at(f, f->n - 1) != NULL;
+        .begin = (uint32_t)(begin - features->text), .end = (uint32_t)(at->p - features->text),
+        .vertex = features->n_vertices};
+    cut_ring(features, span);
+    return bt_features_at(features, features->n - 1) != NULL;
 }
 
 /// The list of features, and the rest of the file. False: it is no JSON.
-static bool split(bt_features *f)
+static bool split(bt_features *features)
 {
-    scan s = {f->text, f->text + f->size};
-    skip_space(&s);
-    if (!find_value(&s, "features") || !take(&s, '[')) {
-        f->root = json_loadb(f->text, f->size, JSON_REJECT_DUPLICATES, NULL);
-        f->n = json_array_size(json_object_get(f->root, "features"));
-        return f->root != NULL;
+    scan at = {features->text, features->text + features->size};
+    skip_space(&at);
+    if (!find_value(&at, "features") || !take(&at, '[')) {
+        features->root = json_loadb(features->text, features->size, JSON_REJECT_DUPLICATES, NULL);
+        features->n = json_array_size(json_object_get(features->root, "features"));
+        return features->root != NULL;
     }
-    const size_t before = (size_t)(s.p - f->text);
-    if (peek(&s) != ']') {
+    const size_t before = (size_t)(at.p - features->text);
+    if (peek(&at) != ']') {
         do {
-            if (!add_feature(f, &s)) return false;
-        } while (take(&s, ','));
+            if (!add_feature(features, &at)) return false;
+        } while (take(&at, ','));
     }
-    if (peek(&s) != ']') return false;
-    const size_t after = f->size - (size_t)(s.p - f->text);
+    if (peek(&at) != ']') return false;
+    const size_t after = features->size - (size_t)(at.p - features->text);
     char *rest = bt_alloc(before + after, 1);
-    memcpy(rest, f->text, before);
-    memcpy(rest + before, s.p, after);
-    f->root = json_loadb(rest, before + after, JSON_REJECT_DUPLICATES, NULL);
+    memcpy(rest, features->text, before);
+    memcpy(rest + before, at.p, after);
+    features->root = json_loadb(rest, before + after, JSON_REJECT_DUPLICATES, NULL);
     free(rest);
-    return f->root != NULL;
+    return features->root != NULL;
 }
 
 /// What a file is that is no JSON, by the bytes at its beginning, or NULL.
@@ -315,13 +320,14 @@ static const char *other_format(const char *text, size_t size)
     return NULL;
 }
 
-bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err)
+bt_status bt_features_open(bt_features *features, const char *path, bt_errors *err)
 {
-    *f = (bt_features){0};
+    *features = (bt_features){0};
     bt_status status =
-        bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &f->text, &f->size, err);
+        bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &features->text, &features->size,
+                        err);
     if (status != BT_OK) return status;
-    const char *other = other_format(f->text, f->size);
+    const char *other = other_format(features->text, features->size);
     if (other) {
         bt_errors_add(err,
                       "%s: is %s, not GeoJSON; make GeoJSON of it: bergtow outlines %s -o floes.geojson (a field of "
@@ -331,7 +337,7 @@ bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err)
     }
     // What a hostile file could make of it is known before: a tree takes far more room than the text.
     int64_t lists = 0;
-    const char *c = f->text, *end = f->text + f->size;
+    const char *c = features->text, *end = features->text + features->size;
     while ((c = memchr(c, '[', (size_t)(end - c)))) c++, lists++;
     if (lists > BT_MOST_LISTS) {
         bt_errors_add(err,
@@ -341,27 +347,27 @@ bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err)
         return BT_ERR_CASE;
     }
     json_error_t why;
-    if (!split(f)) {
-        json_t *whole = json_loadb(f->text, f->size, JSON_REJECT_DUPLICATES, &why);
+    if (!split(features)) {
+        json_t *whole = json_loadb(features->text, features->size, JSON_REJECT_DUPLICATES, &why);
         if (!whole) {
             bt_errors_add(err, "%s:%d: is not JSON: %s; mend the file", path, why.line, why.text);
             return BT_ERR_CASE;
         }
-        json_decref(f->root);
-        free(f->span);
-        f->span = NULL;
-        f->root = whole;
-        f->n = json_array_size(json_object_get(whole, "features"));
+        json_decref(features->root);
+        free(features->span);
+        features->span = NULL;
+        features->root = whole;
+        features->n = json_array_size(json_object_get(whole, "features"));
     }
-    f->listed = json_is_array(json_object_get(f->root, "features"));
+    features->listed = json_is_array(json_object_get(features->root, "features"));
     return BT_OK;
 }
 
-void bt_features_close(bt_features *f)
+void bt_features_close(bt_features *features)
 {
-    json_decref(f->root);
-    json_decref(f->parsed);
-    void *arrays[] = {f->text, f->span, f->ring, f->lean};
+    json_decref(features->root);
+    json_decref(features->parsed);
+    void *arrays[] = {features->text, features->span, features->ring, features->lean};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
-    *f = (bt_features){0};
+    *features = (bt_features){0};
 }

@@ -42,14 +42,14 @@ typedef struct bt_features {
 } bt_features;
 
 /// Errors name file and line. To be closed in any case.
-bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err);
-void bt_features_close(bt_features *f);
+bt_status bt_features_open(bt_features *features, const char *path, bt_errors *err);
+void bt_features_close(bt_features *features);
 
 /// Feature i, until the next call; null for coordinates in its place where bt_features_ring has them.
-const json_t *bt_features_at(bt_features *f, size_t i);
+const json_t *bt_features_at(bt_features *features, size_t i);
 
 /// The ring [*n][2] of feature i, which is a Polygon, or a MultiPolygon of one, without holes; NULL: see its
 /// coordinates.
-const double *bt_features_ring(const bt_features *f, size_t i, size_t *n);
+const double *bt_features_ring(const bt_features *features, size_t i, size_t *n);
 
 #endif

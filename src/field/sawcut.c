@@ -35,38 +35,38 @@ static void shape_piece(double *v, double area, double aspect)
     memcpy(v, (double[8]){cx - hx, cy - hy, cx + hx, cy - hy, cx + hx, cy + hy, cx - hx, cy + hy}, 8 * sizeof *v);
 }
 
-static void add_cell(bt_tessellation *c, const bt_region *y, double x0, double x1, double y0, double y1, double target,
-                     double aspect, int effort, int halved)
+static void add_cell(bt_tessellation *cells, const bt_region *region, double x0, double x1, double y0, double y1,
+                     double target, double aspect, int effort, int halved)
 {
     double v[2 * 8 * BT_TESSELLATION_VERTICES];
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
-    int n = bt_tessellation_clear(y, 4, v, effort == 0);
+    int n = bt_tessellation_clear(region, 4, v, effort == 0);
     if (n >= 3) n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
     double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_centroid(n, v).area : 0;
     // Halves waste less water beside an obstacle.
     if (left < (effort < 2 ? 0.65 : 0.85) * whole && halved < (effort < 2 ? 2 : 4)) {
         double cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
         bool across = x1 - x0 >= y1 - y0;
-        add_cell(c, y, x0, across ? cx : x1, y0, across ? y1 : cy, target / 2, aspect, effort, halved + 1);
-        add_cell(c, y, across ? cx : x0, x1, across ? y0 : cy, y1, target / 2, aspect, effort, halved + 1);
+        add_cell(cells, region, x0, across ? cx : x1, y0, across ? y1 : cy, target / 2, aspect, effort, halved + 1);
+        add_cell(cells, region, across ? cx : x0, x1, across ? y0 : cy, y1, target / 2, aspect, effort, halved + 1);
         return;
     }
     if (n < 3) return;
     // What an obstacle leaves of a piece must still be a piece.
-    bt_moments m = bt_shape_extent(n, v);
-    if (m.area < 0.25 * whole || m.inradius < 0.2 * bt_min(x1 - x0, y1 - y0) / 2) return;
-    if ((c->n & (c->n - 1)) == 0) { // full at powers of two
-        size_t cap = c->n ? 2 * (size_t)c->n : 1;
-        c->nv = bt_realloc(c->nv, cap, sizeof *c->nv);
-        c->v = bt_realloc(c->v, cap, sizeof *c->v);
-        c->target = bt_realloc(c->target, cap, sizeof *c->target);
+    bt_moments moments = bt_shape_extent(n, v);
+    if (moments.area < 0.25 * whole || moments.inradius < 0.2 * bt_min(x1 - x0, y1 - y0) / 2) return;
+    if ((cells->n & (cells->n - 1)) == 0) { // full at powers of two
+        size_t cap = cells->n ? 2 * (size_t)cells->n : 1;
+        cells->nv = bt_realloc(cells->nv, cap, sizeof *cells->nv);
+        cells->v = bt_realloc(cells->v, cap, sizeof *cells->v);
+        cells->target = bt_realloc(cells->target, cap, sizeof *cells->target);
     }
     double extent = bt_shape_width(n, v, 0, 1) * bt_shape_width(n, v, 1, 0);
-    if (m.area > (1 - 1e-9) * extent) shape_piece(v, target, aspect), n = 4;
-    c->nv[c->n] = n;
-    memcpy(c->v[c->n], v, 2 * (size_t)n * sizeof *v);
-    c->target[c->n] = bt_min(target, target * m.area / whole);
-    c->n++;
+    if (moments.area > (1 - 1e-9) * extent) shape_piece(v, target, aspect), n = 4;
+    cells->nv[cells->n] = n;
+    memcpy(cells->v[cells->n], v, 2 * (size_t)n * sizeof *v);
+    cells->target[cells->n] = bt_min(target, target * moments.area / whole);
+    cells->n++;
 }
 
 typedef struct piece {
@@ -106,15 +106,15 @@ static bt_idx fill_strips(bt_idx n, const piece *p, double share, double aspect,
     return n_strips;
 }
 
-bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed,
-                                    int effort)
+bt_tessellation bt_tessellation_saw(const bt_region *region, bt_idx n, const double *target, double aspect,
+                                    int64_t seed, int effort)
 {
-    bt_tessellation c = {0};
-    double lx = y->x1 - y->x0, ly = y->y1 - y->y0, wanted = 0;
+    bt_tessellation cells = {0};
+    double lx = region->x1 - region->x0, ly = region->y1 - region->y0, wanted = 0;
     piece *p = bt_alloc((size_t)n, sizeof *p), *strip = bt_alloc((size_t)n, sizeof *strip);
     for (bt_idx i = 0; i < n; i++) {
-        bt_rng r = bt_rng_start(seed, BT_RNG_CUT, i);
-        p[i] = (piece){bt_log(target[i]) / 2 + DEAL_NOISE * bt_rng_normal(&r), target[i], i};
+        bt_rng rng = bt_rng_start(seed, BT_RNG_CUT, i);
+        p[i] = (piece){bt_log(target[i]) / 2 + DEAL_NOISE * bt_rng_normal(&rng), target[i], i};
         wanted += target[i];
     }
     qsort(p, (size_t)n, sizeof *p, by_key);
@@ -132,29 +132,29 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
     double last;
     bt_idx n_strips = fill_strips(n, p, share / lx, chosen, lx, first, &last);
     for (bt_idx k = 0; k < n_strips; k++) {
-        bt_rng r = bt_rng_start(seed, BT_RNG_CUT, (int64_t)n + k);
-        strip[k] = (piece){bt_rng_uniform(&r), 0, k};
+        bt_rng rng = bt_rng_start(seed, BT_RNG_CUT, (int64_t)n + k);
+        strip[k] = (piece){bt_rng_uniform(&rng), 0, k};
     }
     qsort(strip, (size_t)n_strips, sizeof *strip, by_key);
 
-    double y0 = y->y0;
+    double y0 = region->y0;
     for (bt_idx s = 0; s < n_strips; s++) {
         bt_idx k = (bt_idx)strip[s].id, from = first[k], to = first[k + 1];
         double sum = 0;
         for (bt_idx i = from; i < to; i++) {
-            bt_rng r = bt_rng_start(seed, BT_RNG_CUT, 2 * (int64_t)n + p[i].id);
-            p[i].key = bt_rng_uniform(&r);
+            bt_rng rng = bt_rng_start(seed, BT_RNG_CUT, 2 * (int64_t)n + p[i].id);
+            p[i].key = bt_rng_uniform(&rng);
             sum += p[i].target;
         }
         qsort(p + from, (size_t)(to - from), sizeof *p, by_key);
-        double width = sum * share / lx, y1 = s + 1 < n_strips ? y0 + width : y->y1;
-        bt_rng r = bt_rng_start(seed, BT_RNG_CUT, 3 * (int64_t)n + k);
-        double x = y->x0 + (y->periodic_x ? lx * bt_rng_uniform(&r) : 0);
+        double width = sum * share / lx, y1 = s + 1 < n_strips ? y0 + width : region->y1;
+        bt_rng rng = bt_rng_start(seed, BT_RNG_CUT, 3 * (int64_t)n + k);
+        double x = region->x0 + (region->periodic_x ? lx * bt_rng_uniform(&rng) : 0);
         for (bt_idx i = from; i < to; i++) {
-            double x1 = i + 1 < to || y->periodic_x ? x + p[i].target / sum * lx : y->x1;
+            double x1 = i + 1 < to || region->periodic_x ? x + p[i].target / sum * lx : region->x1;
             // A piece whose middle is beyond a periodic edge is moved back whole.
-            double shift = y->periodic_x && (x + x1) / 2 >= y->x1 ? -lx : 0;
-            add_cell(&c, y, x + shift, x1 + shift, y0, y1, p[i].target, aspect, effort, 0);
+            double shift = region->periodic_x && (x + x1) / 2 >= region->x1 ? -lx : 0;
+            add_cell(&cells, region, x + shift, x1 + shift, y0, y1, p[i].target, aspect, effort, 0);
             x = x1;
         }
         y0 = y1;
@@ -162,5 +162,5 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
     free(p);
     free(strip);
     free(first);
-    return c;
+    return cells;
 }

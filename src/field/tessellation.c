@@ -50,45 +50,45 @@ typedef struct diagram {
 
 static bt_tessellation create(bt_idx n)
 {
-    bt_tessellation c = {.n = n};
-    c.nv = bt_alloc((size_t)n, sizeof *c.nv);
-    c.v = bt_alloc((size_t)n, sizeof *c.v);
-    c.target = bt_alloc((size_t)n, sizeof *c.target);
-    return c;
+    bt_tessellation cells = {.n = n};
+    cells.nv = bt_alloc((size_t)n, sizeof *cells.nv);
+    cells.v = bt_alloc((size_t)n, sizeof *cells.v);
+    cells.target = bt_alloc((size_t)n, sizeof *cells.target);
+    return cells;
 }
 
-void bt_tessellation_free(bt_tessellation *c)
+void bt_tessellation_free(bt_tessellation *cells)
 {
-    free(c->nv);
-    free(c->v);
-    free(c->target);
-    *c = (bt_tessellation){0};
+    free(cells->nv);
+    free(cells->v);
+    free(cells->target);
+    *cells = (bt_tessellation){0};
 }
 
-static bt_idx bin_of(const diagram *g, double x, double y)
+static bt_idx bin_of(const diagram *tiling, double x, double y)
 {
-    int ix = (int)((x - g->region->x0) / g->bx), iy = (int)((y - g->region->y0) / g->by);
-    ix = ix < 0 ? 0 : ix >= g->nx ? g->nx - 1 : ix;
-    iy = iy < 0 ? 0 : iy >= g->ny ? g->ny - 1 : iy;
-    return iy * g->nx + ix;
+    int ix = (int)((x - tiling->region->x0) / tiling->bx), iy = (int)((y - tiling->region->y0) / tiling->by);
+    ix = ix < 0 ? 0 : ix >= tiling->nx ? tiling->nx - 1 : ix;
+    iy = iy < 0 ? 0 : iy >= tiling->ny ? tiling->ny - 1 : iy;
+    return iy * tiling->nx + ix;
 }
 
-static void sort_into_bins(diagram *g)
+static void sort_into_bins(diagram *tiling)
 {
-    size_t bins = (size_t)g->nx * (size_t)g->ny;
-    memset(g->first, 0, (bins + 1) * sizeof *g->first);
-    g->w_max = -INFINITY;
-    for (bt_idx i = 0; i < g->n; i++) {
-        g->first[bin_of(g, g->p[2 * i], g->p[2 * i + 1]) + 1]++;
-        g->w_max = bt_max(g->w_max, g->w[i]);
+    size_t bins = (size_t)tiling->nx * (size_t)tiling->ny;
+    memset(tiling->first, 0, (bins + 1) * sizeof *tiling->first);
+    tiling->w_max = -INFINITY;
+    for (bt_idx i = 0; i < tiling->n; i++) {
+        tiling->first[bin_of(tiling, tiling->p[2 * i], tiling->p[2 * i + 1]) + 1]++;
+        tiling->w_max = bt_max(tiling->w_max, tiling->w[i]);
     }
-    for (size_t b = 0; b < bins; b++) g->first[b + 1] += g->first[b];
+    for (size_t b = 0; b < bins; b++) tiling->first[b + 1] += tiling->first[b];
     bt_idx *at = bt_alloc(bins, sizeof *at);
-    memcpy(at, g->first, bins * sizeof *at);
-    for (bt_idx i = 0; i < g->n; i++) {
-        const double x = g->p[2 * i], y = g->p[2 * i + 1];
-        const bt_idx k = at[bin_of(g, x, y)]++;
-        g->member[k].x = x, g->member[k].y = y, g->member[k].w = g->w[i], g->member[k].i = i;
+    memcpy(at, tiling->first, bins * sizeof *at);
+    for (bt_idx i = 0; i < tiling->n; i++) {
+        const double x = tiling->p[2 * i], y = tiling->p[2 * i + 1];
+        const bt_idx k = at[bin_of(tiling, x, y)]++;
+        tiling->member[k].x = x, tiling->member[k].y = y, tiling->member[k].w = tiling->w[i], tiling->member[k].i = i;
     }
     free(at);
 }
@@ -109,15 +109,15 @@ static bool reached(int n, const double *v, double dx, double dy, double rhs)
 }
 
 // Cut the cell (relative to seed i) by the seeds of one bin, shifted by a period. Returns the new count.
-static int cut_by_bin(const diagram *g, bt_idx i, int n, double *v, double *r, bt_idx bin, double sx, double sy)
+static int cut_by_bin(const diagram *tiling, bt_idx i, int n, double *v, double *r, bt_idx bin, double sx, double sy)
 {
     double out[2 * WORK];
-    const double px = g->p[2 * i], py = g->p[2 * i + 1], w = g->w[i];
-    for (bt_idx k = g->first[bin]; k < g->first[bin + 1]; k++) {
-        const double dx = g->member[k].x + sx - px, dy = g->member[k].y + sy - py, wj = g->member[k].w,
+    const double px = tiling->p[2 * i], py = tiling->p[2 * i + 1], w = tiling->w[i];
+    for (bt_idx k = tiling->first[bin]; k < tiling->first[bin + 1]; k++) {
+        const double dx = tiling->member[k].x + sx - px, dy = tiling->member[k].y + sy - py, wj = tiling->member[k].w,
                      d2 = dx * dx + dy * dy, rhs = 0.5 * (d2 + w - wj);
         if (rhs > 0 && rhs * rhs > SURE * d2 * *r * *r) continue; // most: without a root
-        const bt_idx j = g->member[k].i;
+        const bt_idx j = tiling->member[k].i;
         if (j == i || rhs >= sqrt(d2) * *r) continue;
         if (d2 == 0) { // coincident seeds: the heavier one, then the lower index, has the cell
             if (wj > w || (wj == w && j < i)) return 0;
@@ -139,48 +139,48 @@ static int cut_by_bin(const diagram *g, bt_idx i, int n, double *v, double *r, b
 }
 
 // The cell of seed i relative to its seed; returns its number of vertices.
-static int power_cell(const diagram *g, bt_idx i, double *v)
+static int power_cell(const diagram *tiling, bt_idx i, double *v)
 {
-    const bt_region *y = g->region;
-    double px = g->p[2 * i], py = g->p[2 * i + 1], lx = y->x1 - y->x0, ly = y->y1 - y->y0;
-    double x0 = y->periodic_x ? -lx / 2 : y->x0 - px, x1 = y->periodic_x ? lx / 2 : y->x1 - px;
-    double y0 = y->periodic_y ? -ly / 2 : y->y0 - py, y1 = y->periodic_y ? ly / 2 : y->y1 - py;
+    const bt_region *region = tiling->region;
+    double px = tiling->p[2 * i], py = tiling->p[2 * i + 1], lx = region->x1 - region->x0, ly = region->y1 - region->y0;
+    double x0 = region->periodic_x ? -lx / 2 : region->x0 - px, x1 = region->periodic_x ? lx / 2 : region->x1 - px;
+    double y0 = region->periodic_y ? -ly / 2 : region->y0 - py, y1 = region->periodic_y ? ly / 2 : region->y1 - py;
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
     int n = 4;
-    double r = sqrt(reach2(n, v)), delta = g->w_max - g->w[i];
-    bt_idx home = bin_of(g, px, py);
-    int hx = home % g->nx, hy = home / g->nx;
+    double r = sqrt(reach2(n, v)), delta = tiling->w_max - tiling->w[i];
+    bt_idx home = bin_of(tiling, px, py);
+    int hx = home % tiling->nx, hy = home / tiling->nx;
     for (int k = 0; n >= 3; k++) {
         for (int jy = hy - k; jy <= hy + k && n >= 3; jy++) {
-            if (!y->periodic_y && (jy < 0 || jy >= g->ny)) continue;
-            int wy = jy >= 0 ? jy / g->ny : -((g->ny - 1 - jy) / g->ny), by = jy - wy * g->ny;
+            if (!region->periodic_y && (jy < 0 || jy >= tiling->ny)) continue;
+            int wy = jy >= 0 ? jy / tiling->ny : -((tiling->ny - 1 - jy) / tiling->ny), by = jy - wy * tiling->ny;
             int step = jy == hy - k || jy == hy + k || k == 0 ? 1 : 2 * k;
             for (int jx = hx - k; jx <= hx + k && n >= 3; jx += step) {
-                if (!y->periodic_x && (jx < 0 || jx >= g->nx)) continue;
-                int wx = jx >= 0 ? jx / g->nx : -((g->nx - 1 - jx) / g->nx), bx = jx - wx * g->nx;
-                n = cut_by_bin(g, i, n, v, &r, by * g->nx + bx, wx * lx, wy * ly);
+                if (!region->periodic_x && (jx < 0 || jx >= tiling->nx)) continue;
+                int wx = jx >= 0 ? jx / tiling->nx : -((tiling->nx - 1 - jx) / tiling->nx), bx = jx - wx * tiling->nx;
+                n = cut_by_bin(tiling, i, n, v, &r, by * tiling->nx + bx, wx * lx, wy * ly);
             }
         }
         // Distance from the seed to the nearest bin not yet seen; sides beyond a wall have none.
         double d = INFINITY;
-        if (y->periodic_x || hx - k > 0) d = bt_min(d, px - (y->x0 + (hx - k) * g->bx));
-        if (y->periodic_x || hx + k < g->nx - 1) d = bt_min(d, y->x0 + (hx + k + 1) * g->bx - px);
-        if (y->periodic_y || hy - k > 0) d = bt_min(d, py - (y->y0 + (hy - k) * g->by));
-        if (y->periodic_y || hy + k < g->ny - 1) d = bt_min(d, y->y0 + (hy + k + 1) * g->by - py);
+        if (region->periodic_x || hx - k > 0) d = bt_min(d, px - (region->x0 + (hx - k) * tiling->bx));
+        if (region->periodic_x || hx + k < tiling->nx - 1) d = bt_min(d, region->x0 + (hx + k + 1) * tiling->bx - px);
+        if (region->periodic_y || hy - k > 0) d = bt_min(d, py - (region->y0 + (hy - k) * tiling->by));
+        if (region->periodic_y || hy + k < tiling->ny - 1) d = bt_min(d, region->y0 + (hy + k + 1) * tiling->by - py);
         if (d == INFINITY || (d > 0 && d * d - delta >= 2 * d * r)) break;
     }
     return n;
 }
 
 // The cell with walls and obstacles taken out, in domain coordinates.
-static int ice_cell(const diagram *g, bt_idx i, double *v)
+static int ice_cell(const diagram *tiling, bt_idx i, double *v)
 {
-    int n = power_cell(g, i, v);
+    int n = power_cell(tiling, i, v);
     for (int k = 0; k < n; k++) {
-        v[2 * k] += g->p[2 * i];
-        v[2 * k + 1] += g->p[2 * i + 1];
+        v[2 * k] += tiling->p[2 * i];
+        v[2 * k + 1] += tiling->p[2 * i + 1];
     }
-    return n >= 3 ? bt_tessellation_clear(g->region, n, v, false) : 0;
+    return n >= 3 ? bt_tessellation_clear(tiling->region, n, v, false) : 0;
 }
 
 // ---- seeds ----
@@ -205,27 +205,28 @@ typedef struct bin_walk {
 
 static bin_walk walk_bins(const bt_region *region, const discs *dd, double x, double y, double r)
 {
-    bin_walk w = {.region = region, .dd = dd};
-    w.ix0 = (int)floor((x - r - region->x0) / dd->bx), w.ix1 = (int)floor((x + r - region->x0) / dd->bx);
-    w.iy = (int)floor((y - r - region->y0) / dd->by), w.iy1 = (int)floor((y + r - region->y0) / dd->by);
-    w.ix = w.ix0 - 1;
-    return w;
+    bin_walk walk = {.region = region, .dd = dd};
+    walk.ix0 = (int)floor((x - r - region->x0) / dd->bx), walk.ix1 = (int)floor((x + r - region->x0) / dd->bx);
+    walk.iy = (int)floor((y - r - region->y0) / dd->by), walk.iy1 = (int)floor((y + r - region->y0) / dd->by);
+    walk.ix = walk.ix0 - 1;
+    return walk;
 }
 
-static bool next_bin(bin_walk *w)
+static bool next_bin(bin_walk *walk)
 {
     for (;;) {
-        if (++w->ix > w->ix1) {
-            w->ix = w->ix0;
-            w->iy++;
+        if (++walk->ix > walk->ix1) {
+            walk->ix = walk->ix0;
+            walk->iy++;
         }
-        if (w->iy > w->iy1) return false;
+        if (walk->iy > walk->iy1) return false;
         // turns round the period
-        int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny);
-        if ((tx && !w->region->periodic_x) || (ty && !w->region->periodic_y)) continue;
-        w->bin = (size_t)(w->iy - ty * w->dd->ny) * (size_t)w->dd->nx + (size_t)(w->ix - tx * w->dd->nx);
-        w->sx = tx * (w->region->x1 - w->region->x0);
-        w->sy = ty * (w->region->y1 - w->region->y0);
+        int tx = (int)floor((double)walk->ix / walk->dd->nx), ty = (int)floor((double)walk->iy / walk->dd->ny);
+        if ((tx && !walk->region->periodic_x) || (ty && !walk->region->periodic_y)) continue;
+        walk->bin = (size_t)(walk->iy - ty * walk->dd->ny) * (size_t)walk->dd->nx +
+                    (size_t)(walk->ix - tx * walk->dd->nx);
+        walk->sx = tx * (walk->region->x1 - walk->region->x0);
+        walk->sy = ty * (walk->region->y1 - walk->region->y0);
         return true;
     }
 }
@@ -238,20 +239,20 @@ static double crowding(const bt_region *region, const discs *dd, const double *p
     if (!region->periodic_x) worst = bt_max(worst, 1 - bt_min(x - region->x0, region->x1 - x) / (SPACING * r));
     if (!region->periodic_y) worst = bt_max(worst, 1 - bt_min(y - region->y0, region->y1 - y) / (SPACING * r));
     for (int k = 0; k < region->n_obstacles; k++) {
-        const bt_obstacle *o = &region->obstacles[k];
-        if (bt_hypot(x - o->x, y - o->y) > o->radius + r) continue;
+        const bt_obstacle *obstacle = &region->obstacles[k];
+        if (bt_hypot(x - obstacle->x, y - obstacle->y) > obstacle->radius + r) continue;
         double out = -INFINITY; // distance to the obstacle, from below
-        for (int e = 0; e < o->n; e++) {
-            const double *a = o->v + 2 * e, *b = o->v + 2 * ((e + 1) % o->n);
+        for (int e = 0; e < obstacle->n; e++) {
+            const double *a = obstacle->v + 2 * e, *b = obstacle->v + 2 * ((e + 1) % obstacle->n);
             double ex = b[0] - a[0], ey = b[1] - a[1];
             out = bt_max(out, (ey * (x - a[0]) - ex * (y - a[1])) / bt_hypot(ex, ey));
         }
         worst = bt_max(worst, 1 - out / (SPACING * r));
     }
-    for (bin_walk w = walk_bins(region, dd, x, y, SPACING * r); next_bin(&w);)
-        for (int32_t k = dd->head[w.bin]; k >= 0; k = dd->node[k].next) {
+    for (bin_walk walk = walk_bins(region, dd, x, y, SPACING * r); next_bin(&walk);)
+        for (int32_t k = dd->head[walk.bin]; k >= 0; k = dd->node[k].next) {
             bt_idx j = dd->node[k].i;
-            double d = bt_hypot(p[2 * j] + w.sx - x, p[2 * j + 1] + w.sy - y);
+            double d = bt_hypot(p[2 * j] + walk.sx - x, p[2 * j + 1] + walk.sy - y);
             worst = bt_max(worst, 1 - d / (SPACING * (r + radius[j])));
         }
     return worst;
@@ -267,9 +268,9 @@ static int larger_first(const void *a, const void *b)
 }
 
 // Random places, large cells first, each the freest of a few candidates (sequential addition, then best of TRIES).
-static void place_seeds(const bt_region *y, bt_idx n, const double *radius, int64_t seed, double *p)
+static void place_seeds(const bt_region *region, bt_idx n, const double *radius, int64_t seed, double *p)
 {
-    double lx = y->x1 - y->x0, ly = y->y1 - y->y0, mean = 0;
+    double lx = region->x1 - region->x0, ly = region->y1 - region->y0, mean = 0;
     by_size *order = bt_alloc((size_t)n, sizeof *order);
     for (bt_idx i = 0; i < n; i++) {
         order[i] = (by_size){radius[i], i};
@@ -287,22 +288,22 @@ static void place_seeds(const bt_region *y, bt_idx n, const double *radius, int6
         bt_rng rng = bt_rng_start(seed, BT_RNG_PLACE, i);
         double least = INFINITY;
         for (int t = 0; t < TRIES && least > 0; t++) {
-            double x = y->x0 + lx * bt_rng_uniform(&rng), z = y->y0 + ly * bt_rng_uniform(&rng);
-            double worst = crowding(y, &dd, p, radius, x, z, radius[i]);
+            double x = region->x0 + lx * bt_rng_uniform(&rng), z = region->y0 + ly * bt_rng_uniform(&rng);
+            double worst = crowding(region, &dd, p, radius, x, z, radius[i]);
             if (worst < least) {
                 least = worst;
                 p[2 * i] = x;
                 p[2 * i + 1] = z;
             }
         }
-        for (bin_walk w = walk_bins(y, &dd, p[2 * i], p[2 * i + 1], SPACING * radius[i]); next_bin(&w);) {
+        for (bin_walk walk = walk_bins(region, &dd, p[2 * i], p[2 * i + 1], SPACING * radius[i]); next_bin(&walk);) {
             if (dd.n == dd.cap) {
                 dd.cap = dd.cap ? 2 * dd.cap : 1024;
                 dd.node = bt_realloc(dd.node, (size_t)dd.cap, sizeof *dd.node);
             }
             dd.node[dd.n].i = i;
-            dd.node[dd.n].next = dd.head[w.bin];
-            dd.head[w.bin] = dd.n++;
+            dd.node[dd.n].next = dd.head[walk.bin];
+            dd.head[walk.bin] = dd.n++;
         }
     }
     free(order);
@@ -312,39 +313,40 @@ static void place_seeds(const bt_region *y, bt_idx n, const double *radius, int6
 
 // ---- areas ----
 
-bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed)
+bt_tessellation bt_tessellation_tessellate(const bt_region *region, bt_idx n, const double *target, int64_t seed)
 {
     bt_tessellation cells = create(n);
-    double lx = y->x1 - y->x0, ly = y->y1 - y->y0, wanted = 0;
+    double lx = region->x1 - region->x0, ly = region->y1 - region->y0, wanted = 0;
     for (bt_idx i = 0; i < n; i++) wanted += target[i];
-    double share = y->ice_area / wanted; // cells fill the region
+    double share = region->ice_area / wanted; // cells fill the region
     double *radius = bt_alloc((size_t)n, sizeof *radius);
     for (bt_idx i = 0; i < n; i++) {
         cells.target[i] = target[i];
         radius[i] = sqrt(target[i] * share / BT_PI);
     }
 
-    diagram g = {.region = y, .n = n};
-    g.p = bt_alloc(2 * (size_t)n, sizeof *g.p);
-    g.w = bt_alloc((size_t)n, sizeof *g.w);
-    place_seeds(y, n, radius, seed, g.p);
-    for (bt_idx i = 0; i < n; i++) g.w[i] = radius[i] * radius[i];
+    diagram tiling = {.region = region, .n = n};
+    tiling.p = bt_alloc(2 * (size_t)n, sizeof *tiling.p);
+    tiling.w = bt_alloc((size_t)n, sizeof *tiling.w);
+    place_seeds(region, n, radius, seed, tiling.p);
+    for (bt_idx i = 0; i < n; i++) tiling.w[i] = radius[i] * radius[i];
     double bin = sqrt(2 * lx * ly / n); // two seeds a bin
-    g.nx = (int)bt_max(1, floor(lx / bin));
-    g.ny = (int)bt_max(1, floor(ly / bin));
-    g.bx = lx / g.nx;
-    g.by = ly / g.ny;
-    g.first = bt_alloc((size_t)g.nx * (size_t)g.ny + 1, sizeof *g.first);
-    g.member = bt_alloc((size_t)n, sizeof *g.member);
+    tiling.nx = (int)bt_max(1, floor(lx / bin));
+    tiling.ny = (int)bt_max(1, floor(ly / bin));
+    tiling.bx = lx / tiling.nx;
+    tiling.by = ly / tiling.ny;
+    tiling.first = bt_alloc((size_t)tiling.nx * (size_t)tiling.ny + 1, sizeof *tiling.first);
+    tiling.member = bt_alloc((size_t)n, sizeof *tiling.member);
 
     double *area = bt_alloc((size_t)n, sizeof *area), *next = bt_alloc(2 * (size_t)n, sizeof *next);
     for (int round = 0; round < ROUNDS; round++) {
-        sort_into_bins(&g);
+        sort_into_bins(&tiling);
 #pragma omp parallel for schedule(dynamic, 256) if (BT_MANY(n, 2000))
         for (bt_idx i = 0; i < n; i++) {
             double v[2 * 2 * WORK];
-            int m = ice_cell(&g, i, v);
-            bt_moments mo = m >= 3 ? bt_shape_centroid(m, v) : (bt_moments){.cx = g.p[2 * i], .cy = g.p[2 * i + 1]};
+            int m = ice_cell(&tiling, i, v);
+            bt_moments mo = m >= 3 ? bt_shape_centroid(m, v)
+                                   : (bt_moments){.cx = tiling.p[2 * i], .cy = tiling.p[2 * i + 1]};
             area[i] = mo.area;
             next[2 * i] = mo.cx;
             next[2 * i + 1] = mo.cy;
@@ -352,18 +354,18 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const d
         double sum = 0;
         for (bt_idx i = 0; i < n; i++) sum += area[i];
         for (bt_idx i = 0; i < n; i++) {
-            g.w[i] += STEP / BT_PI * (target[i] * sum / wanted - area[i]);
+            tiling.w[i] += STEP / BT_PI * (target[i] * sum / wanted - area[i]);
             if (round >= LLOYD) continue;
-            g.p[2 * i] = next[2 * i];
-            g.p[2 * i + 1] = next[2 * i + 1];
-            bt_region_wrap(y, &g.p[2 * i], &g.p[2 * i + 1]);
+            tiling.p[2 * i] = next[2 * i];
+            tiling.p[2 * i + 1] = next[2 * i + 1];
+            bt_region_wrap(region, &tiling.p[2 * i], &tiling.p[2 * i + 1]);
         }
     }
-    sort_into_bins(&g);
+    sort_into_bins(&tiling);
 #pragma omp parallel for schedule(dynamic, 256) if (BT_MANY(n, 2000))
     for (bt_idx i = 0; i < n; i++) {
         double v[2 * 2 * WORK];
-        int m = ice_cell(&g, i, v);
+        int m = ice_cell(&tiling, i, v);
         if (m < 3) continue;
         double full = bt_shape_centroid(m, v).area;
         m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI), BT_TESSELLATION_VERTICES);
@@ -375,9 +377,9 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const d
     free(radius);
     free(area);
     free(next);
-    free(g.p);
-    free(g.w);
-    free(g.first);
-    free(g.member);
+    free(tiling.p);
+    free(tiling.w);
+    free(tiling.first);
+    free(tiling.member);
     return cells;
 }

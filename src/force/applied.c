@@ -36,44 +36,46 @@ typedef struct slot {
 static slot *slots[BT_MAX_FORCE_LAWS]; // each stays where it is: the table of laws points into it
 static int n_slots;
 
-static void reserve(slot *s, int64_t n)
+static void reserve(slot *arrays, int64_t n)
 {
-    if (n <= s->cap) return;
+    if (n <= arrays->cap) return;
     const size_t cap = (size_t)n;
-    s->row = bt_realloc(s->row, cap, sizeof *s->row);
-    s->id = bt_realloc(s->id, cap, sizeof *s->id);
-    s->place = bt_realloc(s->place, cap, 3 * sizeof *s->place);
-    s->velocity = bt_realloc(s->velocity, cap, 3 * sizeof *s->velocity);
-    s->mass = bt_realloc(s->mass, cap, sizeof *s->mass);
-    s->inertia = bt_realloc(s->inertia, cap, sizeof *s->inertia);
-    s->load = bt_realloc(s->load, cap, BT_APPLIED_NUMBERS * sizeof *s->load);
-    s->cap = n;
+    arrays->row = bt_realloc(arrays->row, cap, sizeof *arrays->row);
+    arrays->id = bt_realloc(arrays->id, cap, sizeof *arrays->id);
+    arrays->place = bt_realloc(arrays->place, cap, 3 * sizeof *arrays->place);
+    arrays->velocity = bt_realloc(arrays->velocity, cap, 3 * sizeof *arrays->velocity);
+    arrays->mass = bt_realloc(arrays->mass, cap, sizeof *arrays->mass);
+    arrays->inertia = bt_realloc(arrays->inertia, cap, sizeof *arrays->inertia);
+    arrays->load = bt_realloc(arrays->load, cap, BT_APPLIED_NUMBERS * sizeof *arrays->load);
+    arrays->cap = n;
 }
 
 /// Rows of the bodies of this rank by their ids; returns their number.
-static int64_t list_bodies(slot *s, const bt_bodies *b)
+static int64_t list_bodies(slot *arrays, const bt_bodies *bodies)
 {
     int64_t n = 0;
-    for (bt_gid gid = 0; gid < b->n_global; gid++) {
-        const bt_idx i = b->index_of[gid];
-        s->row[gid] = i < 0 ? -1 : (bt_idx)n;
+    for (bt_gid gid = 0; gid < bodies->n_global; gid++) {
+        const bt_idx i = bodies->index_of[gid];
+        arrays->row[gid] = i < 0 ? -1 : (bt_idx)n;
         if (i < 0) continue;
-        s->id[n] = gid;
-        memcpy(s->place + 3 * n, (const double[]){b->pose[i].x, b->pose[i].y, b->pose[i].yaw}, 3 * sizeof(double));
-        memcpy(s->velocity + 3 * n, (const double[]){b->vel[i].x, b->vel[i].y, b->vel[i].w}, 3 * sizeof(double));
-        s->mass[n] = b->mass[i];
-        s->inertia[n] = b->inertia[i];
+        arrays->id[n] = gid;
+        memcpy(arrays->place + 3 * n, (const double[]){bodies->pose[i].x, bodies->pose[i].y, bodies->pose[i].yaw},
+               3 * sizeof(double));
+        memcpy(arrays->velocity + 3 * n, (const double[]){bodies->vel[i].x, bodies->vel[i].y, bodies->vel[i].w},
+               3 * sizeof(double));
+        arrays->mass[n] = bodies->mass[i];
+        arrays->inertia[n] = bodies->inertia[i];
         n++;
     }
-    memset(s->load, 0, (size_t)n * BT_APPLIED_NUMBERS * sizeof *s->load);
+    memset(arrays->load, 0, (size_t)n * BT_APPLIED_NUMBERS * sizeof *arrays->load);
     return n;
 }
 
 /// K must not be negative: g >= 0, and g gw >= gx² + gy², but for rounding.
-static const char *fault_of(const slot *s, int64_t n, double *acts)
+static const char *fault_of(const slot *arrays, int64_t n, double *acts)
 {
     for (int64_t k = 0; k < n; k++) {
-        const double *l = s->load + BT_APPLIED_NUMBERS * k;
+        const double *l = arrays->load + BT_APPLIED_NUMBERS * k;
         for (int j = 0; j < BT_APPLIED_NUMBERS; j++) {
             if (!isfinite(l[j])) return "a number that it has filled in is not finite";
             if (l[j] != 0) *acts = 1;
@@ -85,49 +87,50 @@ static const char *fault_of(const slot *s, int64_t n, double *acts)
     return NULL;
 }
 
-static const char *begin(const bt_world *w, double *own, void *context)
+static const char *begin(const bt_world *world, double *own, void *context)
 {
-    slot *s = context;
+    slot *arrays = context;
     own[ACTS] = 0;
-    s->of = NULL;
-    if (!s->force) return NULL; // alike on all ranks
-    reserve(s, w->bodies.n_global);
-    const bt_applied a = {
-        .n = list_bodies(s, &w->bodies),
-        .id = s->id, .place = s->place, .velocity = s->velocity, .mass = s->mass, .inertia = s->inertia,
-        .load = s->load,
-        .time = bt_load_time(w),
-        .dt = w->par.dt,
-        .water = {w->par.water_u, w->par.water_v},
-        .air = {w->par.air_u, w->par.air_v},
-        .towed = w->towed,
+    arrays->of = NULL;
+    if (!arrays->force) return NULL; // alike on all ranks
+    reserve(arrays, world->bodies.n_global);
+    const bt_applied applied = {
+        .n = list_bodies(arrays, &world->bodies),
+        .id = arrays->id, .place = arrays->place, .velocity = arrays->velocity, .mass = arrays->mass,
+        .inertia = arrays->inertia, .load = arrays->load,
+        .time = bt_load_time(world),
+        .dt = world->par.dt,
+        .water = {world->par.water_u, world->par.water_v},
+        .air = {world->par.air_u, world->par.air_v},
+        .towed = world->towed,
     };
-    const char *fault = s->force(&a, s->user) != 0 ? "its function has failed" : fault_of(s, a.n, &own[ACTS]);
-    bt_domain_maxima(w, &own[ACTS], 1); // what rests, and is so left out, is the same on any ranks
-    if (!fault) s->of = &w->bodies;
+    const char *fault = arrays->force(&applied, arrays->user) != 0 ? "its function has failed"
+                                                                   : fault_of(arrays, applied.n, &own[ACTS]);
+    bt_domain_maxima(world, &own[ACTS], 1); // what rests, and is so left out, is the same on any ranks
+    if (!fault) arrays->of = &world->bodies;
     return fault;
 }
 
-static void add(const bt_force_body *b, bt_load *l)
+static void add(const bt_force_body *body, bt_load *load)
 {
-    const slot *s = b->context;
-    if (b->own[ACTS] == 0 || s->of != b->all) return; // or a body that stands nowhere (step/window.c)
-    const double *x = s->load + BT_APPLIED_NUMBERS * s->row[b->all->gid[b->i]];
-    l->fx += x[BT_APPLIED_FX];
-    l->fy += x[BT_APPLIED_FY];
-    l->moment += x[BT_APPLIED_MOMENT];
-    l->g += x[BT_APPLIED_G];
-    l->gx += x[BT_APPLIED_GX];
-    l->gy += x[BT_APPLIED_GY];
-    l->gw += x[BT_APPLIED_GW];
-    l->jx += x[BT_APPLIED_JX];
-    l->jy += x[BT_APPLIED_JY];
-    l->jw += x[BT_APPLIED_JW];
+    const slot *arrays = body->context;
+    if (body->own[ACTS] == 0 || arrays->of != body->all) return; // or a body that stands nowhere (step/window.c)
+    const double *x = arrays->load + BT_APPLIED_NUMBERS * arrays->row[body->all->gid[body->i]];
+    load->fx += x[BT_APPLIED_FX];
+    load->fy += x[BT_APPLIED_FY];
+    load->moment += x[BT_APPLIED_MOMENT];
+    load->g += x[BT_APPLIED_G];
+    load->gx += x[BT_APPLIED_GX];
+    load->gy += x[BT_APPLIED_GY];
+    load->gw += x[BT_APPLIED_GW];
+    load->jx += x[BT_APPLIED_JX];
+    load->jy += x[BT_APPLIED_JY];
+    load->jw += x[BT_APPLIED_JW];
 }
 
-static bool rests(const bt_params *p, const double *own)
+static bool rests(const bt_params *par, const double *own)
 {
-    (void)p;
+    (void)par;
     return own[ACTS] == 0;
 }
 
@@ -164,22 +167,22 @@ static void copy_line(char *to, size_t room, const char *text)
 
 bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *force, void *user, bt_errors *err)
 {
-    slot *s = name ? find(name) : NULL;
-    if (!s) {
-        s = bt_alloc(1, sizeof *s);
-        snprintf(s->name, sizeof s->name, "%s", name ? name : "");
-        copy_line(s->doc, sizeof s->doc, doc ? doc : "");
-        s->law = (bt_force_law){
-            .name = s->name, .doc = s->doc, .rests = rests, .begin = begin, .add = add, .context = s};
-        const bool fits = !name || strlen(name) < sizeof s->name;
+    slot *arrays = name ? find(name) : NULL;
+    if (!arrays) {
+        arrays = bt_alloc(1, sizeof *arrays);
+        snprintf(arrays->name, sizeof arrays->name, "%s", name ? name : "");
+        copy_line(arrays->doc, sizeof arrays->doc, doc ? doc : "");
+        arrays->law = (bt_force_law){
+            .name = arrays->name, .doc = arrays->doc, .rests = rests, .begin = begin, .add = add, .context = arrays};
+        const bool fits = !name || strlen(name) < sizeof arrays->name;
         if (!fits) bt_errors_add(err, "force %s: the name is longer than %d letters", name, BT_MOST_LAW_NAME);
-        if (!fits || bt_force_register(&s->law, err) != BT_OK) {
-            free(s);
+        if (!fits || bt_force_register(&arrays->law, err) != BT_OK) {
+            free(arrays);
             return BT_ERR_USAGE;
         }
-        slots[n_slots++] = s;
+        slots[n_slots++] = arrays;
     }
-    s->force = force;
-    s->user = user;
+    arrays->force = force;
+    arrays->user = user;
     return BT_OK;
 }

@@ -22,8 +22,8 @@
 
 #include "bergtow/world.h"
 
-/// Free drift of body i in the water and wind of w->par, m/s. hold: along x, y it stays at rest (walls); the other
+/// Free drift of body i in the water and wind of world->par, m/s. hold: along x, y it stays at rest (walls); the other
 /// component balances. A body without any drag or damper does not drift: u = 0. False when the balance was not found.
-bool bt_drift_velocity(const bt_world *w, bt_idx i, const bool hold[2], double u[2]);
+bool bt_drift_velocity(const bt_world *world, bt_idx i, const bool hold[2], double u[2]);
 
 #endif

@@ -33,24 +33,24 @@
 typedef struct bt_environment bt_environment;
 
 /// Current and wind of a case, or NULL when neither changes with time: bt_params then says it all. Tables are copied.
-bt_environment *bt_environment_create(const bt_case *c);
-void bt_environment_free(bt_environment *e);
+bt_environment *bt_environment_create(const bt_case *input);
+void bt_environment_free(bt_environment *environment);
 
-/// At the start of a step: water, wind, balance and tilt of its middle into w->par; wakes what rested when they
+/// At the start of a step: water, wind, balance and tilt of its middle into world->par; wakes what rested when they
 /// changed. Does nothing without an environment.
-void bt_environment_begin(bt_world *w);
+void bt_environment_begin(bt_world *world);
 
-/// At the end of a step: displacement of the water, w->drift_x, w->drift_y.
-void bt_environment_advance(bt_world *w);
+/// At the end of a step: displacement of the water, world->drift_x, world->drift_y.
+void bt_environment_advance(bt_world *world);
 
 /// Current (water true) or wind of a case at time t, m/s.
-void bt_environment_at(const bt_case *c, bool water, double t, double v[2]);
+void bt_environment_at(const bt_case *input, bool water, double t, double v[2]);
 
 /// Mean of current or wind over the run, m/s.
-void bt_environment_mean(const bt_case *c, bool water, double v[2]);
+void bt_environment_mean(const bt_case *input, bool water, double v[2]);
 
 /// Does the current or the wind of a case change in time?
-bool bt_environment_changes(const bt_case *c);
+bool bt_environment_changes(const bt_case *input);
 
 
 #endif

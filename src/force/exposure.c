@@ -51,7 +51,10 @@ typedef struct surroundings {
 } surroundings;
 
 /// Farthest that ice shelters / its thickness, of the fluid with the higher edges.
-static double lee_reach(const bt_params *p) { return BT_EXPOSURE_REACH * p->lee * bt_max(p->draft, 1 - p->draft); }
+static double lee_reach(const bt_params *par)
+{
+    return BT_EXPOSURE_REACH * par->lee * bt_max(par->draft, 1 - par->draft);
+}
 
 // --- form drag -------------------------------------------------------------------------------------------------------
 
@@ -82,20 +85,20 @@ static void turn(const double along[2], double dx, double dy, int n, const doubl
 }
 
 /// Where the lines enter and leave a convex polygon that has been turned; INFINITY, −INFINITY of those that pass it by.
-static void cross(const lines *l, int n, const double *v, double in[LINES], double out[LINES])
+static void cross(const lines *rays, int n, const double *v, double in[LINES], double out[LINES])
 {
-    const double per_step = 1 / l->step;
+    const double per_step = 1 / rays->step;
     for (int k = 0; k < LINES; k++) in[k] = INFINITY, out[k] = -INFINITY;
     for (int e = 0; e < n; e++) {
         const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0);
         if (p[1] == q[1]) continue;
         const double low = bt_min(p[1], q[1]), high = bt_max(p[1], q[1]), slope = (q[0] - p[0]) / (q[1] - p[1]);
-        const double place = (low - l->from) * per_step - 0.5;
+        const double place = (low - rays->from) * per_step - 0.5;
         if (place > LINES - 1) continue;
         int k = place > 0 ? (int)place : 0;
         if (k < place) k++;
         for (; k < LINES; k++) {
-            const double at = l->from + (k + 0.5) * l->step;
+            const double at = rays->from + (k + 0.5) * rays->step;
             if (at > high) break;
             const double s = p[0] + (at - p[1]) * slope;
             in[k] = bt_min(in[k], s);
@@ -105,45 +108,48 @@ static void cross(const lines *l, int n, const double *v, double in[LINES], doub
 }
 
 /// Width of the convex hull of body i across the flow (vx, vy) that is not 0, m, and the lines.
-static double draw(const bt_bodies *b, bt_idx i, double vx, double vy, lines *l)
+static double draw(const bt_bodies *bodies, bt_idx i, double vx, double vy, lines *rays)
 {
-    const int n = bt_body_corners(b, i);
-    const bt_mark *mark = b->mark + b->offset[i];
+    const int n = bt_body_corners(bodies, i);
+    const bt_mark *mark = bodies->mark + bodies->offset[i];
     const double size = sqrt(vx * vx + vy * vy);
-    l->along[0] = vx / size, l->along[1] = vy / size;
+    rays->along[0] = vx / size, rays->along[1] = vy / size;
     double v[2 * BT_MAX_VERTICES], out[LINES];
     int m = 0;
     for (int k = 0; k < n; k++)
-        if (mark[k].next != k) turn(l->along, 0, 0, 1, b->outline + 2 * (b->offset[i] + k), v + 2 * m++);
+        if (mark[k].next != k) turn(rays->along, 0, 0, 1, bodies->outline + 2 * (bodies->offset[i] + k), v + 2 * m++);
     double low = INFINITY, high = -INFINITY;
     for (int k = 0; k < m; k++) low = bt_min(low, v[2 * k + 1]), high = bt_max(high, v[2 * k + 1]);
-    l->from = low;
-    l->step = (high - low) / LINES;
-    cross(l, m, v, l->enter, out);
-    l->first = INFINITY, l->last = -INFINITY;
-    for (int k = 0; k < LINES; k++) l->first = bt_min(l->first, l->enter[k]), l->last = bt_max(l->last, l->enter[k]);
+    rays->from = low;
+    rays->step = (high - low) / LINES;
+    cross(rays, m, v, rays->enter, out);
+    rays->first = INFINITY, rays->last = -INFINITY;
+    for (int k = 0; k < LINES; k++)
+        rays->first = bt_min(rays->first, rays->enter[k]), rays->last = bt_max(rays->last, rays->enter[k]);
     return high - low;
 }
 
 /// What a neighbour leaves of n fluids with the heights scale × h, on each line; thickness: of the floe that is looked
 /// at.
-static void cast(const bt_params *p, const lines *l, const neighbour *j, double thickness, int n, const double *scale,
-                 double shelter[][LINES])
+static void cast(const bt_params *par, const lines *rays, const neighbour *near, double thickness, int n,
+                 const double *scale, double shelter[][LINES])
 {
-    const bt_bodies *b = j->b;
-    const double r = b->radius[j->i], h = b->thickness[j->i], reach = lee_reach(p) * h;
-    const double s = l->along[0] * j->dx + l->along[1] * j->dy, t = l->along[0] * j->dy - l->along[1] * j->dx;
-    if (s - r >= l->last || l->first - s - r >= reach || t - r >= l->from + LINES * l->step || t + r <= l->from) return;
-    for (int part = bt_part_first(b, j->i); part >= 0; part = bt_part_next(b, j->i, part)) {
-        const int64_t first = b->offset[j->i] + part;
+    const bt_bodies *bodies = near->b;
+    const double r = bodies->radius[near->i], h = bodies->thickness[near->i], reach = lee_reach(par) * h;
+    const double s = rays->along[0] * near->dx + rays->along[1] * near->dy,
+                 t = rays->along[0] * near->dy - rays->along[1] * near->dx;
+    if (s - r >= rays->last || rays->first - s - r >= reach || t - r >= rays->from + LINES * rays->step ||
+        t + r <= rays->from) return;
+    for (int part = bt_part_first(bodies, near->i); part >= 0; part = bt_part_next(bodies, near->i, part)) {
+        const int64_t first = bodies->offset[near->i] + part;
         double v[2 * BT_MAX_VERTICES], in[LINES], out[LINES];
-        turn(l->along, j->dx, j->dy, b->mark[first].count, b->outline + 2 * first, v);
-        cross(l, b->mark[first].count, v, in, out);
+        turn(rays->along, near->dx, near->dy, bodies->mark[first].count, bodies->outline + 2 * first, v);
+        cross(rays, bodies->mark[first].count, v, in, out);
         for (int k = 0; k < LINES; k++) {
-            const double away = bt_max(0, l->enter[k] - out[k]);
-            if (!(in[k] < l->enter[k]) || away >= reach) continue;
+            const double away = bt_max(0, rays->enter[k] - out[k]);
+            if (!(in[k] < rays->enter[k]) || away >= reach) continue;
             for (int f = 0; f < n; f++) {
-                const double by = bt_min(1, h / thickness) * lee(away / (p->lee * scale[f] * h));
+                const double by = bt_min(1, h / thickness) * lee(away / (par->lee * scale[f] * h));
                 shelter[f][k] = bt_max(shelter[f][k], by);
             }
         }
@@ -151,13 +157,14 @@ static void cast(const bt_params *p, const lines *l, const neighbour *j, double 
 }
 
 /// Factors of n fluids that flow past floe i with the same velocity.
-static void edges(const bt_world *w, bt_idx i, const double v[2], const scratch *s, int n, const double *scale,
+static void edges(const bt_world *world, bt_idx i, const double v[2], const scratch *room, int n, const double *scale,
                   double factor[])
 {
-    lines l;
+    lines rays;
     double shelter[2][LINES] = {{0}};
-    draw(&w->bodies, i, v[0], v[1], &l);
-    for (size_t k = 0; k < s->n; k++) cast(&w->par, &l, &s->near[k], w->bodies.thickness[i], n, scale, shelter);
+    draw(&world->bodies, i, v[0], v[1], &rays);
+    for (size_t k = 0; k < room->n; k++)
+        cast(&world->par, &rays, &room->near[k], world->bodies.thickness[i], n, scale, shelter);
     for (int f = 0; f < n; f++) {
         double sum = 0;
         for (int k = 0; k < LINES; k++) sum += shelter[f][k];
@@ -167,10 +174,10 @@ static void edges(const bt_world *w, bt_idx i, const double v[2], const scratch 
 
 // --- skin drag -------------------------------------------------------------------------------------------------------
 
-static int outline_of(const neighbour *j, const double **v)
+static int outline_of(const neighbour *near, const double **v)
 {
-    *v = j->b->outline + 2 * j->b->offset[j->i];
-    return bt_body_corners(j->b, j->i);
+    *v = near->b->outline + 2 * near->b->offset[near->i];
+    return bt_body_corners(near->b, near->i);
 }
 
 /// Area that two convex outlines share, m²: what is left of b between the edges of a, one after the other.
@@ -235,17 +242,17 @@ static void sort(double *x, size_t n)
     }
 }
 
-static void put(scratch *s, double x)
+static void put(scratch *room, double x)
 {
-    if (s->n_numbers == s->cap_numbers) {
-        s->cap_numbers = s->cap_numbers ? 2 * s->cap_numbers : 64;
-        s->number = bt_realloc(s->number, s->cap_numbers, sizeof *s->number);
+    if (room->n_numbers == room->cap_numbers) {
+        room->cap_numbers = room->cap_numbers ? 2 * room->cap_numbers : 64;
+        room->number = bt_realloc(room->number, room->cap_numbers, sizeof *room->number);
     }
-    s->number[s->n_numbers++] = x;
+    room->number[room->n_numbers++] = x;
 }
 
 /// Ordinates at which edges of two outlines cross.
-static void add_crossings(const neighbour *a, const neighbour *b, scratch *s)
+static void add_crossings(const neighbour *a, const neighbour *b, scratch *room)
 {
     const double *v, *u, dx = b->dx - a->dx, dy = b->dy - a->dy;
     const int n = outline_of(a, &v), m = outline_of(b, &u);
@@ -256,22 +263,22 @@ static void add_crossings(const neighbour *a, const neighbour *b, scratch *s)
             const double d0 = ex * (f[1] + dy - p[1]) - ey * (f[0] + dx - p[0]),
                          d1 = ex * (g[1] + dy - p[1]) - ey * (g[0] + dx - p[0]);
             if ((d0 < 0) == (d1 < 0)) continue;
-            put(s, a->dy + f[1] + dy + d0 / (d0 - d1) * (g[1] - f[1]));
+            put(room, a->dy + f[1] + dy + d0 / (d0 - d1) * (g[1] - f[1]));
         }
     }
 }
 
 /// The line y = const in a convex outline: from x[0] to x[1]; false where it passes by.
-static bool chord(const neighbour *j, double y, double x[2])
+static bool chord(const neighbour *near, double y, double x[2])
 {
     const double *v;
-    const int n = outline_of(j, &v);
+    const int n = outline_of(near, &v);
     x[0] = INFINITY, x[1] = -INFINITY;
-    y -= j->dy;
+    y -= near->dy;
     for (int k = 0; k < n; k++) {
         const double *p = v + 2 * k, *q = v + 2 * (k + 1 < n ? k + 1 : 0);
         if ((p[1] < y) == (q[1] < y)) continue;
-        const double at = j->dx + p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0]);
+        const double at = near->dx + p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0]);
         x[0] = bt_min(x[0], at);
         x[1] = bt_max(x[1], at);
     }
@@ -306,49 +313,51 @@ static double seen_on(const neighbour *sheet, size_t m, double y, double *end, d
 }
 
 /// e of a floe, the first of m sheets.
-static double seen(const neighbour *sheet, size_t m, scratch *s)
+static double seen(const neighbour *sheet, size_t m, scratch *room)
 {
-    s->n_numbers = 0;
+    room->n_numbers = 0;
     for (size_t k = 0; k < m; k++) {
         const double *v;
         const int n = outline_of(&sheet[k], &v);
-        for (int c = 0; c < n; c++) put(s, sheet[k].dy + v[2 * c + 1]);
-        for (size_t j = 0; j < k; j++) add_crossings(&sheet[j], &sheet[k], s);
+        for (int c = 0; c < n; c++) put(room, sheet[k].dy + v[2 * c + 1]);
+        for (size_t j = 0; j < k; j++) add_crossings(&sheet[j], &sheet[k], room);
     }
-    const size_t n = s->n_numbers;
-    sort(s->number, n);
-    for (size_t k = 0; k < 2 * m; k++) put(s, 0);
+    const size_t n = room->n_numbers;
+    sort(room->number, n);
+    for (size_t k = 0; k < 2 * m; k++) put(room, 0);
     double area = 0, sum = 0;
     for (size_t k = 0; k + 1 < n; k++) {
-        const double high = s->number[k + 1] - s->number[k], y = s->number[k] + 0.5 * high;
+        const double high = room->number[k + 1] - room->number[k], y = room->number[k] + 0.5 * high;
         double own;
         if (!(high > 0)) continue;
-        sum += high * seen_on(sheet, m, y, s->number + n, &own);
+        sum += high * seen_on(sheet, m, y, room->number + n, &own);
         area += high * own;
     }
     return area > 0 ? bt_min(1, sum / area) : 1;
 }
 
 /// The sheets on and under floe i go to the front of the list, which loses its order.
-static double skin(const bt_world *w, bt_idx i, scratch *s)
+static double skin(const bt_world *world, bt_idx i, scratch *room)
 {
-    const bt_bodies *b = &w->bodies;
-    const double deck = 1 - w->par.draft;
+    const bt_bodies *bodies = &world->bodies;
+    const double deck = 1 - world->par.draft;
     size_t m = 0;
-    for (size_t k = 0; k < s->n; k++) {
-        const neighbour j = s->near[k];
-        const double r = b->radius[i] + j.b->radius[j.i];
-        if (j.dx * j.dx + j.dy * j.dy >= r * r || !bt_bodies_slide(b, i, j.b, j.i, w->towed, deck)) continue;
-        if (!within(b, i, j.b, j.i, j.dx, j.dy, w->par.slop) || !within(j.b, j.i, b, i, -j.dx, -j.dy, w->par.slop))
+    for (size_t k = 0; k < room->n; k++) {
+        const neighbour near = room->near[k];
+        const double r = bodies->radius[i] + near.b->radius[near.i];
+        if (near.dx * near.dx + near.dy * near.dy >= r * r ||
+            !bt_bodies_slide(bodies, i, near.b, near.i, world->towed, deck)) continue;
+        if (!within(bodies, i, near.b, near.i, near.dx, near.dy, world->par.slop) ||
+            !within(near.b, near.i, bodies, i, -near.dx, -near.dy, world->par.slop))
             continue;
-        s->near[k] = s->near[m];
-        s->near[m++] = j;
+        room->near[k] = room->near[m];
+        room->near[m++] = near;
     }
     if (m == 0) return 1;
     neighbour *sheet = bt_alloc(m + 1, sizeof *sheet);
-    sheet[0] = (neighbour){b, i, 0, 0};
+    sheet[0] = (neighbour){bodies, i, 0, 0};
     for (size_t j = 0; j < m; j++) { // by id: rounding follows the order
-        const neighbour at = s->near[j];
+        const neighbour at = room->near[j];
         size_t k = j + 1;
         for (; k > 1 && sheet[k - 1].b->gid[sheet[k - 1].i] > at.b->gid[at.i]; k--) sheet[k] = sheet[k - 1];
         sheet[k] = at;
@@ -357,8 +366,8 @@ static double skin(const bt_world *w, bt_idx i, scratch *s)
     for (size_t k = 2; k <= m; k++)
         for (size_t j = 1; j < k; j++) pile = pile || shared(&sheet[j], &sheet[k]) > 0;
     double e = 1;
-    for (size_t k = 1; k <= m && !pile; k++) e -= 0.5 * shared(sheet, &sheet[k]) / b->area[i];
-    if (pile) e = seen(sheet, m + 1, s);
+    for (size_t k = 1; k <= m && !pile; k++) e -= 0.5 * shared(sheet, &sheet[k]) / bodies->area[i];
+    if (pile) e = seen(sheet, m + 1, room);
     free(sheet);
     return bt_max(0, e);
 }
@@ -380,9 +389,10 @@ typedef struct region {
 
 static bt_idx floe_of(const quarter *q, bt_idx k) { return q->copy ? q->copy[k].i : k; }
 
-static double offset(const bt_world *w, const bt_pose *p, const double from[2], int axis)
+static double offset(const bt_world *world, const bt_pose *pose, const double from[2], int axis)
 {
-    return axis ? bt_nearest_image(p->y - from[1], w->par.period_y) : bt_nearest_image(p->x - from[0], w->par.period_x);
+    return axis ? bt_nearest_image(pose->y - from[1], world->par.period_y)
+                : bt_nearest_image(pose->x - from[0], world->par.period_x);
 }
 
 /// Does a box from low to high miss that of the region about a place?
@@ -392,19 +402,20 @@ static bool misses(const region *r, const double at[2], const double low[2], con
            high[1] < at[1] + r->low[1];
 }
 
-static void consider(const bt_world *w, bt_idx i, const region *r, const bt_bodies *b, bt_idx j, scratch *s)
+static void consider(const bt_world *world, bt_idx i, const region *r, const bt_bodies *bodies, bt_idx j, scratch *room)
 {
-    const double h = b->thickness[j], size = b->radius[j], reach = w->bodies.radius[i] + size + lee_reach(&w->par) * h,
-                 from[2] = {w->bodies.pose[i].x, w->bodies.pose[i].y},
-                 d[2] = {offset(w, &b->pose[j], from, 0), offset(w, &b->pose[j], from, 1)};
-    if (d[0] * d[0] + d[1] * d[1] >= reach * reach || !(h > 0) || b->gid[j] == w->bodies.gid[i]) return;
+    const double h = bodies->thickness[j], size = bodies->radius[j],
+                 reach = world->bodies.radius[i] + size + lee_reach(&world->par) * h,
+                 from[2] = {world->bodies.pose[i].x, world->bodies.pose[i].y},
+                 d[2] = {offset(world, &bodies->pose[j], from, 0), offset(world, &bodies->pose[j], from, 1)};
+    if (d[0] * d[0] + d[1] * d[1] >= reach * reach || !(h > 0) || bodies->gid[j] == world->bodies.gid[i]) return;
     const double low[2] = {d[0] - size, d[1] - size}, high[2] = {d[0] + size, d[1] + size};
     if (misses(r, (const double[]){0, 0}, low, high)) return;
-    if (s->n == s->cap) {
-        s->cap = s->cap ? 2 * s->cap : 32;
-        s->near = bt_realloc(s->near, s->cap, sizeof *s->near);
+    if (room->n == room->cap) {
+        room->cap = room->cap ? 2 * room->cap : 32;
+        room->near = bt_realloc(room->near, room->cap, sizeof *room->near);
     }
-    s->near[s->n++] = (neighbour){b, j, d[0], d[1]};
+    room->near[room->n++] = (neighbour){bodies, j, d[0], d[1]};
 }
 
 /// Columns (or rows) of cells within so many rings of c: the first, and how many. Around a period none comes twice.
@@ -436,26 +447,27 @@ static void find_copies(const surroundings *around, int32_t x, int32_t y, bt_idx
 }
 
 /// The quarters about cell k, of which [0, n) are returned; about its middle.
-static size_t quarters(const bt_world *w, const surroundings *around, bt_idx k, const double middle[2], scratch *s)
+static size_t quarters(const bt_world *world, const surroundings *around, bt_idx k, const double middle[2],
+                       scratch *room)
 {
-    const bt_cells *t = w->cells;
-    const bt_cell *cell = &t->cell[k];
+    const bt_cells *cells = world->cells;
+    const bt_cell *cell = &cells->cell[k];
     int32_t from[2];
-    const int32_t n_x = span(cell->x, around->rings[0], t->wrap_x, &from[0]),
-                  n_y = span(cell->y, around->rings[1], t->wrap_y, &from[1]);
-    const bool round[2] = {n_x == t->wrap_x, n_y == t->wrap_y}; // no box goes all around a period
+    const int32_t n_x = span(cell->x, around->rings[0], cells->wrap_x, &from[0]),
+                  n_y = span(cell->y, around->rings[1], cells->wrap_y, &from[1]);
+    const bool round[2] = {n_x == cells->wrap_x, n_y == cells->wrap_y}; // no box goes all around a period
     size_t n = 0;
-    if (s->cap_quarters < 2 * (size_t)n_x * (size_t)n_y) {
-        s->cap_quarters = 2 * (size_t)n_x * (size_t)n_y;
-        s->quarter = bt_realloc(s->quarter, s->cap_quarters, sizeof *s->quarter);
+    if (room->cap_quarters < 2 * (size_t)n_x * (size_t)n_y) {
+        room->cap_quarters = 2 * (size_t)n_x * (size_t)n_y;
+        room->quarter = bt_realloc(room->quarter, room->cap_quarters, sizeof *room->quarter);
     }
     for (int32_t c = 0; c < n_x * n_y; c++) {
         int32_t x = from[0] + c % n_x, y = from[1] + c / n_x;
-        if (t->wrap_x) x = bt_cells_wrapped(x, t->wrap_x);
-        if (t->wrap_y) y = bt_cells_wrapped(y, t->wrap_y);
-        const bt_idx held = bt_cells_at(t, x, y);
-        quarter q = {.b = &w->bodies};
-        if (held >= 0) q.first = t->cell[held].first, q.end = t->cell[held].end;
+        if (cells->wrap_x) x = bt_cells_wrapped(x, cells->wrap_x);
+        if (cells->wrap_y) y = bt_cells_wrapped(y, cells->wrap_y);
+        const bt_idx held = bt_cells_at(cells, x, y);
+        quarter q = {.b = &world->bodies};
+        if (held >= 0) q.first = cells->cell[held].first, q.end = cells->cell[held].end;
         for (int copies = 0; copies < 2; copies++) {
             if (copies) {
                 q.b = &around->copies, q.copy = around->sorted;
@@ -466,28 +478,28 @@ static size_t quarters(const bt_world *w, const surroundings *around, bt_idx k, 
             for (bt_idx j = q.first; j < q.end; j++) {
                 const bt_idx i = floe_of(&q, j);
                 for (int axis = 0; axis < 2; axis++) {
-                    const double d = round[axis] ? 0 : offset(w, &q.b->pose[i], middle, axis),
+                    const double d = round[axis] ? 0 : offset(world, &q.b->pose[i], middle, axis),
                                  size = round[axis] ? INFINITY : q.b->radius[i];
                     q.low[axis] = bt_min(q.low[axis], d - size);
                     q.high[axis] = bt_max(q.high[axis], d + size);
                 }
             }
-            s->quarter[n++] = q;
+            room->quarter[n++] = q;
         }
     }
     return n;
 }
 
 /// Where fluids that flow past floe i at v may come from: the circle about it, drawn out upstream by the farthest lee.
-static region upstream(const bt_world *w, bt_idx i, const double v[2][2])
+static region upstream(const bt_world *world, bt_idx i, const double v[2][2])
 {
-    const double r = w->bodies.radius[i];
+    const double r = world->bodies.radius[i];
     region of = {{-r, -r}, {r, r}};
     for (int f = 0; f < 2; f++)
         for (int axis = 0; axis < 2; axis++) {
             const double size = sqrt(v[f][0] * v[f][0] + v[f][1] * v[f][1]);
             if (!(size > 0)) continue;
-            const double way = -w->par.lee_reach * v[f][axis] / size;
+            const double way = -world->par.lee_reach * v[f][axis] / size;
             of.low[axis] = bt_min(of.low[axis], way - r);
             of.high[axis] = bt_max(of.high[axis], way + r);
         }
@@ -495,151 +507,154 @@ static region upstream(const bt_world *w, bt_idx i, const double v[2][2])
 }
 
 /// All floes that may shelter or cover floe i of a cell with n quarters about its middle.
-static void gather(const bt_world *w, const surroundings *around, bt_idx i, const double v[2][2],
-                   const double middle[2], size_t n, scratch *s)
+static void gather(const bt_world *world, const surroundings *around, bt_idx i, const double v[2][2],
+                   const double middle[2], size_t n, scratch *room)
 {
-    const bt_cells *t = w->cells;
-    const bt_bodies *b = &w->bodies;
-    const region r = upstream(w, i, v);
-    s->n = 0;
-    for (bt_idx j = b->large[i] ? 0 : t->n_in_cells; j < b->n; j++) consider(w, i, &r, b, j, s);
-    for (bt_idx j = 0; b->large[i] && j < around->copies.n; j++) consider(w, i, &r, &around->copies, j, s);
-    if (b->large[i]) return;
-    const double at[2] = {offset(w, &b->pose[i], middle, 0), offset(w, &b->pose[i], middle, 1)};
+    const bt_cells *cells = world->cells;
+    const bt_bodies *bodies = &world->bodies;
+    const region r = upstream(world, i, v);
+    room->n = 0;
+    for (bt_idx j = bodies->large[i] ? 0 : cells->n_in_cells; j < bodies->n; j++)
+        consider(world, i, &r, bodies, j, room);
+    for (bt_idx j = 0; bodies->large[i] && j < around->copies.n; j++) consider(world, i, &r, &around->copies, j, room);
+    if (bodies->large[i]) return;
+    const double at[2] = {offset(world, &bodies->pose[i], middle, 0), offset(world, &bodies->pose[i], middle, 1)};
     for (size_t k = 0; k < n; k++) {
-        const quarter *q = &s->quarter[k];
+        const quarter *q = &room->quarter[k];
         if (misses(&r, at, q->low, q->high)) continue;
-        for (bt_idx j = q->first; j < q->end; j++) consider(w, i, &r, q->b, floe_of(q, j), s);
+        for (bt_idx j = q->first; j < q->end; j++) consider(world, i, &r, q->b, floe_of(q, j), room);
     }
 }
 
 // --- floe by floe ----------------------------------------------------------------------------------------------------
 
-static void look_at(bt_world *w, const bt_idx i, const double v[2][2], scratch *s)
+static void look_at(bt_world *world, const bt_idx i, const double v[2][2], scratch *room)
 {
-    const bt_params *p = &w->par;
-    bt_bodies *b = &w->bodies;
-    bt_exposure *e = &b->exposure[i];
-    const double scale[2] = {p->draft, 1 - p->draft};
+    const bt_params *par = &world->par;
+    bt_bodies *bodies = &world->bodies;
+    bt_exposure *exposure = &bodies->exposure[i];
+    const double scale[2] = {par->draft, 1 - par->draft};
     double factor[2];
-    if (p->lee > 0 && v[0][0] == v[1][0] && v[0][1] == v[1][1]) {
-        edges(w, i, v[0], s, 2, scale, factor);
-        e->water_form = factor[0], e->air_form = factor[1];
-    } else if (p->lee > 0) {
-        if (v[0][0] != 0 || v[0][1] != 0) edges(w, i, v[0], s, 1, scale, &e->water_form);
-        if (v[1][0] != 0 || v[1][1] != 0) edges(w, i, v[1], s, 1, scale + 1, &e->air_form);
+    if (par->lee > 0 && v[0][0] == v[1][0] && v[0][1] == v[1][1]) {
+        edges(world, i, v[0], room, 2, scale, factor);
+        exposure->water_form = factor[0], exposure->air_form = factor[1];
+    } else if (par->lee > 0) {
+        if (v[0][0] != 0 || v[0][1] != 0) edges(world, i, v[0], room, 1, scale, &exposure->water_form);
+        if (v[1][0] != 0 || v[1][1] != 0) edges(world, i, v[1], room, 1, scale + 1, &exposure->air_form);
     }
-    if (p->covers) e->skin = skin(w, i, s);
+    if (par->covers) exposure->skin = skin(world, i, room);
 }
 
 /// Velocities of water and air past floe i, m/s; false where it is not looked at now: nothing flows past it, or slowly,
 /// or it is none of this rank.
-static bool flows(const bt_world *w, bt_idx i, double v[2][2])
+static bool flows(const bt_world *world, bt_idx i, double v[2][2])
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_params *p = &w->par;
-    v[0][0] = p->water_u - b->vel[i].x, v[0][1] = p->water_v - b->vel[i].y;
-    v[1][0] = p->air_u - b->vel[i].x, v[1][1] = p->air_v - b->vel[i].y;
+    const bt_bodies *bodies = &world->bodies;
+    const bt_params *par = &world->par;
+    v[0][0] = par->water_u - bodies->vel[i].x, v[0][1] = par->water_v - bodies->vel[i].y;
+    v[1][0] = par->air_u - bodies->vel[i].x, v[1][1] = par->air_v - bodies->vel[i].y;
     const double most = bt_max(v[0][0] * v[0][0] + v[0][1] * v[0][1], v[1][0] * v[1][0] + v[1][1] * v[1][1]);
-    const bool slow = most < p->exposure_slow * p->exposure_slow;
-    return b->motion[i] == BT_DYNAMIC && b->thickness[i] > 0 && bt_domain_owns(w, i) && most > 0 &&
-           !(slow && w->step / p->exposure_steps % SLOW != 0);
+    const bool slow = most < par->exposure_slow * par->exposure_slow;
+    return bodies->motion[i] == BT_DYNAMIC && bodies->thickness[i] > 0 && bt_domain_owns(world, i) && most > 0 &&
+           !(slow && world->step / par->exposure_steps % SLOW != 0);
 }
 
-static void look_cell(bt_world *w, bt_idx k, const void *around, bt_totals *none)
+static void look_cell(bt_world *world, bt_idx k, const void *around, bt_totals *none)
 {
     (void)none;
-    const bt_cells *t = w->cells;
-    const bt_cell *cell = &t->cell[k];
-    if (t->asleep[k] == BT_ASLEEP) return;
-    const double middle[2] = {t->x0 + (cell->x + 0.5) * t->side_x, t->y0 + (cell->y + 0.5) * t->side_y};
-    scratch s = {0};
+    const bt_cells *cells = world->cells;
+    const bt_cell *cell = &cells->cell[k];
+    if (cells->asleep[k] == BT_ASLEEP) return;
+    const double middle[2] = {cells->x0 + (cell->x + 0.5) * cells->side_x, cells->y0 + (cell->y + 0.5) * cells->side_y};
+    scratch room = {0};
     size_t n = 0;
     for (bt_idx i = cell->first; i < cell->end; i++) {
         double v[2][2];
-        if (!flows(w, i, v)) continue;
-        if (n == 0 && k < t->n - 1) n = quarters(w, around, k, middle, &s);
-        gather(w, around, i, (const double(*)[2])v, middle, n, &s);
-        look_at(w, i, (const double(*)[2])v, &s);
+        if (!flows(world, i, v)) continue;
+        if (n == 0 && k < cells->n - 1) n = quarters(world, around, k, middle, &room);
+        gather(world, around, i, (const double(*)[2])v, middle, n, &room);
+        look_at(world, i, (const double(*)[2])v, &room);
     }
-    free(s.near);
-    free(s.number);
-    free(s.quarter);
+    free(room.near);
+    free(room.number);
+    free(room.quarter);
 }
 
 /// Rings of cells that the floes near one of the middle cell stand in.
-static int rings_of(const bt_world *w, double side, int32_t wrap)
+static int rings_of(const bt_world *world, double side, int32_t wrap)
 {
-    const bt_cells *t = w->cells;
+    const bt_cells *cells = world->cells;
     if (wrap == 1) return 0;
-    return (int)bt_max(1, ceil((w->par.lee_reach + 2 * t->reach + 2 * t->allowance) / side));
+    return (int)bt_max(1, ceil((world->par.lee_reach + 2 * cells->reach + 2 * cells->allowance) / side));
 }
 
-void bt_exposure_look(bt_world *w)
+void bt_exposure_look(bt_world *world)
 {
-    const bt_cells *t = w->cells;
-    surroundings s = {.rings = {rings_of(w, t->side_x, t->wrap_x), rings_of(w, t->side_y, t->wrap_y)}};
-    bt_domain_around(w, s.rings, w->par.lee_reach, &s.copies);
+    const bt_cells *cells = world->cells;
+    surroundings s =
+        {.rings = {rings_of(world, cells->side_x, cells->wrap_x), rings_of(world, cells->side_y, cells->wrap_y)}};
+    bt_domain_around(world, s.rings, world->par.lee_reach, &s.copies);
     s.sorted = bt_alloc((size_t)s.copies.n, sizeof *s.sorted);
     for (bt_idx j = 0; j < s.copies.n; j++) s.sorted[j] = (placed){{s.copies.cell[j][0], s.copies.cell[j][1]}, j};
     if (s.copies.n > 0) qsort(s.sorted, (size_t)s.copies.n, sizeof *s.sorted, by_cell);
     bt_totals none = {0};
-    bt_phases_busy(w, look_cell, &s, &none);
-    bt_domain_share(w, (double *)w->bodies.exposure, sizeof(bt_exposure) / sizeof(double));
+    bt_phases_busy(world, look_cell, &s, &none);
+    bt_domain_share(world, (double *)world->bodies.exposure, sizeof(bt_exposure) / sizeof(double));
     free(s.sorted);
     bt_bodies_free(&s.copies);
 }
 
-void bt_exposure_begin(bt_world *w)
+void bt_exposure_begin(bt_world *world)
 {
-    if (w->par.exposure_steps > 0 && w->step % w->par.exposure_steps == 0) bt_exposure_look(w);
+    if (world->par.exposure_steps > 0 && world->step % world->par.exposure_steps == 0) bt_exposure_look(world);
 }
 
 // --- a field that begins ---------------------------------------------------------------------------------------------
 
-void bt_exposure_setup(bt_world *w, double speed)
+void bt_exposure_setup(bt_world *world, double speed)
 {
-    bt_params *p = &w->par;
-    const bt_bodies *b = &w->bodies;
+    bt_params *par = &world->par;
+    const bt_bodies *bodies = &world->bodies;
     double thickest = 0, sum = 0, n = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        thickest = bt_max(thickest, b->thickness[i]);
-        sum += b->thickness[i];
-        n += b->thickness[i] > 0;
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        thickest = bt_max(thickest, bodies->thickness[i]);
+        sum += bodies->thickness[i];
+        n += bodies->thickness[i] > 0;
     }
-    p->lee_reach = lee_reach(p) * thickest;
-    p->exposure_steps = 0;
-    if (n == 0 || !(p->lee > 0 || p->covers)) return;
-    p->exposure_slow = BT_EXPOSURE_SLOW * speed;
-    p->exposure_steps = (int64_t)bt_max(1, bt_min(1e6, round(BT_EXPOSURE_WAY * p->draft * sum / n / (speed * p->dt))));
+    par->lee_reach = lee_reach(par) * thickest;
+    par->exposure_steps = 0;
+    if (n == 0 || !(par->lee > 0 || par->covers)) return;
+    par->exposure_slow = BT_EXPOSURE_SLOW * speed;
+    par->exposure_steps =
+        (int64_t)bt_max(1, bt_min(1e6, round(BT_EXPOSURE_WAY * par->draft * sum / n / (speed * par->dt))));
 }
 
-bt_exposure bt_exposure_mean(const bt_world *w, bt_gid n_floes)
+bt_exposure bt_exposure_mean(const bt_world *world, bt_gid n_floes)
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_params *p = &w->par;
+    const bt_bodies *bodies = &world->bodies;
+    const bt_params *par = &world->par;
     double water = 0, air = 0, sheltered[2] = {0, 0};
     for (bt_gid g = 0; g < n_floes; g++) {
-        const bt_idx i = bt_world_index(w, g);
+        const bt_idx i = bt_world_index(world, g);
         if (i < 0) continue;
-        const double wx = p->water_u - b->vel[i].x, wy = p->water_v - b->vel[i].y, ax = p->air_u - b->vel[i].x,
-                     ay = p->air_v - b->vel[i].y;
-        lines l;
-        if (b->motion[i] != BT_DYNAMIC) continue;
-        const double in_water = wx == 0 && wy == 0 ? 0 : b->drag[i].water_form * draw(b, i, wx, wy, &l),
-                     in_air = ax == 0 && ay == 0 ? 0 : b->drag[i].air_form * draw(b, i, ax, ay, &l);
+        const double wx = par->water_u - bodies->vel[i].x, wy = par->water_v - bodies->vel[i].y,
+                     ax = par->air_u - bodies->vel[i].x, ay = par->air_v - bodies->vel[i].y;
+        lines rays;
+        if (bodies->motion[i] != BT_DYNAMIC) continue;
+        const double in_water = wx == 0 && wy == 0 ? 0 : bodies->drag[i].water_form * draw(bodies, i, wx, wy, &rays),
+                     in_air = ax == 0 && ay == 0 ? 0 : bodies->drag[i].air_form * draw(bodies, i, ax, ay, &rays);
         water += in_water;
         air += in_air;
-        sheltered[0] += in_water * b->exposure[i].water_form;
-        sheltered[1] += in_air * b->exposure[i].air_form;
+        sheltered[0] += in_water * bodies->exposure[i].water_form;
+        sheltered[1] += in_air * bodies->exposure[i].air_form;
     }
     return (bt_exposure){1, water > 0 ? sheltered[0] / water : 1, air > 0 ? sheltered[1] / air : 1};
 }
 
-bt_exposure bt_exposure_estimate(const bt_params *p, double size, double thickness, double concentration)
+bt_exposure bt_exposure_estimate(const bt_params *par, double size, double thickness, double concentration)
 {
-    if (!(p->lee > 0) || !(concentration > 0)) return bt_exposed;
+    if (!(par->lee > 0) || !(concentration > 0)) return bt_exposed;
     const double way = (1 - bt_min(1, concentration)) / concentration * BT_PI / 4 * size;
-    return (bt_exposure){1, way / (way + p->lee * p->draft * thickness),
-                         way / (way + p->lee * (1 - p->draft) * thickness)};
+    return (bt_exposure){1, way / (way + par->lee * par->draft * thickness),
+                         way / (way + par->lee * (1 - par->draft) * thickness)};
 }

@@ -55,22 +55,22 @@
 #define BT_EXPOSURE_REACH 4.5 ///< farthest that a floe shelters / λH, assumed
 
 /// How often, and how far floes look: for a world with all its floes, whose par has lee, draft and covers. speed: m/s.
-void bt_exposure_setup(bt_world *w, double speed);
+void bt_exposure_setup(bt_world *world, double speed);
 
 /// Collective. The factors of all floes past which a fluid flows, at the poses and velocities of now; labels must be
 /// those of now (cells.h).
-void bt_exposure_look(bt_world *w);
+void bt_exposure_look(bt_world *world);
 
 /// Collective. At the start of a step, with labels: looks when it is due.
-void bt_exposure_begin(bt_world *w);
+void bt_exposure_begin(bt_world *world);
 
 /// Factors of floes below id n_floes together, of a world that is not distributed: Σ f (form drag × width) / Σ (form
 /// drag × width); 1 where nothing flows. All have the whole of their skin.
-bt_exposure bt_exposure_mean(const bt_world *w, bt_gid n_floes);
+bt_exposure bt_exposure_mean(const bt_world *world, bt_gid n_floes);
 
 /// The same for floes of a mean diameter and thickness (m) at random at a concentration, before a field is there. With
 /// free ways at random, of mean ℓ = (1 − A)/A times the mean chord of a disc π/4 d, the mean of 1 − exp(−D/(λH)) is
 ///     f = ℓ/(ℓ + λH)
-bt_exposure bt_exposure_estimate(const bt_params *p, double size, double thickness, double concentration);
+bt_exposure bt_exposure_estimate(const bt_params *par, double size, double thickness, double concentration);
 
 #endif

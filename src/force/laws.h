@@ -11,15 +11,15 @@
 
 // --- drag ------------------------------------------------------------------------------------------------------------
 
-static inline void bt_add_water_drag(const bt_force_body *b, bt_load *l)
+static inline void bt_add_water_drag(const bt_force_body *body, bt_load *load)
 {
-    bt_load_stream(l, b->par->water_u, b->par->water_v, b->drag->water_skin * b->exposure->skin,
-                   b->drag->water_form * b->exposure->water_form);
+    bt_load_stream(load, body->par->water_u, body->par->water_v, body->drag->water_skin * body->exposure->skin,
+                   body->drag->water_form * body->exposure->water_form);
 }
 
-static inline bool bt_water_rests(const bt_params *p, const double *own)
+static inline bool bt_water_rests(const bt_params *par, const double *own)
 {
-    (void)p, (void)own;
+    (void)par, (void)own;
     return true;
 }
 
@@ -31,16 +31,16 @@ static const bt_force_law bt_law_water_drag = {
     .add = bt_add_water_drag,
 };
 
-static inline void bt_add_air_drag(const bt_force_body *b, bt_load *l)
+static inline void bt_add_air_drag(const bt_force_body *body, bt_load *load)
 {
-    bt_load_stream(l, b->par->air_u, b->par->air_v, b->drag->air_skin * b->exposure->skin,
-                   b->drag->air_form * b->exposure->air_form);
+    bt_load_stream(load, body->par->air_u, body->par->air_v, body->drag->air_skin * body->exposure->skin,
+                   body->drag->air_form * body->exposure->air_form);
 }
 
-static inline bool bt_air_rests(const bt_params *p, const double *own)
+static inline bool bt_air_rests(const bt_params *par, const double *own)
 {
     (void)own;
-    return p->air_u == p->water_u && p->air_v == p->water_v;
+    return par->air_u == par->water_u && par->air_v == par->water_v;
 }
 
 static const bt_force_law bt_law_air_drag = {
@@ -51,7 +51,10 @@ static const bt_force_law bt_law_air_drag = {
     .add = bt_add_air_drag,
 };
 
-static inline void bt_add_yaw_drag(const bt_force_body *b, bt_load *l) { l->yaw += b->drag->yaw * b->exposure->skin; }
+static inline void bt_add_yaw_drag(const bt_force_body *body, bt_load *load)
+{
+    load->yaw += body->drag->yaw * body->exposure->skin;
+}
 
 // One law for both fluids: what rests turns in neither, and the body has one coefficient.
 static const bt_force_law bt_law_yaw_drag = {
@@ -65,12 +68,12 @@ static const bt_force_law bt_law_yaw_drag = {
 
 // --- the rotating Earth and the slope of the sea ---------------------------------------------------------------------
 
-static inline void bt_add_coriolis(const bt_force_body *b, bt_load *l) { l->turn += b->par->coriolis; }
+static inline void bt_add_coriolis(const bt_force_body *body, bt_load *load) { load->turn += body->par->coriolis; }
 
-static inline bool bt_coriolis_rests(const bt_params *p, const double *own)
+static inline bool bt_coriolis_rests(const bt_params *par, const double *own)
 {
     (void)own;
-    return p->coriolis == 0 || (p->balance_u == p->water_u && p->balance_v == p->water_v);
+    return par->coriolis == 0 || (par->balance_u == par->water_u && par->balance_v == par->water_v);
 }
 
 static const bt_force_law bt_law_coriolis = {
@@ -80,20 +83,20 @@ static const bt_force_law bt_law_coriolis = {
     .add = bt_add_coriolis,
 };
 
-static inline void bt_add_tilt(const bt_force_body *b, bt_load *l)
+static inline void bt_add_tilt(const bt_force_body *body, bt_load *load)
 {
-    const bt_params *p = b->par;
-    const double push = p->dt * (p->tilt_moves_water ? 1 : b->share);
-    l->about_x += p->balance_u;
-    l->about_y += p->balance_v;
-    l->gain_x += push * p->tilt_ax;
-    l->gain_y += push * p->tilt_ay;
+    const bt_params *par = body->par;
+    const double push = par->dt * (par->tilt_moves_water ? 1 : body->share);
+    load->about_x += par->balance_u;
+    load->about_y += par->balance_v;
+    load->gain_x += push * par->tilt_ax;
+    load->gain_y += push * par->tilt_ay;
 }
 
-static inline bool bt_tilt_rests(const bt_params *p, const double *own)
+static inline bool bt_tilt_rests(const bt_params *par, const double *own)
 {
     (void)own;
-    return p->tilt_ax == 0 && p->tilt_ay == 0;
+    return par->tilt_ax == 0 && par->tilt_ay == 0;
 }
 
 static const bt_force_law bt_law_tilt = {

@@ -10,49 +10,50 @@
 #include "base/elementary.h"
 
 /// Middle of the step at hand, s.
-static inline double bt_load_time(const bt_world *w) { return ((double)w->step + 0.5) * w->par.dt; }
+static inline double bt_load_time(const bt_world *world) { return ((double)world->step + 0.5) * world->par.dt; }
 
 /// Streams are counted.
-static inline void bt_load_clear(bt_load *l)
+static inline void bt_load_clear(bt_load *load)
 {
-    l->turn = l->about_x = l->about_y = l->gain_x = l->gain_y = l->fx = l->fy = l->moment = l->yaw = 0;
-    l->g = l->gx = l->gy = l->gw = l->jx = l->jy = l->jw = 0;
-    l->n_streams = 0;
+    load->turn = load->about_x =
+        load->about_y = load->gain_x = load->gain_y = load->fx = load->fy = load->moment = load->yaw = 0;
+    load->g = load->gx = load->gy = load->gw = load->jx = load->jy = load->jw = 0;
+    load->n_streams = 0;
 }
 
 /// What law k adds to a body on which it acts.
-static inline void bt_load_add(const bt_forces *f, int k, bt_force_body *b, bt_load *l)
+static inline void bt_load_add(const bt_forces *forces, int k, bt_force_body *body, bt_load *load)
 {
     const bt_force_law *law = bt_force_laws[k];
-    if (law->towed_only && !b->towed) return;
-    b->own = f->own[k];
-    b->context = law->context;
-    law->add(b, l);
+    if (law->towed_only && !body->towed) return;
+    body->own = forces->own[k];
+    body->context = law->context;
+    law->add(body, load);
 }
 
 /// What all laws from `first` on add to a body.
-static inline void bt_load_fill(const bt_forces *f, int first, bt_force_body *b, bt_load *l)
+static inline void bt_load_fill(const bt_forces *forces, int first, bt_force_body *body, bt_load *load)
 {
-    for (int k = first; k < f->n; k++) bt_load_add(f, k, b, l);
+    for (int k = first; k < forces->n; k++) bt_load_add(forces, k, body, load);
 }
 
 /// Body i at velocity u as laws see it.
-static inline bt_force_body bt_load_body(const bt_world *w, bt_idx i, const bt_vel *u)
+static inline bt_force_body bt_load_body(const bt_world *world, bt_idx i, const bt_vel *u)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     return (bt_force_body){
-        .par = &w->par,
-        .drag = &b->drag[i],
-        .exposure = &b->exposure[i],
+        .par = &world->par,
+        .drag = &bodies->drag[i],
+        .exposure = &bodies->exposure[i],
         .vel = *u,
-        .time = bt_load_time(w),
-        .mass = b->mass[i],
-        .inertia = b->inertia[i],
-        .share = b->share[i],
-        .towed = b->gid[i] == w->towed,
-        .all = b,
+        .time = bt_load_time(world),
+        .mass = bodies->mass[i],
+        .inertia = bodies->inertia[i],
+        .share = bodies->share[i],
+        .towed = bodies->gid[i] == world->towed,
+        .all = bodies,
         .i = i,
-        .towed_at = w->forces->towed_at,
+        .towed_at = world->forces->towed_at,
     };
 }
 
@@ -63,28 +64,29 @@ typedef struct bt_turning {
 
 #define BT_TURNING_NONE {.c = 1}
 
-static inline void bt_turning_set(bt_turning *r, double angle)
+static inline void bt_turning_set(bt_turning *turning, double angle)
 {
-    if (r->angle == angle) return;
-    r->angle = angle;
-    bt_sincos(angle, &r->s, &r->c);
+    if (turning->angle == angle) return;
+    turning->angle = angle;
+    bt_sincos(angle, &turning->s, &turning->c);
 }
 
 /// U' = U_b + R (U − U_b) + gain + Δt F/M.
-static inline void bt_load_turn(const bt_load *l, const bt_turning *r, double dt, double m, double inertia, bt_vel *u)
+static inline void bt_load_turn(const bt_load *load, const bt_turning *turning, double dt, double m, double inertia,
+                                bt_vel *u)
 {
-    if (r->s != 0) {
-        const double x = u->x - l->about_x, y = u->y - l->about_y;
-        u->x = l->about_x + r->c * x - r->s * y;
-        u->y = l->about_y + r->s * x + r->c * y;
+    if (turning->s != 0) {
+        const double x = u->x - load->about_x, y = u->y - load->about_y;
+        u->x = load->about_x + turning->c * x - turning->s * y;
+        u->y = load->about_y + turning->s * x + turning->c * y;
     }
-    u->x += l->gain_x;
-    u->y += l->gain_y;
-    if (l->fx != 0 || l->fy != 0) {
-        u->x += dt * l->fx / m;
-        u->y += dt * l->fy / m;
+    u->x += load->gain_x;
+    u->y += load->gain_y;
+    if (load->fx != 0 || load->fy != 0) {
+        u->x += dt * load->fx / m;
+        u->y += dt * load->fy / m;
     }
-    if (l->moment != 0) u->w += dt * l->moment / inertia;
+    if (load->moment != 0) u->w += dt * load->moment / inertia;
 }
 
 /// All that is implicit as one linear force j − K (U, ω).
@@ -94,55 +96,59 @@ typedef struct bt_linear {
     double twist;
 } bt_linear;
 
-static inline bt_linear bt_load_linear(const bt_load *l, double w)
+static inline bt_linear bt_load_linear(const bt_load *load, double w)
 {
-    return (bt_linear){l->g, l->gx, l->gy, l->gw + l->yaw * fabs(w), l->jx, l->jy, l->jw, l->jw};
+    return (bt_linear){load->g, load->gx, load->gy, load->gw + load->yaw * fabs(w), load->jx, load->jy, load->jw,
+                       load->jw};
 }
 
 /// Skin drag of one fluid, k |v| v, v = U_ref − U of the size `slip`.
-static inline void bt_linear_add_skin(bt_linear *a, const bt_stream *s, double slip)
+static inline void bt_linear_add_skin(bt_linear *linear, const bt_stream *stream, double slip)
 {
-    const double g = s->skin * slip;
-    a->g += g;
-    a->jx += g * s->u;
-    a->jy += g * s->v;
+    const double g = stream->skin * slip;
+    linear->g += g;
+    linear->jx += g * stream->u;
+    linear->jy += g * stream->v;
 }
 
 /// Form drag of a stream along the convex hull of the outline of body i; rx, ry: U_ref − U, w: ω.
-void bt_linear_add_outline(const bt_bodies *b, bt_idx i, bt_stream s, double rx, double ry, double w, bt_linear *a);
+void bt_linear_add_outline(const bt_bodies *bodies, bt_idx i, bt_stream stream, double rx, double ry, double w,
+                           bt_linear *linear);
 
 /// Everything implicit that acts on body i at velocity u.
-static inline bt_linear bt_load_implicit(const bt_bodies *b, bt_idx i, const bt_load *l, const bt_vel *u)
+static inline bt_linear bt_load_implicit(const bt_bodies *bodies, bt_idx i, const bt_load *load, const bt_vel *u)
 {
-    bt_linear a = bt_load_linear(l, u->w);
-    for (int k = 0; k < l->n_streams; k++) {
-        const bt_stream *s = &l->stream[k];
-        const double rx = s->u - u->x, ry = s->v - u->y;
-        bt_linear_add_skin(&a, s, sqrt(rx * rx + ry * ry));
+    bt_linear linear = bt_load_linear(load, u->w);
+    for (int k = 0; k < load->n_streams; k++) {
+        const bt_stream *stream = &load->stream[k];
+        const double rx = stream->u - u->x, ry = stream->v - u->y;
+        bt_linear_add_skin(&linear, stream, sqrt(rx * rx + ry * ry));
     }
-    for (int k = 0; k < l->n_streams; k++) {
-        const bt_stream s = l->stream[k]; // a copy: the load itself stays in registers
-        const double rx = s.u - u->x, ry = s.v - u->y;
-        if (s.form != 0 && (rx != 0 || ry != 0 || u->w != 0)) bt_linear_add_outline(b, i, s, rx, ry, u->w, &a);
+    for (int k = 0; k < load->n_streams; k++) {
+        const bt_stream stream = load->stream[k]; // a copy: the load itself stays in registers
+        const double rx = stream.u - u->x, ry = stream.v - u->y;
+        if (stream.form != 0 && (rx != 0 || ry != 0 || u->w != 0))
+            bt_linear_add_outline(bodies, i, stream, rx, ry, u->w, &linear);
     }
-    return a;
+    return linear;
 }
 
 /// (M + Δt K) U* = M U' + Δt j; inv: of the diagonal of M + Δt K.
-static inline void bt_linear_take(const bt_linear *l, double dt, double m, double inertia, bt_inv inv, bt_vel *u)
+static inline void bt_linear_take(const bt_linear *linear, double dt, double m, double inertia, bt_inv inv, bt_vel *u)
 {
-    if (l->gx == 0 && l->gy == 0) { // no coupling
+    if (linear->gx == 0 && linear->gy == 0) { // no coupling
         // without drag exactly as it was: a floe that drifts with the water is at rest to the last bit
-        if (l->g > 0 || l->jx != 0 || l->jy != 0) {
-            u->x = (m * u->x + dt * l->jx) * inv.m;
-            u->y = (m * u->y + dt * l->jy) * inv.m;
+        if (linear->g > 0 || linear->jx != 0 || linear->jy != 0) {
+            u->x = (m * u->x + dt * linear->jx) * inv.m;
+            u->y = (m * u->y + dt * linear->jy) * inv.m;
         }
-        if (l->gw > 0 || l->twist != 0) u->w = (inertia * u->w + dt * l->twist) * inv.i;
+        if (linear->gw > 0 || linear->twist != 0) u->w = (inertia * u->w + dt * linear->twist) * inv.i;
         return;
     }
-    const double x = dt * l->gx, y = dt * l->gy, bx = m * u->x + dt * l->jx, by = m * u->y + dt * l->jy;
+    const double x = dt * linear->gx, y = dt * linear->gy, bx = m * u->x + dt * linear->jx,
+                 by = m * u->y + dt * linear->jy;
     // The last denominator is positive: (Σ g r)² <= Σ g Σ g r².
-    u->w = (inertia * u->w + dt * l->jw + (y * bx - x * by) * inv.m) / (1 / inv.i - (x * x + y * y) * inv.m);
+    u->w = (inertia * u->w + dt * linear->jw + (y * bx - x * by) * inv.m) / (1 / inv.i - (x * x + y * y) * inv.m);
     u->x = (bx + y * u->w) * inv.m;
     u->y = (by - x * u->w) * inv.m;
 }

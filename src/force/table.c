@@ -94,23 +94,23 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 
 bt_forces *bt_forces_create(void)
 {
-    bt_forces *f = bt_alloc(1, sizeof *f);
-    f->n = bt_n_force_laws;
-    f->n_series = bt_n_force_series;
-    f->towed_at[0] = f->towed_at[1] = NAN;
-    for (int k = 0; k < f->n; k++) f->acted[k] = !bt_force_laws[k]->begin;
-    return f;
+    bt_forces *forces = bt_alloc(1, sizeof *forces);
+    forces->n = bt_n_force_laws;
+    forces->n_series = bt_n_force_series;
+    forces->towed_at[0] = forces->towed_at[1] = NAN;
+    for (int k = 0; k < forces->n; k++) forces->acted[k] = !bt_force_laws[k]->begin;
+    return forces;
 }
 
-void bt_forces_free(bt_forces *f) { free(f); }
+void bt_forces_free(bt_forces *forces) { free(forces); }
 
-void bt_forces_leave_added(bt_forces *f) { f->n = BT_LISTED_LAWS; }
+void bt_forces_leave_added(bt_forces *forces) { forces->n = BT_LISTED_LAWS; }
 
-void bt_forces_setup(bt_world *w, const bt_case *c)
+void bt_forces_setup(bt_world *world, const bt_case *input)
 {
-    for (int k = 0; k < w->forces->n; k++) {
+    for (int k = 0; k < world->forces->n; k++) {
         const bt_force_law *law = bt_force_laws[k];
-        bt_keys_get(c, law->name, law->keys, law->n_keys, w->forces->own[k]);
-        if (law->setup) law->setup(c, w->forces->own[k]);
+        bt_keys_get(input, law->name, law->keys, law->n_keys, world->forces->own[k]);
+        if (law->setup) law->setup(input, world->forces->own[k]);
     }
 }

@@ -148,8 +148,8 @@ static double ear_quality(int m, const int *loop, int i, const double *v)
 
 typedef struct ring { int n, at[BT_MAX_VERTICES]; } ring;
 
-static int next_of(const ring *r, int k) { return r->at[k + 1 < r->n ? k + 1 : 0]; }
-static int before_of(const ring *r, int k) { return r->at[k > 0 ? k - 1 : r->n - 1]; }
+static int next_of(const ring *loop, int k) { return loop->at[k + 1 < loop->n ? k + 1 : 0]; }
+static int before_of(const ring *loop, int k) { return loop->at[k > 0 ? k - 1 : loop->n - 1]; }
 
 /// Join b to a along an edge that both have, if the result is convex there.
 static bool join(ring *a, const ring *b, const double *v)
@@ -173,9 +173,9 @@ static bool join(ring *a, const ring *b, const double *v)
     return false;
 }
 
-bool bt_outline_split(int n, const double *v, bt_parts *p)
+bool bt_outline_split(int n, const double *v, bt_parts *parts)
 {
-    *p = (bt_parts){0};
+    *parts = (bt_parts){0};
     ring *part = bt_alloc((size_t)n, sizeof *part);
     int loop[BT_MAX_VERTICES], m = n, n_parts = 0;
     for (int i = 0; i < n; i++) loop[i] = i;
@@ -209,8 +209,8 @@ bool bt_outline_split(int n, const double *v, bt_parts *p)
         const double area2 = bt_outline_area2(part[i].n, own);
         if (area2 <= SLIVER * whole) continue;
         sound = bt_shape_fault(part[i].n, own) == NULL;
-        p->count[p->n++] = part[i].n;
-        for (int k = 0; k < part[i].n; k++) p->corner[p->n_vertices++] = (uint8_t)part[i].at[k];
+        parts->count[parts->n++] = part[i].n;
+        for (int k = 0; k < part[i].n; k++) parts->corner[parts->n_vertices++] = (uint8_t)part[i].at[k];
         kept += area2;
     }
     free(part);

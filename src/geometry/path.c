@@ -7,23 +7,23 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static void add_leg(bt_path *p, bt_leg leg)
+static void add_leg(bt_path *path, bt_leg leg)
 {
-    if (p->n > 0) leg.way = p->leg[p->n - 1].way + p->leg[p->n - 1].length;
-    p->leg[p->n++] = leg;
+    if (path->n > 0) leg.way = path->leg[path->n - 1].way + path->leg[path->n - 1].length;
+    path->leg[path->n++] = leg;
 }
 
-bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, double radius, char why[200])
+bool bt_path_make(bt_path *path, double x, double y, int n, const double *points, double radius, char why[200])
 {
-    *p = (bt_path){.leg = bt_alloc(2 * (size_t)n + 1, sizeof *p->leg),
-                   .mark = bt_alloc((size_t)n + 1, sizeof *p->mark),
-                   .n_marks = n};
+    *path = (bt_path){.leg = bt_alloc(2 * (size_t)n + 1, sizeof *path->leg),
+                      .mark = bt_alloc((size_t)n + 1, sizeof *path->mark),
+                      .n_marks = n};
     double tx = 1, ty = 0, used = 0; // of the leg at hand: tangent, and what the corner behind has taken of it
     for (int k = 0; k < n; k++) {
         const double px = points[2 * k], py = points[2 * k + 1], far = bt_hypot(px - x, py - y);
         if (!(far > 0)) {
             snprintf(why, 200, "way-point %d is where the one before it (or the start) is; remove one of them", k + 1);
-            bt_path_free(p);
+            bt_path_free(path);
             return false;
         }
         tx = (px - x) / far, ty = (py - y) / far;
@@ -41,61 +41,61 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
                      "the course change of %.4g deg at way-point %d leaves no room for a turn of radius %.4g m on a "
                      "leg of %.4g m; lower tow.turn_radius or move the way-point",
                      fabs(angle) * 180 / BT_PI, k + 1, radius, far);
-            bt_path_free(p);
+            bt_path_free(path);
             return false;
         }
-        add_leg(p, (bt_leg){.length = far - used - cut, .x = x + used * tx, .y = y + used * ty, .tx = tx, .ty = ty});
-        p->mark[k] = p->leg[p->n - 1].way + p->leg[p->n - 1].length;
+        add_leg(path, (bt_leg){.length = far - used - cut, .x = x + used * tx, .y = y + used * ty, .tx = tx, .ty = ty});
+        path->mark[k] = path->leg[path->n - 1].way + path->leg[path->n - 1].length;
         if (cut > 0) {
             const double arc = radius * fabs(angle);
-            add_leg(p, (bt_leg){.length = arc,
-                                .x = px - cut * tx,
-                                .y = py - cut * ty,
-                                .tx = tx,
-                                .ty = ty,
-                                .turn = copysign(1 / radius, angle)});
-            p->mark[k] += 0.5 * arc;
+            add_leg(path, (bt_leg){.length = arc,
+                                   .x = px - cut * tx,
+                                   .y = py - cut * ty,
+                                   .tx = tx,
+                                   .ty = ty,
+                                   .turn = copysign(1 / radius, angle)});
+            path->mark[k] += 0.5 * arc;
         }
         used = cut;
         x = px, y = py;
     }
-    add_leg(p, (bt_leg){.length = INFINITY, .x = x, .y = y, .tx = tx, .ty = ty});
+    add_leg(path, (bt_leg){.length = INFINITY, .x = x, .y = y, .tx = tx, .ty = ty});
     return true;
 }
 
-static const bt_leg *leg_at(const bt_path *p, double way)
+static const bt_leg *leg_at(const bt_path *path, double way)
 {
     int k = 0;
-    while (k + 1 < p->n && way >= p->leg[k + 1].way) k++;
-    return &p->leg[k];
+    while (k + 1 < path->n && way >= path->leg[k + 1].way) k++;
+    return &path->leg[k];
 }
 
-void bt_leg_at(const bt_leg *l, double way, double at[2], double tangent[2])
+void bt_leg_at(const bt_leg *leg, double way, double at[2], double tangent[2])
 {
     double along = way, aside = 0, c = 1, d = 0;
-    if (l->turn != 0) {
-        c = bt_cos(way * l->turn), d = bt_sin(way * l->turn);
-        along = d / l->turn, aside = (1 - c) / l->turn;
+    if (leg->turn != 0) {
+        c = bt_cos(way * leg->turn), d = bt_sin(way * leg->turn);
+        along = d / leg->turn, aside = (1 - c) / leg->turn;
     }
-    at[0] = l->x + along * l->tx - aside * l->ty;
-    at[1] = l->y + along * l->ty + aside * l->tx;
-    tangent[0] = c * l->tx - d * l->ty;
-    tangent[1] = c * l->ty + d * l->tx;
+    at[0] = leg->x + along * leg->tx - aside * leg->ty;
+    at[1] = leg->y + along * leg->ty + aside * leg->tx;
+    tangent[0] = c * leg->tx - d * leg->ty;
+    tangent[1] = c * leg->ty + d * leg->tx;
 }
 
-void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2])
+void bt_path_at(const bt_path *path, double way, double at[2], double tangent[2])
 {
-    const bt_leg *l = leg_at(p, way);
-    bt_leg_at(l, way - l->way, at, tangent);
+    const bt_leg *leg = leg_at(path, way);
+    bt_leg_at(leg, way - leg->way, at, tangent);
 }
 
-double bt_path_near(const bt_path *p, double way, double x, double y)
+double bt_path_near(const bt_path *path, double way, double x, double y)
 {
     enum { STEPS = 8 };
     for (int k = 0; k < STEPS; k++) {
         double at[2], t[2];
-        bt_path_at(p, way, at, t);
-        const double along = (x - at[0]) * t[0] + (y - at[1]) * t[1], turn = leg_at(p, way)->turn;
+        bt_path_at(path, way, at, t);
+        const double along = (x - at[0]) * t[0] + (y - at[1]) * t[1], turn = leg_at(path, way)->turn;
         if (turn == 0) {
             way += along;
             continue;
@@ -107,9 +107,9 @@ double bt_path_near(const bt_path *p, double way, double x, double y)
     return way;
 }
 
-void bt_path_free(bt_path *p)
+void bt_path_free(bt_path *path)
 {
-    free(p->leg);
-    free(p->mark);
-    *p = (bt_path){0};
+    free(path->leg);
+    free(path->mark);
+    *path = (bt_path){0};
 }

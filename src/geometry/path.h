@@ -26,18 +26,18 @@ typedef struct bt_path {
 
 /// From (x, y) through points [n][2] with corners of this radius (0 = sharp). False, with the reason in why, when two
 /// points coincide, a rounded corner has no room on its legs, or turns back on itself.
-bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, double radius, char why[200]);
+bool bt_path_make(bt_path *path, double x, double y, int n, const double *points, double radius, char why[200]);
 
 /// Position and unit tangent after `way` m of a leg (before its start: backwards).
-void bt_leg_at(const bt_leg *l, double way, double at[2], double tangent[2]);
+void bt_leg_at(const bt_leg *leg, double way, double at[2], double tangent[2]);
 
 /// Position and unit tangent after `way` m of it (before the start: on the straight line backwards).
-void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2]);
+void bt_path_at(const bt_path *path, double way, double at[2], double tangent[2]);
 
 /// Way of the point of the path near to (x, y), sought from `way` on, forwards and backwards, by going along the
 /// tangent of a leg, or about the centre of an arc.
-double bt_path_near(const bt_path *p, double way, double x, double y);
+double bt_path_near(const bt_path *path, double way, double x, double y);
 
-void bt_path_free(bt_path *p);
+void bt_path_free(bt_path *path);
 
 #endif

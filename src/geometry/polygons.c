@@ -17,31 +17,31 @@ static double support(int n, const double *v, double nx, double ny)
     return h;
 }
 
-static void take(bt_apart *r, double along, double ha, double hb)
+static void take(bt_apart *apart, double along, double ha, double hb)
 {
-    r->gap = bt_max(r->gap, along - ha - hb);
-    if (ha + hb > 0) r->both = bt_max(r->both, along / (ha + hb));
-    if (ha > 0) r->first = bt_max(r->first, (along - hb) / ha);
+    apart->gap = bt_max(apart->gap, along - ha - hb);
+    if (ha + hb > 0) apart->both = bt_max(apart->both, along / (ha + hb));
+    if (ha > 0) apart->first = bt_max(apart->first, (along - hb) / ha);
 }
 
 bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx, double dy)
 {
-    bt_apart r = {-INFINITY, -INFINITY, -INFINITY};
+    bt_apart apart = {-INFINITY, -INFINITY, -INFINITY};
     for (int i = 0; i < na; i++) {
         const double *p = a + 2 * i, *q = a + 2 * (i + 1 < na ? i + 1 : 0);
         double nx = q[1] - p[1], ny = p[0] - q[0], l = sqrt(nx * nx + ny * ny);
         if (l == 0) continue;
         nx /= l, ny /= l;
-        take(&r, nx * dx + ny * dy, nx * p[0] + ny * p[1], support(nb, b, -nx, -ny));
+        take(&apart, nx * dx + ny * dy, nx * p[0] + ny * p[1], support(nb, b, -nx, -ny));
     }
     for (int i = 0; i < nb; i++) {
         const double *p = b + 2 * i, *q = b + 2 * (i + 1 < nb ? i + 1 : 0);
         double nx = q[1] - p[1], ny = p[0] - q[0], l = sqrt(nx * nx + ny * ny);
         if (l == 0) continue;
         nx /= l, ny /= l; // outward of b: n = −(nx, ny) points from a to b
-        take(&r, -(nx * dx + ny * dy), support(na, a, -nx, -ny), nx * p[0] + ny * p[1]);
+        take(&apart, -(nx * dx + ny * dy), support(na, a, -nx, -ny), nx * p[0] + ny * p[1]);
     }
-    return r;
+    return apart;
 }
 
 // --- motion ----------------------------------------------------------------------------------------------------------
@@ -60,13 +60,13 @@ bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx
 #define WITHIN 1.01 // times `near`: near enough
 enum { ROUNDS = 32 }; // after so many they count as meeting
 
-static void turn(const bt_moving *p, double t, double x, double y, double *out)
+static void turn(const bt_moving *moving, double t, double x, double y, double *out)
 {
     double s, c;
-    bt_sincos(p->rate * t, &s, &c);
-    for (int i = 0; i < p->n; i++) {
-        out[2 * i] = c * p->v[2 * i] - s * p->v[2 * i + 1] + x;
-        out[2 * i + 1] = s * p->v[2 * i] + c * p->v[2 * i + 1] + y;
+    bt_sincos(moving->rate * t, &s, &c);
+    for (int i = 0; i < moving->n; i++) {
+        out[2 * i] = c * moving->v[2 * i] - s * moving->v[2 * i + 1] + x;
+        out[2 * i + 1] = s * moving->v[2 * i] + c * moving->v[2 * i + 1] + y;
     }
 }
 
@@ -137,27 +137,27 @@ bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy
 
 typedef struct { double low[2], high[2]; } box;
 
-static box box_of(const bt_welded *o)
+static box box_of(const bt_welded *outline)
 {
-    box b = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
-    for (int i = 0; i < 2 * o->n; i++) {
-        b.low[i % 2] = bt_min(b.low[i % 2], o->v[i]);
-        b.high[i % 2] = bt_max(b.high[i % 2], o->v[i]);
+    box bounds = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    for (int i = 0; i < 2 * outline->n; i++) {
+        bounds.low[i % 2] = bt_min(bounds.low[i % 2], outline->v[i]);
+        bounds.high[i % 2] = bt_max(bounds.high[i % 2], outline->v[i]);
     }
-    return b;
+    return bounds;
 }
 
-/// The place on o, moved by (dx, dy), that x goes to. False: o is not within reach.
-static bool place_on(const bt_welded *o, double dx, double dy, double reach, double x[2])
+/// The place on `outline`, moved by (dx, dy), that x goes to. False: `outline` is not within reach.
+static bool place_on(const bt_welded *outline, double dx, double dy, double reach, double x[2])
 {
     double best = reach, to[2] = {0};
-    for (int i = 0; i < o->n; i++) {
-        const double px = o->v[2 * i] + dx, py = o->v[2 * i + 1] + dy, d = bt_hypot(x[0] - px, x[1] - py);
+    for (int i = 0; i < outline->n; i++) {
+        const double px = outline->v[2 * i] + dx, py = outline->v[2 * i + 1] + dy, d = bt_hypot(x[0] - px, x[1] - py);
         if (d <= best) best = d, to[0] = px, to[1] = py;
     }
     if (best == reach) { // no vertex is nearer
-        for (int i = 0; i < o->n; i++) {
-            const double *p = o->v + 2 * i, *q = o->v + 2 * (i + 1 < o->n ? i + 1 : 0);
+        for (int i = 0; i < outline->n; i++) {
+            const double *p = outline->v + 2 * i, *q = outline->v + 2 * (i + 1 < outline->n ? i + 1 : 0);
             const double ex = q[0] - p[0], ey = q[1] - p[1], rx = x[0] - p[0] - dx, ry = x[1] - p[1] - dy,
                          t = (rx * ex + ry * ey) / (ex * ex + ey * ey), d = bt_hypot(rx - t * ex, ry - t * ey);
             if (t < 0 || t > 1 || d >= best) continue;
@@ -169,18 +169,18 @@ static bool place_on(const bt_welded *o, double dx, double dy, double reach, dou
     return true;
 }
 
-static bool sound(const bt_welded *o, bool convex)
+static bool sound(const bt_welded *outline, bool convex)
 {
-    return !bt_outline_fault(o->n, o->v) && bt_outline_convex(o->n, o->v) == convex;
+    return !bt_outline_fault(outline->n, outline->v) && bt_outline_convex(outline->n, outline->v) == convex;
 }
 
-void bt_weld(int n, bt_welded *o, double reach, double period_x, double period_y)
+void bt_weld(int n, bt_welded *outline, double reach, double period_x, double period_y)
 {
     const int images_x = period_x > 0, images_y = period_y > 0;
-    box *b = bt_alloc((size_t)n, sizeof *b);
+    box *bounds = bt_alloc((size_t)n, sizeof *bounds);
     for (int i = 0; i < n; i++) {
-        bt_welded moved = o[i];
-        b[i] = box_of(&o[i]);
+        bt_welded moved = outline[i];
+        bounds[i] = box_of(&outline[i]);
         bool done[BT_MAX_VERTICES] = {false}, any = false;
         for (int j = 0; j < i; j++)
             for (int kx = -images_x; kx <= images_x; kx++)
@@ -188,12 +188,14 @@ void bt_weld(int n, bt_welded *o, double reach, double period_x, double period_y
                     const double d[2] = {kx * period_x, ky * period_y};
                     bool apart = false;
                     for (int a = 0; a < 2; a++)
-                        apart = apart || b[j].low[a] + d[a] > b[i].high[a] + reach ||
-                                b[j].high[a] + d[a] < b[i].low[a] - reach;
+                        apart = apart || bounds[j].low[a] + d[a] > bounds[i].high[a] + reach ||
+                                bounds[j].high[a] + d[a] < bounds[i].low[a] - reach;
                     for (int k = 0; k < moved.n && !apart; k++)
-                        if (!done[k]) any = (done[k] = place_on(&o[j], d[0], d[1], reach, moved.v + 2 * k)) || any;
+                        if (!done[k]) any = (done[k] = place_on(&outline[j], d[0], d[1], reach, moved.v + 2 * k)) ||
+                                            any;
                 }
-        if (any && sound(&moved, bt_outline_convex(o[i].n, o[i].v))) o[i] = moved, b[i] = box_of(&o[i]);
+        if (any && sound(&moved, bt_outline_convex(outline[i].n, outline[i].v)))
+            outline[i] = moved, bounds[i] = box_of(&outline[i]);
     }
-    free(b);
+    free(bounds);
 }

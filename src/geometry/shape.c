@@ -32,8 +32,8 @@ static double cubic_antiderivative(double h, double s)
 
 bt_moments bt_shape_centroid(int n, const double *v)
 {
-    bt_moments m = {0};
-    if (n < 1) return m;
+    bt_moments moments = {0};
+    if (n < 1) return moments;
     // Area and centroid relative to the first vertex, so that a polygon far from the origin loses no digits.
     double a2 = 0, sx = 0, sy = 0, mean_x = 0, mean_y = 0;
     for (int i = 0; i < n; i++) {
@@ -46,32 +46,33 @@ bt_moments bt_shape_centroid(int n, const double *v)
         mean_x += px / n;
         mean_y += py / n;
     }
-    m.area = a2 / 2;
+    moments.area = a2 / 2;
     // A polygon without area is a fault of the caller's data; the mean of the vertices keeps the answer finite.
-    m.cx = v[0] + (a2 != 0 ? sx / (3 * a2) : mean_x);
-    m.cy = v[1] + (a2 != 0 ? sy / (3 * a2) : mean_y);
-    return m;
+    moments.cx = v[0] + (a2 != 0 ? sx / (3 * a2) : mean_x);
+    moments.cy = v[1] + (a2 != 0 ? sy / (3 * a2) : mean_y);
+    return moments;
 }
 
 static bt_moments moments(int n, const double *v, bool cubic)
 {
-    bt_moments m = bt_shape_centroid(n, v);
-    if (n < 1) return m;
-    m.inradius = INFINITY;
+    bt_moments moments = bt_shape_centroid(n, v);
+    if (n < 1) return moments;
+    moments.inradius = INFINITY;
     for (int i = 0; i < n; i++) {
         int j = i + 1 < n ? i + 1 : 0;
-        double px = v[2 * i] - m.cx, py = v[2 * i + 1] - m.cy, qx = v[2 * j] - m.cx, qy = v[2 * j + 1] - m.cy;
-        m.radius = bt_max(m.radius, bt_hypot(px, py));
+        double px = v[2 * i] - moments.cx, py = v[2 * i + 1] - moments.cy, qx = v[2 * j] - moments.cx,
+               qy = v[2 * j + 1] - moments.cy;
+        moments.radius = bt_max(moments.radius, bt_hypot(px, py));
         double ex = qx - px, ey = qy - py, l = bt_hypot(ex, ey);
         if (l == 0) continue;
         double c = cross(px, py, qx, qy), h = c / l;
-        m.polar += c * (px * px + py * py + px * qx + py * qy + qx * qx + qy * qy) / 12;
+        moments.polar += c * (px * px + py * py + px * qx + py * qy + qx * qx + qy * qy) / 12;
         double sp = (px * ex + py * ey) / l, sq = (qx * ex + qy * ey) / l;
-        if (cubic) m.cubic += cubic_antiderivative(h, sq) - cubic_antiderivative(h, sp);
-        m.inradius = bt_min(m.inradius, h);
+        if (cubic) moments.cubic += cubic_antiderivative(h, sq) - cubic_antiderivative(h, sp);
+        moments.inradius = bt_min(moments.inradius, h);
     }
-    if (!isfinite(m.inradius)) m.inradius = 0;
-    return m;
+    if (!isfinite(moments.inradius)) moments.inradius = 0;
+    return moments;
 }
 
 bt_moments bt_shape_moments(int n, const double *v) { return moments(n, v, true); }
@@ -121,12 +122,12 @@ bool bt_shape_broken(int n, const double *v) { return fault_of(n, v, 1e-12, 1e-6
 
 bt_moments bt_shape_centre(int n, double *v)
 {
-    bt_moments m = bt_shape_extent(n, v);
+    bt_moments moments = bt_shape_extent(n, v);
     for (int i = 0; i < n; i++) {
-        v[2 * i] -= m.cx;
-        v[2 * i + 1] -= m.cy;
+        v[2 * i] -= moments.cx;
+        v[2 * i + 1] -= moments.cy;
     }
-    return m;
+    return moments;
 }
 
 double bt_shape_width(int n, const double *v, double ux, double uy)

@@ -14,8 +14,8 @@ typedef struct bt_collision {
     double ran, rbn;  ///< ra×n, rb×n of the pressure centre, m
 } bt_collision;
 
-/// Contact u with a normal impulse above 0, after the solve and before poses move.
-bt_collision bt_contact_collision(const bt_world *w, const bt_contact *u);
+/// The contact with a normal impulse above 0, after the solve and before poses move.
+bt_collision bt_contact_collision(const bt_world *world, const bt_contact *contact);
 
 typedef struct bt_contact_corner {
     double angle;     ///< interior, rad; NaN if there is none
@@ -23,7 +23,7 @@ typedef struct bt_contact_corner {
 } bt_contact_corner;
 
 /// The corner that makes a contact point of a pair of parts, by its feature as manifold.c numbers them.
-bt_contact_corner bt_contact_corner_of(const bt_bodies *b, const bt_contact *u, const uint16_t part[2],
+bt_contact_corner bt_contact_corner_of(const bt_bodies *bodies, const bt_contact *contact, const uint16_t part[2],
                                        uint32_t feature);
 
 #endif

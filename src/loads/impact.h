@@ -106,21 +106,21 @@ typedef struct bt_impacts {
     int64_t n_open;
 } bt_impacts;
 
-bt_impact_rule bt_impact_rule_of(const bt_case *c);
+bt_impact_rule bt_impact_rule_of(const bt_case *input);
 /// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
-void bt_impact_convert(const bt_impact_rule *r, bt_impact *e);
+void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact);
 
-/// For the towed body of world w; NULL when the case asks for none, or there is no body.
-bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w);
-void bt_impacts_free(bt_impacts *m);
+/// For the towed body of the world; NULL when the case asks for none, or there is no body.
+bt_impacts *bt_impacts_create(const bt_case *input, const bt_world *world);
+void bt_impacts_free(bt_impacts *impacts);
 
 /// Collective. Take the step just solved: after the solve and before poses move.
-void bt_impacts_take(bt_world *w);
+void bt_impacts_take(bt_world *world);
 
 /// The run is over: what is still open is closed as it is, into `closed`.
-void bt_impacts_end(bt_impacts *m);
+void bt_impacts_end(bt_impacts *impacts);
 
 /// What the conversion is, in words: "half-sine of 0.1 s".
-void bt_impact_describe(const bt_impact_rule *r, char out[160]);
+void bt_impact_describe(const bt_impact_rule *rule, char out[160]);
 
 #endif

@@ -10,23 +10,23 @@
 #include "base/elementary.h"
 #include "case/cost.h"
 
-static const double *vertex(const bt_panels *p, int i)
+static const double *vertex(const bt_panels *panels, int i)
 {
-    return p->outline + 2 * (i < p->n_vertices ? i : i - p->n_vertices);
+    return panels->outline + 2 * (i < panels->n_vertices ? i : i - panels->n_vertices);
 }
 
 /// Length along the waterline of the point nearest to (x, y), m.
-static double nearest(const bt_panels *p, double x, double y)
+static double nearest(const bt_panels *panels, double x, double y)
 {
     double best = INFINITY, at = 0;
-    for (int i = 0; i < p->n_vertices; i++) {
-        const double *a = vertex(p, i), *b = vertex(p, i + 1);
-        const double ex = b[0] - a[0], ey = b[1] - a[1], length = p->arc[i + 1] - p->arc[i];
+    for (int i = 0; i < panels->n_vertices; i++) {
+        const double *a = vertex(panels, i), *b = vertex(panels, i + 1);
+        const double ex = b[0] - a[0], ey = b[1] - a[1], length = panels->arc[i + 1] - panels->arc[i];
         const double t = bt_min(1, bt_max(0, ((x - a[0]) * ex + (y - a[1]) * ey) / (ex * ex + ey * ey)));
         const double dx = x - a[0] - t * ex, dy = y - a[1] - t * ey, d = dx * dx + dy * dy;
         if (d < best) {
             best = d;
-            at = p->arc[i] + t * length;
+            at = panels->arc[i] + t * length;
         }
     }
     return at;
@@ -34,58 +34,58 @@ static double nearest(const bt_panels *p, double x, double y)
 
 /// Where the ray along +x leaves the waterline: the centroid is inside and the outline convex, so one edge crosses it
 /// upwards.
-static double bow_of(const bt_panels *p)
+static double bow_of(const bt_panels *panels)
 {
-    for (int i = 0; i < p->n_vertices; i++) {
-        const double *a = vertex(p, i), *b = vertex(p, i + 1);
+    for (int i = 0; i < panels->n_vertices; i++) {
+        const double *a = vertex(panels, i), *b = vertex(panels, i + 1);
         if (!(a[1] <= 0 && b[1] > 0)) continue;
         const double t = -a[1] / (b[1] - a[1]);
-        if (a[0] + t * (b[0] - a[0]) > 0) return p->arc[i] + t * (p->arc[i + 1] - p->arc[i]);
+        if (a[0] + t * (b[0] - a[0]) > 0) return panels->arc[i] + t * (panels->arc[i + 1] - panels->arc[i]);
     }
     return 0;
 }
 
-void bt_panels_init(bt_panels *p, int n, int n_vertices, const double *outline)
+void bt_panels_init(bt_panels *panels, int n, int n_vertices, const double *outline)
 {
-    *p = (bt_panels){.n = n, .n_vertices = n_vertices};
-    p->outline = bt_alloc(2 * (size_t)n_vertices, sizeof *p->outline);
-    memcpy(p->outline, outline, 2 * (size_t)n_vertices * sizeof *p->outline);
-    p->arc = bt_alloc((size_t)n_vertices + 1, sizeof *p->arc);
+    *panels = (bt_panels){.n = n, .n_vertices = n_vertices};
+    panels->outline = bt_alloc(2 * (size_t)n_vertices, sizeof *panels->outline);
+    memcpy(panels->outline, outline, 2 * (size_t)n_vertices * sizeof *panels->outline);
+    panels->arc = bt_alloc((size_t)n_vertices + 1, sizeof *panels->arc);
     for (int i = 0; i < n_vertices; i++) {
-        const double *a = vertex(p, i), *b = vertex(p, i + 1);
-        p->arc[i + 1] = p->arc[i] + bt_hypot(b[0] - a[0], b[1] - a[1]);
+        const double *a = vertex(panels, i), *b = vertex(panels, i + 1);
+        panels->arc[i + 1] = panels->arc[i] + bt_hypot(b[0] - a[0], b[1] - a[1]);
     }
-    p->bow = bow_of(p);
-    p->panel = bt_alloc((size_t)n, sizeof *p->panel);
+    panels->bow = bow_of(panels);
+    panels->panel = bt_alloc((size_t)n, sizeof *panels->panel);
 }
 
-void bt_panels_free(bt_panels *p)
+void bt_panels_free(bt_panels *panels)
 {
-    free(p->outline);
-    free(p->arc);
-    free(p->panel);
-    *p = (bt_panels){0};
+    free(panels->outline);
+    free(panels->arc);
+    free(panels->panel);
+    *panels = (bt_panels){0};
 }
 
-int bt_panels_at(const bt_panels *p, double x, double y)
+int bt_panels_at(const bt_panels *panels, double x, double y)
 {
     // Half a panel before the bow begins panel 0.
-    const double around = p->arc[p->n_vertices];
-    double s = (nearest(p, x, y) - p->bow) / around * p->n + 0.5;
-    s -= p->n * floor(s / p->n);
+    const double around = panels->arc[panels->n_vertices];
+    double s = (nearest(panels, x, y) - panels->bow) / around * panels->n + 0.5;
+    s -= panels->n * floor(s / panels->n);
     const int k = (int)s;
-    return k < p->n ? k : 0;
+    return k < panels->n ? k : 0;
 }
 
-void bt_panels_point(const bt_panels *p, double s, double xy[2], double normal[2])
+void bt_panels_point(const bt_panels *panels, double s, double xy[2], double normal[2])
 {
-    const double around = p->arc[p->n_vertices];
-    double at = p->bow + (s - 0.5) / p->n * around;
+    const double around = panels->arc[panels->n_vertices];
+    double at = panels->bow + (s - 0.5) / panels->n * around;
     at -= around * floor(at / around);
     int i = 0;
-    while (i < p->n_vertices - 1 && p->arc[i + 1] <= at) i++;
-    const double *a = vertex(p, i), *b = vertex(p, i + 1), length = p->arc[i + 1] - p->arc[i],
-                 t = (at - p->arc[i]) / length;
+    while (i < panels->n_vertices - 1 && panels->arc[i + 1] <= at) i++;
+    const double *a = vertex(panels, i), *b = vertex(panels, i + 1), length = panels->arc[i + 1] - panels->arc[i],
+                 t = (at - panels->arc[i]) / length;
     xy[0] = a[0] + t * (b[0] - a[0]);
     xy[1] = a[1] + t * (b[1] - a[1]);
     if (!normal) return;
@@ -93,29 +93,29 @@ void bt_panels_point(const bt_panels *p, double s, double xy[2], double normal[2
     normal[1] = (a[0] - b[0]) / length;
 }
 
-void bt_panels_clear(bt_panels *p)
+void bt_panels_clear(bt_panels *panels)
 {
-    for (int k = 0; k < p->n; k++) p->panel[k].fx = p->panel[k].fy = p->panel[k].normal = 0;
+    for (int k = 0; k < panels->n; k++) panels->panel[k].fx = panels->panel[k].fy = panels->panel[k].normal = 0;
 }
 
-void bt_panels_load(bt_panels *p, double x, double y, double normal, double fx, double fy)
+void bt_panels_load(bt_panels *panels, double x, double y, double normal, double fx, double fy)
 {
-    bt_panel *k = &p->panel[bt_panels_at(p, x, y)];
-    k->normal += normal;
-    k->fx += fx;
-    k->fy += fy;
+    bt_panel *panel = &panels->panel[bt_panels_at(panels, x, y)];
+    panel->normal += normal;
+    panel->fx += fx;
+    panel->fy += fy;
 }
 
 // --- blocks of steps -------------------------------------------------------------------------------------------------
 
 _Static_assert(sizeof(bt_panel_loads) == BT_COST_PANEL_BYTES, "what check says of memory and disk counts them");
 
-static void add(bt_panel_loads *to, const bt_panel_loads *l)
+static void add(bt_panel_loads *to, const bt_panel_loads *loads)
 {
-    to->fx += l->fx;
-    to->fy += l->fy;
-    to->normal += l->normal;
-    to->most = bt_max(to->most, l->most);
+    to->fx += loads->fx;
+    to->fy += loads->fy;
+    to->normal += loads->normal;
+    to->most = bt_max(to->most, loads->most);
 }
 
 static int64_t blocks_after(int64_t steps)
@@ -124,13 +124,13 @@ static int64_t blocks_after(int64_t steps)
     return 1 + (steps + length - 1) / length;
 }
 
-int64_t bt_panel_blocks_rows(const bt_panel_blocks *b, int64_t steps) { return blocks_after(steps) * b->n; }
+int64_t bt_panel_blocks_rows(const bt_panel_blocks *blocks, int64_t steps) { return blocks_after(steps) * blocks->n; }
 
-static bt_panel_loads *row(const bt_panel_blocks *b, int64_t block) { return b->load + block * b->n; }
+static bt_panel_loads *row(const bt_panel_blocks *blocks, int64_t block) { return blocks->load + block * blocks->n; }
 
-static void clear(bt_panel_blocks *b, int64_t from, int64_t to)
+static void clear(bt_panel_blocks *blocks, int64_t from, int64_t to)
 {
-    memset(row(b, from), 0, (size_t)((to - from) * b->n) * sizeof *b->load);
+    memset(row(blocks, from), 0, (size_t)((to - from) * blocks->n) * sizeof *blocks->load);
 }
 
 /// Room for so many blocks at least; what is new bears no load.
@@ -143,47 +143,47 @@ static void reserve(bt_panel_blocks *b, int64_t blocks)
     clear(b, had, b->cap);
 }
 
-void bt_panel_blocks_init(bt_panel_blocks *b, int n)
+void bt_panel_blocks_init(bt_panel_blocks *blocks, int n)
 {
-    *b = (bt_panel_blocks){.n = n};
-    reserve(b, 1);
+    *blocks = (bt_panel_blocks){.n = n};
+    reserve(blocks, 1);
 }
 
-void bt_panel_blocks_free(bt_panel_blocks *b)
+void bt_panel_blocks_free(bt_panel_blocks *blocks)
 {
-    free(b->load);
-    *b = (bt_panel_blocks){0};
+    free(blocks->load);
+    *blocks = (bt_panel_blocks){0};
 }
 
-void bt_panel_blocks_restore(bt_panel_blocks *b, int64_t steps, bt_panel_loads *load)
+void bt_panel_blocks_restore(bt_panel_blocks *blocks, int64_t steps, bt_panel_loads *load)
 {
-    free(b->load);
-    b->steps = steps;
-    b->load = load;
-    b->cap = blocks_after(b->steps);
+    free(blocks->load);
+    blocks->steps = steps;
+    blocks->load = load;
+    blocks->cap = blocks_after(blocks->steps);
 }
 
 _Static_assert(BT_STATS_STARTS % 2 == 0, "full blocks go in pairs");
 
 /// Blocks 2k − 1 and 2k become block k.
-static void merge_pairs(bt_panel_blocks *b)
+static void merge_pairs(bt_panel_blocks *blocks)
 {
     for (int64_t to = 1; to <= BT_STATS_STARTS / 2; to++) {
-        memmove(row(b, to), row(b, 2 * to - 1), (size_t)b->n * sizeof *b->load);
-        for (int k = 0; k < b->n; k++) add(row(b, to) + k, row(b, 2 * to) + k);
+        memmove(row(blocks, to), row(blocks, 2 * to - 1), (size_t)blocks->n * sizeof *blocks->load);
+        for (int k = 0; k < blocks->n; k++) add(row(blocks, to) + k, row(blocks, 2 * to) + k);
     }
-    clear(b, 1 + BT_STATS_STARTS / 2, 1 + BT_STATS_STARTS);
+    clear(blocks, 1 + BT_STATS_STARTS / 2, 1 + BT_STATS_STARTS);
 }
 
-void bt_panel_blocks_add(bt_panel_blocks *b, const bt_panel *panel, bool early)
+void bt_panel_blocks_add(bt_panel_blocks *blocks, const bt_panel *panel, bool early)
 {
     if (!early) {
-        if (bt_stats_start_step(b->steps + 1) > bt_stats_start_step(b->steps)) merge_pairs(b);
-        b->steps++;
-        reserve(b, blocks_after(b->steps));
+        if (bt_stats_start_step(blocks->steps + 1) > bt_stats_start_step(blocks->steps)) merge_pairs(blocks);
+        blocks->steps++;
+        reserve(blocks, blocks_after(blocks->steps));
     }
-    bt_panel_loads *to = row(b, early ? 0 : blocks_after(b->steps) - 1);
-    for (int k = 0; k < b->n; k++)
+    bt_panel_loads *to = row(blocks, early ? 0 : blocks_after(blocks->steps) - 1);
+    for (int k = 0; k < blocks->n; k++)
         add(&to[k], &(bt_panel_loads){panel[k].fx, panel[k].fy, panel[k].normal, panel[k].normal});
 }
 

@@ -25,21 +25,21 @@ typedef struct bt_panels {
 } bt_panels;
 
 /// n panels on a waterline with the centroid at the origin; the outline is copied. Release with bt_panels_free.
-void bt_panels_init(bt_panels *p, int n, int n_vertices, const double *outline);
-void bt_panels_free(bt_panels *p);
+void bt_panels_init(bt_panels *panels, int n, int n_vertices, const double *outline);
+void bt_panels_free(bt_panels *panels);
 
 /// Panel of the point (x, y), m, body frame.
-int bt_panels_at(const bt_panels *p, double x, double y);
+int bt_panels_at(const bt_panels *panels, double x, double y);
 
 /// The point of the waterline at panel coordinate s (panel k reaches from s = k to k + 1), m; normal: outward there (or
 /// NULL).
-void bt_panels_point(const bt_panels *p, double s, double xy[2], double normal[2]);
+void bt_panels_point(const bt_panels *panels, double s, double xy[2], double normal[2]);
 
 /// Begin a step: no load.
-void bt_panels_clear(bt_panels *p);
+void bt_panels_clear(bt_panels *panels);
 
 /// A normal force (N) and the force vector (N, body frame) at a point.
-void bt_panels_load(bt_panels *p, double x, double y, double normal, double fx, double fy);
+void bt_panels_load(bt_panels *panels, double x, double y, double normal, double fx, double fy);
 
 // --- blocks of steps -------------------------------------------------------------------------------------------------
 
@@ -66,17 +66,17 @@ typedef struct bt_panel_blocks {
     int64_t cap;           ///< blocks there is room for
 } bt_panel_blocks;
 
-void bt_panel_blocks_init(bt_panel_blocks *b, int n);
-void bt_panel_blocks_free(bt_panel_blocks *b);
+void bt_panel_blocks_init(bt_panel_blocks *blocks, int n);
+void bt_panel_blocks_free(bt_panel_blocks *blocks);
 
 /// Rows of `load` after so many steps: a row a panel for each block, the early one included.
-int64_t bt_panel_blocks_rows(const bt_panel_blocks *b, int64_t steps);
+int64_t bt_panel_blocks_rows(const bt_panel_blocks *blocks, int64_t steps);
 
 /// Take the loads of a step. early: it ends before the earliest start.
-void bt_panel_blocks_add(bt_panel_blocks *b, const bt_panel *panel, bool early);
+void bt_panel_blocks_add(bt_panel_blocks *blocks, const bt_panel *panel, bool early);
 
 /// What was saved: `steps`, and load[bt_panel_blocks_rows], which is taken over.
-void bt_panel_blocks_restore(bt_panel_blocks *b, int64_t steps, bt_panel_loads *load);
+void bt_panel_blocks_restore(bt_panel_blocks *blocks, int64_t steps, bt_panel_loads *load);
 
 /// Into before[n] and within[n]: the steps before and in the window that begins `first` steps after the earliest start.
 /// first: a multiple of bt_stats_start_step(steps), or `steps`, where there is no window.

@@ -80,17 +80,17 @@ struct bt_snapshot;
     "checkpoint.damaged.h5" // a checkpoint.h5 that was refused, set aside when the next one was written
 #define BT_FAILURE_FILE "failure.h5"
 
-/// What is added to s from here on goes to dir/name.tmp at once; s is empty before, bt_snapshot_free ends it. What
-/// fails here or on the way, bt_checkpoint_write returns.
-void bt_checkpoint_begin(struct bt_snapshot *s, const char *dir, const char *name, bt_errors *err);
+/// What is added to `snap` from here on goes to dir/name.tmp at once; `snap` is empty before, bt_snapshot_free ends it.
+/// What fails here or on the way, bt_checkpoint_write returns.
+void bt_checkpoint_begin(struct bt_snapshot *snap, const char *dir, const char *name, bt_errors *err);
 /// dir/name from what has been added since bt_checkpoint_begin, a complete file or none. The one before is kept for
 /// checkpoint.h5. Errors: BT_ERR_IO.
-bt_status bt_checkpoint_write(struct bt_snapshot *s, const char *dir, const char *name, bt_errors *err);
+bt_status bt_checkpoint_write(struct bt_snapshot *snap, const char *dir, const char *name, bt_errors *err);
 
 /// Read dir/checkpoint.h5, or, if that is not there or refused, the one before it. *said: why the first was not taken,
 /// for the user, or NULL; the caller frees it, and *path, which must live as long as the snapshot. Errors: BT_ERR_IO,
 /// BT_ERR_CASE for what is refused.
-bt_status bt_checkpoint_read(struct bt_snapshot *s, const char *dir, char **path, char **said, bt_errors *err);
+bt_status bt_checkpoint_read(struct bt_snapshot *snap, const char *dir, char **path, char **said, bt_errors *err);
 
 /// Is there a checkpoint in dir?
 bool bt_checkpoint_there(const char *dir);

@@ -63,89 +63,90 @@ static bt_status check_problem(const char *path, const bt_fclib_problem *p, bt_e
 }
 
 /// A dataset and what it holds; axes, units and meaning as for bt_h5_describe.
-static void put(bt_h5 *h, const char *name, hid_t type, hsize_t n, hsize_t width, const void *data, const char *axes,
+static void put(bt_h5 *h5, const char *name, hid_t type, hsize_t n, hsize_t width, const void *data, const char *axes,
                 const char *units, const char *meaning)
 {
-    bt_h5_write(h, name, type, n, width, data);
-    bt_h5_describe(h, name, axes, units, meaning);
+    bt_h5_write(h5, name, type, n, width, data);
+    bt_h5_describe(h5, name, axes, units, meaning);
 }
 
-static void put_int(bt_h5 *h, const char *name, int value, const char *meaning)
+static void put_int(bt_h5 *h5, const char *name, int value, const char *meaning)
 {
-    put(h, name, H5T_NATIVE_INT, 1, 0, &value, "one", "1", meaning);
+    put(h5, name, H5T_NATIVE_INT, 1, 0, &value, "one", "1", meaning);
 }
 
-static void put_text(bt_h5 *h, const char *name, const char *text, const char *meaning)
+static void put_text(bt_h5 *h5, const char *name, const char *text, const char *meaning)
 {
-    bt_h5_write_text(h, name, text);
-    bt_h5_describe(h, name, NULL, NULL, meaning);
+    bt_h5_write_text(h5, name, text);
+    bt_h5_describe(h5, name, NULL, NULL, meaning);
 }
 
-static void put_rows(bt_h5 *h, const char *name, int m, const double *data, const char *units, const char *meaning)
+static void put_rows(bt_h5 *h5, const char *name, int m, const double *data, const char *units, const char *meaning)
 {
-    put(h, name, H5T_NATIVE_DOUBLE, (hsize_t)m, 0, data, "row", units, meaning);
+    put(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)m, 0, data, "row", units, meaning);
 }
 
-static void write_problem(bt_h5 *h, const bt_fclib_problem *x)
+static void write_problem(bt_h5 *h5, const bt_fclib_problem *x)
 {
     const int m = 2 * x->n;
     int32_t *rows = bt_alloc((size_t)m + 1, sizeof *rows);
     for (int i = 0; i <= m; i++) rows[i] = (int32_t)x->w_ptr[i];
-    bt_h5_group(h, "/fclib_local");
-    put_int(h, "/fclib_local/spacedim", 2, "dimensions of space");
-    bt_h5_group(h, "/fclib_local/W");
-    put_int(h, "/fclib_local/W/nzmax", rows[m], "entries of W");
-    put_int(h, "/fclib_local/W/m", m, "rows of W");
-    put_int(h, "/fclib_local/W/n", m, "columns of W");
-    put_int(h, "/fclib_local/W/nz", COMPRESSED_ROWS, "kind of storage: -2, compressed rows");
-    put(h, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
+    bt_h5_group(h5, "/fclib_local");
+    put_int(h5, "/fclib_local/spacedim", 2, "dimensions of space");
+    bt_h5_group(h5, "/fclib_local/W");
+    put_int(h5, "/fclib_local/W/nzmax", rows[m], "entries of W");
+    put_int(h5, "/fclib_local/W/m", m, "rows of W");
+    put_int(h5, "/fclib_local/W/n", m, "columns of W");
+    put_int(h5, "/fclib_local/W/nz", COMPRESSED_ROWS, "kind of storage: -2, compressed rows");
+    put(h5, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
         "row i has the entries p[i] up to p[i + 1]");
-    put(h, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1", "column of each entry");
-    put(h, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1", "entries of W");
-    bt_h5_group(h, "/fclib_local/vectors");
-    put_rows(h, "/fclib_local/vectors/q", m, x->q, "m/s", "velocities without impulses: u = W r + q");
-    put(h, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)x->n, 0, x->mu, "contact", "1", "friction");
+    put(h5, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1", "column of each entry");
+    put(h5, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1", "entries of W");
+    bt_h5_group(h5, "/fclib_local/vectors");
+    put_rows(h5, "/fclib_local/vectors/q", m, x->q, "m/s", "velocities without impulses: u = W r + q");
+    put(h5, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)x->n, 0, x->mu, "contact", "1", "friction");
     free(rows);
-    bt_h5_group(h, "/fclib_local/info");
-    put_text(h, "/fclib_local/info/title", x->title ? x->title : "", "title");
-    put_text(h, "/fclib_local/info/description", x->description ? x->description : "", "description");
-    put_text(h, "/fclib_local/info/math_info",
+    bt_h5_group(h5, "/fclib_local/info");
+    put_text(h5, "/fclib_local/info/title", x->title ? x->title : "", "title");
+    put_text(h5, "/fclib_local/info/description", x->description ? x->description : "", "description");
+    put_text(h5, "/fclib_local/info/math_info",
              "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent",
              "what the problem is");
 }
 
-static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
+static void write_places(bt_h5 *h5, const bt_fclib_places *places, hsize_t n)
 {
-    bt_h5_group(h, "/places");
-    bt_h5_attr_double(h, "/places", "time", p->time);
-    bt_h5_attr_double(h, "/places", "dt", p->dt);
-    put(h, "/places/body", H5T_NATIVE_INT64, n, 2, p->body, "contact pair", "1",
+    bt_h5_group(h5, "/places");
+    bt_h5_attr_double(h5, "/places", "time", places->time);
+    bt_h5_attr_double(h5, "/places", "dt", places->dt);
+    put(h5, "/places/body", H5T_NATIVE_INT64, n, 2, places->body, "contact pair", "1",
         "ids of the two bodies of each contact");
-    put(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal, "contact xy", "1",
+    put(h5, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, places->normal, "contact xy", "1",
         "from the first body to the second, world frame");
-    put(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever, "contact pair_xy", "m",
+    put(h5, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, places->lever, "contact pair_xy", "m",
         "from the centroid of the first and of the second body to the contact point, world frame, at the start of the "
         "step");
-    put(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose, "any_body component", "m, m, rad",
+    put(h5, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)places->n_bodies, 3, places->pose, "any_body component",
+        "m, m, rad",
         "x, y, yaw of every body at the end of the step, by id");
 }
 
 /// What the format does not know, and the solution.
-static void write_more(bt_h5 *h, const bt_fclib_problem *p)
+static void write_more(bt_h5 *h5, const bt_fclib_problem *p)
 {
     const hsize_t n = (hsize_t)p->n;
     if (p->bound)
-        put(h, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
+        put(h5, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
     if (p->disc)
-        put(h, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
+        put(h5, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
             "sheets: their impulse is the sum of a point of the disc of this radius and of a point of the line from "
             "-ends to ends; NaN: another contact");
-    if (p->ends) put_rows(h, "/ends", 2 * p->n, p->ends, "N s", "half of that line; 0 of other contacts");
-    if (p->places) write_places(h, p->places, n);
+    if (p->ends) put_rows(h5, "/ends", 2 * p->n, p->ends, "N s", "half of that line; 0 of other contacts");
+    if (p->places) write_places(h5, p->places, n);
     if (!p->r) return;
-    bt_h5_group(h, "/solution");
-    put_rows(h, "/solution/u", 2 * p->n, p->u, "m/s", "velocities of the solution");
-    put_rows(h, "/solution/r", 2 * p->n, p->r, "N s", "impulses of the solution");
+    bt_h5_group(h5, "/solution");
+    put_rows(h5, "/solution/u", 2 * p->n, p->u, "m/s", "velocities of the solution");
+    put_rows(h5, "/solution/r", 2 * p->n, p->r, "N s", "impulses of the solution");
 }
 
 bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors *err)
@@ -153,13 +154,13 @@ bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors 
     bt_status status = check_problem(path, p, err);
     if (status != BT_OK) return status;
     char *temporary = bt_text_of("%s.tmp", path);
-    bt_h5 h;
-    status = bt_h5_create(&h, temporary, err);
+    bt_h5 h5;
+    status = bt_h5_create(&h5, temporary, err);
     if (status == BT_OK) {
-        bt_h5_describe_file(&h, p->title ? p->title : "contact problem");
-        write_problem(&h, p);
-        write_more(&h, p);
-        status = bt_h5_close(&h);
+        bt_h5_describe_file(&h5, p->title ? p->title : "contact problem");
+        write_problem(&h5, p);
+        write_more(&h5, p);
+        status = bt_h5_close(&h5);
         if (status == BT_OK) status = bt_file_rename(temporary, path, err);
         if (status != BT_OK) unlink(temporary);
     }
@@ -203,61 +204,62 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
 }
 
 /// Sheets that lie on each other: rows along x and y, after the points of the pair.
-static row sheets_of(const bt_world *w, const bt_cell *t, bt_idx j)
+static row sheets_of(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
-    const bt_contact *u = &t->contacts[j];
-    const bt_limit *l = &t->laws.limits[j];
-    return (row){.gid_a = w->bodies.gid[u->a],
-                 .gid_b = w->bodies.gid[u->b],
+    const bt_contact *contact = &cell->contacts[j];
+    const bt_limit *limit = &cell->laws.limits[j];
+    return (row){.gid_a = world->bodies.gid[contact->a],
+                 .gid_b = world->bodies.gid[contact->b],
                  .point = 2,
-                 .a = u->a,
-                 .b = u->b,
-                 .nx = u->nx,
-                 .ny = u->ny,
-                 .ran = u->ran[0],
-                 .rbn = u->rbn[0],
-                 .rat = u->rat,
-                 .rbt = u->rbt,
-                 .ln = u->ln[0],
-                 .lt = u->lt,
+                 .a = contact->a,
+                 .b = contact->b,
+                 .nx = contact->nx,
+                 .ny = contact->ny,
+                 .ran = contact->ran[0],
+                 .rbn = contact->rbn[0],
+                 .rat = contact->rat,
+                 .rbt = contact->rbt,
+                 .ln = contact->ln[0],
+                 .lt = contact->lt,
                  .bound = INFINITY,
-                 .disc = l->flat[0],
-                 .ends = {l->ends[0], l->ends[1]}};
+                 .disc = limit->flat[0],
+                 .ends = {limit->ends[0], limit->ends[1]}};
 }
 
 /// Normal and tangential row of every contact point, in the order of the gids.
-static row *rows_of(const bt_world *w, int *n)
+static row *rows_of(const bt_world *world, int *n)
 {
-    const bt_cells *ts = w->cells;
+    const bt_cells *ts = world->cells;
     int64_t most = 0;
     for (bt_idx k = 0; k < ts->n; k++) most += ts->cell[k].n_points + ts->cell[k].n_contacts;
     row *rows = bt_alloc((size_t)most, sizeof *rows);
     *n = 0;
     for (bt_idx k = 0; k < ts->n; k++)
         for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
-            const bt_contact *u = &ts->cell[k].contacts[j];
-            const double total = u->ln[0] + u->ln[1];
+            const bt_contact *contact = &ts->cell[k].contacts[j];
+            const double total = contact->ln[0] + contact->ln[1];
             if (ts->cell[k].gaps[j].row == BT_ROW_RELEASED) continue; // the two pass each other
-            if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->cell[k], j);
-            for (int i = 0; i < u->n; i++) // one friction for both: distributed like the normal impulses
-                rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a],
-                                     .gid_b = w->bodies.gid[u->b],
+            if (contact->n == 0) rows[(*n)++] = sheets_of(world, &ts->cell[k], j);
+            for (int i = 0; i < contact->n; i++) // one friction for both: distributed like the normal impulses
+                rows[(*n)++] = (row){.gid_a = world->bodies.gid[contact->a],
+                                     .gid_b = world->bodies.gid[contact->b],
                                      .point = i,
-                                     .a = u->a,
-                                     .b = u->b,
-                                     .nx = u->nx,
-                                     .ny = u->ny,
-                                     .ran = u->ran[i],
-                                     .rbn = u->rbn[i],
-                                     .rat = u->rat,
-                                     .rbt = u->rbt,
-                                     .bias = u->bias[i],
-                                     .mu = u->mu,
-                                     .ln = u->ln[i],
-                                     .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
+                                     .a = contact->a,
+                                     .b = contact->b,
+                                     .nx = contact->nx,
+                                     .ny = contact->ny,
+                                     .ran = contact->ran[i],
+                                     .rbn = contact->rbn[i],
+                                     .rat = contact->rat,
+                                     .rbt = contact->rbt,
+                                     .bias = contact->bias[i],
+                                     .mu = contact->mu,
+                                     .ln = contact->ln[i],
+                                     .lt = total > 0 ? contact->lt * (contact->ln[i] / total) : 0,
                                      .disc = NAN,
                                      .bound = ts->cell[k].laws.limits
-                                                  ? bt_limit_bound(&ts->cell[k].laws.limits[j], u, i, w->bodies.vel)
+                                                  ? bt_limit_bound(&ts->cell[k].laws.limits[j], contact, i,
+                                                                   world->bodies.vel)
                                                   : INFINITY};
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
@@ -272,12 +274,12 @@ static void lever_of(double nx, double ny, double rn, double rt, double out[2])
 }
 
 /// Where the rows and all bodies are; the arrays belong to the caller afterwards.
-static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
+static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     int64_t *body = bt_alloc(2 * (size_t)n, sizeof *body);
     double *normal = bt_alloc(2 * (size_t)n, sizeof *normal), *lever = bt_alloc(4 * (size_t)n, sizeof *lever);
-    double *pose = bt_alloc(3 * (size_t)b->n_global, sizeof *pose);
+    double *pose = bt_alloc(3 * (size_t)bodies->n_global, sizeof *pose);
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
         body[2 * k] = p->gid_a, body[2 * k + 1] = p->gid_b;
@@ -285,17 +287,18 @@ static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
         lever_of(p->nx, p->ny, p->ran, p->rat, lever + 4 * k);
         lever_of(p->nx, p->ny, p->rbn, p->rbt, lever + 4 * k + 2);
     }
-    for (bt_gid g = 0; g < b->n_global; g++) {
-        const bt_idx i = bt_world_index(w, g);
-        const double at[3] = {i < 0 ? NAN : b->pose[i].x, i < 0 ? NAN : b->pose[i].y, i < 0 ? NAN : b->pose[i].yaw};
+    for (bt_gid g = 0; g < bodies->n_global; g++) {
+        const bt_idx i = bt_world_index(world, g);
+        const double at[3] = {i < 0 ? NAN : bodies->pose[i].x, i < 0 ? NAN : bodies->pose[i].y,
+                              i < 0 ? NAN : bodies->pose[i].yaw};
         memcpy(pose + 3 * g, at, sizeof at);
     }
-    return (bt_fclib_places){.time = (double)w->step * w->par.dt,
-                             .dt = w->par.dt,
+    return (bt_fclib_places){.time = (double)world->step * world->par.dt,
+                             .dt = world->par.dt,
                              .body = body,
                              .normal = normal,
                              .lever = lever,
-                             .n_bodies = (int64_t)b->n_global,
+                             .n_bodies = (int64_t)bodies->n_global,
                              .pose = pose};
 }
 
@@ -306,19 +309,19 @@ static int by_contact(const void *a, const void *b)
 }
 
 /// The contacts at each movable body: those of body i are at[first[i]] up to at[first[i + 1]].
-static incidence *incidences_of(const bt_bodies *b, const row *rows, int n, int64_t *first)
+static incidence *incidences_of(const bt_bodies *bodies, const row *rows, int n, int64_t *first)
 {
     for (int k = 0; k < n; k++) {
-        if (b->inv[rows[k].a].m > 0) first[rows[k].a + 1]++;
-        if (b->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
+        if (bodies->inv[rows[k].a].m > 0) first[rows[k].a + 1]++;
+        if (bodies->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
     }
-    for (bt_idx i = 0; i < b->n; i++) first[i + 1] += first[i];
-    incidence *at = bt_alloc((size_t)first[b->n], sizeof *at);
-    int64_t *next = bt_alloc((size_t)b->n, sizeof *next);
-    for (bt_idx i = 0; i < b->n; i++) next[i] = first[i];
+    for (bt_idx i = 0; i < bodies->n; i++) first[i + 1] += first[i];
+    incidence *at = bt_alloc((size_t)first[bodies->n], sizeof *at);
+    int64_t *next = bt_alloc((size_t)bodies->n, sizeof *next);
+    for (bt_idx i = 0; i < bodies->n; i++) next[i] = first[i];
     for (int k = 0; k < n; k++) {
-        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (incidence){k, -1};
-        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (incidence){k, 1};
+        if (bodies->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (incidence){k, -1};
+        if (bodies->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (incidence){k, 1};
     }
     free(next);
     return at;
@@ -332,69 +335,69 @@ typedef struct {
 } problem;
 
 /// most: blocks of W, at most.
-static problem problem_of(const bt_bodies *b, const row *rows, int n, int64_t most)
+static problem problem_of(const bt_bodies *bodies, const row *rows, int n, int64_t most)
 {
     const size_t m = (size_t)n;
-    problem x = {0};
-    x.ptr = bt_alloc(2 * m + 1, sizeof *x.ptr);
-    x.col = bt_alloc(4 * (size_t)most, sizeof *x.col);
-    x.val = bt_alloc(4 * (size_t)most, sizeof *x.val);
-    double **const two[] = {&x.q, &x.u, &x.r, &x.ends}, **const one[] = {&x.mu, &x.bound, &x.disc};
+    problem out = {0};
+    out.ptr = bt_alloc(2 * m + 1, sizeof *out.ptr);
+    out.col = bt_alloc(4 * (size_t)most, sizeof *out.col);
+    out.val = bt_alloc(4 * (size_t)most, sizeof *out.val);
+    double **const two[] = {&out.q, &out.u, &out.r, &out.ends}, **const one[] = {&out.mu, &out.bound, &out.disc};
     for (int i = 0; i < 4; i++) *two[i] = bt_alloc(2 * m, sizeof(double));
     for (int i = 0; i < 3; i++) *one[i] = bt_alloc(m, sizeof(double));
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
-        const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
+        const bt_vel *va = &bodies->vel[p->a], *vb = &bodies->vel[p->b];
         const double dx = vb->x - va->x, dy = vb->y - va->y;
-        x.u[2 * k] = p->nx * dx + p->ny * dy + p->rbn * vb->w - p->ran * va->w + p->bias;
-        x.u[2 * k + 1] = p->nx * dy - p->ny * dx + p->rbt * vb->w - p->rat * va->w;
-        x.r[2 * k] = p->ln;
-        x.r[2 * k + 1] = p->lt;
-        x.mu[k] = p->mu;
-        x.bound[k] = p->bound;
-        x.disc[k] = p->disc;
-        x.ends[2 * k] = p->ends[0], x.ends[2 * k + 1] = p->ends[1];
+        out.u[2 * k] = p->nx * dx + p->ny * dy + p->rbn * vb->w - p->ran * va->w + p->bias;
+        out.u[2 * k + 1] = p->nx * dy - p->ny * dx + p->rbt * vb->w - p->rat * va->w;
+        out.r[2 * k] = p->ln;
+        out.r[2 * k + 1] = p->lt;
+        out.mu[k] = p->mu;
+        out.bound[k] = p->bound;
+        out.disc[k] = p->disc;
+        out.ends[2 * k] = p->ends[0], out.ends[2 * k + 1] = p->ends[1];
     }
-    return x;
+    return out;
 }
 
 /// The two rows of W of contact k. near [m]: the contacts at its two bodies, in the order of the contacts.
-static void couple_all(problem *x, const bt_bodies *b, const row *rows, int k, const incidence *near, size_t m)
+static void couple_all(problem *out, const bt_bodies *bodies, const row *rows, int k, const incidence *near, size_t m)
 {
     const row *p = &rows[k];
     int64_t blocks = 0;
     for (size_t i = 0; i < m; i++) blocks += i == 0 || near[i].contact != near[i - 1].contact;
-    int64_t e0 = x->ptr[2 * k], e1 = e0 + 2 * blocks;
-    x->ptr[2 * k + 1] = e1;
-    x->ptr[2 * k + 2] = e1 + 2 * blocks;
+    int64_t e0 = out->ptr[2 * k], e1 = e0 + 2 * blocks;
+    out->ptr[2 * k + 1] = e1;
+    out->ptr[2 * k + 2] = e1 + 2 * blocks;
     for (size_t i = 0; i < m;) {
         const int o = near[i].contact;
         double block[4] = {0};
         for (; i < m && near[i].contact == o; i++) {
             const bt_idx body = near[i].side > 0 ? rows[o].b : rows[o].a;
-            couple(p, body == p->b ? 1 : -1, &rows[o], near[i].side, b->inv[body], block);
+            couple(p, body == p->b ? 1 : -1, &rows[o], near[i].side, bodies->inv[body], block);
         }
         for (int t = 0; t < 2; t++) {
-            x->col[e0] = x->col[e1] = 2 * o + t;
-            x->val[e0++] = block[t];
-            x->val[e1++] = block[2 + t];
+            out->col[e0] = out->col[e1] = 2 * o + t;
+            out->val[e0++] = block[t];
+            out->val[e1++] = block[2 + t];
         }
     }
 }
 
-bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
+bt_status bt_solver_dump(const bt_world *world, const char *path, bt_errors *err)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     int n;
-    row *rows = rows_of(w, &n);
-    int64_t *first = bt_alloc((size_t)b->n + 1, sizeof *first), most = 0, widest = 0;
-    incidence *at = incidences_of(b, rows, n, first);
+    row *rows = rows_of(world, &n);
+    int64_t *first = bt_alloc((size_t)bodies->n + 1, sizeof *first), most = 0, widest = 0;
+    incidence *at = incidences_of(bodies, rows, n, first);
     for (int k = 0; k < n; k++) {
         const int64_t m = first[rows[k].a + 1] - first[rows[k].a] + first[rows[k].b + 1] - first[rows[k].b];
         most += m;
         widest = m > widest ? m : widest;
     }
-    problem x = problem_of(b, rows, n, most);
+    problem x = problem_of(bodies, rows, n, most);
     incidence *near = bt_alloc((size_t)widest, sizeof *near);
     for (int k = 0; k < n; k++) {
         const bt_idx ends[2] = {rows[k].a, rows[k].b};
@@ -402,18 +405,18 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         for (int e = 0; e < 2; e++)
             for (int64_t i = first[ends[e]]; i < first[ends[e] + 1]; i++) near[m++] = at[i];
         if (m) qsort(near, m, sizeof *near, by_contact);
-        couple_all(&x, b, rows, k, near, m);
+        couple_all(&x, bodies, rows, k, near, m);
     }
     for (int i = 0; i < 2 * n; i++) {
         double wr = 0;
         for (int64_t e = x.ptr[i]; e < x.ptr[i + 1]; e++) wr += x.val[e] * x.r[x.col[e]];
         x.q[i] = x.u[i] - wr;
     }
-    const bt_fclib_places places = places_of(w, rows, n);
-    const bool rafts = bt_law_on(&w->par, BT_LAW_RAFTING);
+    const bt_fclib_places places = places_of(world, rows, n);
+    const bool rafts = bt_law_on(&world->par, BT_LAW_RAFTING);
     const bt_fclib_problem out = {
         .n = n, .w_ptr = x.ptr, .w_col = x.col, .w_val = x.val, .q = x.q, .mu = x.mu, .u = x.u, .r = x.r,
-        .bound = bt_laws_on(&w->par) ? x.bound : NULL, .disc = rafts ? x.disc : NULL,
+        .bound = bt_laws_on(&world->par) ? x.bound : NULL, .disc = rafts ? x.disc : NULL,
         .ends = rafts ? x.ends : NULL, .places = &places, .title = "bergtow",
         .description = "contact problem of one time step of broken sea ice, 2-D, with its solution"};
     const bt_status status = bt_fclib_write(path, &out, err);

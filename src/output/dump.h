@@ -6,6 +6,6 @@
 #include "bergtow/world.h"
 
 /// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.
-bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err);
+bt_status bt_solver_dump(const bt_world *world, const char *path, bt_errors *err);
 
 #endif

@@ -21,29 +21,29 @@ static void curve_points(double a[N_CURVE])
     }
 }
 
-static void curves(bt_json *j, const bt_estimate_input *in)
+static void curves(bt_json *json, const bt_estimate_input *in)
 {
     double a[N_CURVE], force[N_CURVE], range[BT_MAX_ESTIMATES][2];
     curve_points(a);
-    bt_json_open(j, "curves", '{');
-    bt_json_numbers(j, "concentration", N_CURVE, a);
+    bt_json_open(json, "curves", '{');
+    bt_json_numbers(json, "concentration", N_CURVE, a);
     for (int k = 0; k < bt_n_estimates(); k++) {
         range[k][0] = range[k][1] = NAN;
         for (int i = 0; i < N_CURVE; i++) {
             bt_estimate_input at = *in;
             at.concentration = a[i];
-            const bt_estimate e = bt_estimate_at(k, &at);
-            force[i] = e.force;
-            if (!e.valid || a[i] == 0) continue; // without ice all are
+            const bt_estimate estimate = bt_estimate_at(k, &at);
+            force[i] = estimate.force;
+            if (!estimate.valid || a[i] == 0) continue; // without ice all are
             if (isnan(range[k][0])) range[k][0] = a[i];
             range[k][1] = a[i];
         }
-        bt_json_numbers(j, bt_estimate_of(k)->name, N_CURVE, force);
+        bt_json_numbers(json, bt_estimate_of(k)->name, N_CURVE, force);
     }
-    bt_json_open(j, "valid_range", '{'); // of the concentration
-    for (int k = 0; k < bt_n_estimates(); k++) bt_json_numbers(j, bt_estimate_of(k)->name, 2, range[k]);
-    bt_json_close(j, '}');
-    bt_json_close(j, '}');
+    bt_json_open(json, "valid_range", '{'); // of the concentration
+    for (int k = 0; k < bt_n_estimates(); k++) bt_json_numbers(json, bt_estimate_of(k)->name, 2, range[k]);
+    bt_json_close(json, '}');
+    bt_json_close(json, '}');
 }
 
 /// One estimate and the conditions, as their tables see them.
@@ -93,26 +93,26 @@ const bt_json_key bt_condition_keys[] = {
 const int bt_n_condition_keys = sizeof bt_condition_keys / sizeof *bt_condition_keys;
 
 /// Simulated / estimate, NaN where there is none.
-static double ratio_of(const bt_estimate_def *d, const bt_estimate *e, double simulated)
+static double ratio_of(const bt_estimate_def *def, const bt_estimate *estimate, double simulated)
 {
-    return d->on_top || !(e->force > 0) ? NAN : simulated / e->force;
+    return def->on_top || !(estimate->force > 0) ? NAN : simulated / estimate->force;
 }
 
-void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated)
+void bt_estimates_json(bt_json *json, const char *key, const bt_estimate_input *in, double simulated)
 {
     const conditions_item conditions = {*in, bt_estimate_strength(in)};
-    bt_json_open(j, key, '{');
-    bt_json_keys_write(j, bt_condition_keys, bt_n_condition_keys, NULL, (const void *const[]){&conditions});
+    bt_json_open(json, key, '{');
+    bt_json_keys_write(json, bt_condition_keys, bt_n_condition_keys, NULL, (const void *const[]){&conditions});
     for (int k = 0; k < bt_n_estimates(); k++) {
-        const bt_estimate_def *d = bt_estimate_of(k);
-        const bt_estimate e = bt_estimate_at(k, in);
-        const estimate_item item = {e, ratio_of(d, &e, simulated), d->formula, d->source};
-        bt_json_open(j, d->name, '{');
-        bt_json_keys_write(j, bt_estimate_keys, bt_n_estimate_keys, NULL, (const void *const[]){&item});
-        bt_json_close(j, '}');
+        const bt_estimate_def *def = bt_estimate_of(k);
+        const bt_estimate estimate = bt_estimate_at(k, in);
+        const estimate_item item = {estimate, ratio_of(def, &estimate, simulated), def->formula, def->source};
+        bt_json_open(json, def->name, '{');
+        bt_json_keys_write(json, bt_estimate_keys, bt_n_estimate_keys, NULL, (const void *const[]){&item});
+        bt_json_close(json, '}');
     }
-    curves(j, in);
-    bt_json_close(j, '}');
+    curves(json, in);
+    bt_json_close(json, '}');
 }
 
 /// Does the formula know the size of floes? Asked of itself, in thin ice, where all have a value.
@@ -125,33 +125,33 @@ static bool uses_floe_size(int k, const bt_estimate_input *in)
     return isfinite(a) && isfinite(b) && a != b;
 }
 
-void bt_estimate_labels_json(bt_json *j, const char *key, const bt_estimate_input *in)
+void bt_estimate_labels_json(bt_json *json, const char *key, const bt_estimate_input *in)
 {
-    bt_json_open(j, key, '{');
+    bt_json_open(json, key, '{');
     for (int k = 0; k < bt_n_estimates(); k++) {
-        const bt_estimate_def *d = bt_estimate_of(k);
-        bt_json_open(j, d->name, '{');
-        bt_json_string(j, "label", d->label);
-        bt_json_string(j, "kind", bt_estimate_kind_name(d));
-        bt_json_bool(j, "uses_floe_size", uses_floe_size(k, in));
-        bt_json_close(j, '}');
+        const bt_estimate_def *def = bt_estimate_of(k);
+        bt_json_open(json, def->name, '{');
+        bt_json_string(json, "label", def->label);
+        bt_json_string(json, "kind", bt_estimate_kind_name(def));
+        bt_json_bool(json, "uses_floe_size", uses_floe_size(k, in));
+        bt_json_close(json, '}');
     }
-    bt_json_close(j, '}');
+    bt_json_close(json, '}');
 }
 
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full)
 {
     for (int k = 0; k < bt_n_estimates(); k++) {
-        const bt_estimate e = bt_estimate_at(k, in);
-        const double ratio = ratio_of(bt_estimate_of(k), &e, simulated);
+        const bt_estimate estimate = bt_estimate_at(k, in);
+        const double ratio = ratio_of(bt_estimate_of(k), &estimate, simulated);
         char force[32] = "no value", low[32], high[32];
-        if (isfinite(e.force)) bt_force_text(force, e.force);
+        if (isfinite(estimate.force)) bt_force_text(force, estimate.force);
         printf("%s%-22s %-12s", indent, bt_estimate_of(k)->label, force);
-        if (e.compares && isfinite(ratio)) printf(" %-9.3g", ratio);
+        if (estimate.compares && isfinite(ratio)) printf(" %-9.3g", ratio);
         else if (!isnan(simulated)) printf(" %-9s", "-");
-        printf(" %s%s", e.valid || bt_estimate_of(k)->note_tells ? "" : "not valid: ", e.note);
-        if (isfinite(e.force) && e.low != e.high)
-            printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
+        printf(" %s%s", estimate.valid || bt_estimate_of(k)->note_tells ? "" : "not valid: ", estimate.note);
+        if (isfinite(estimate.force) && estimate.low != estimate.high)
+            printf("; %s to %s", bt_force_text(low, estimate.low), bt_force_text(high, estimate.high));
         printf("\n");
         if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_of(k)->formula, indent, bt_estimate_of(k)->source);
     }

@@ -13,15 +13,15 @@ extern const int bt_n_condition_keys;
 
 /// An object "estimates": the conditions, one object an estimate, and curves over the concentration with all else kept.
 /// simulated: mean ice resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
-void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated);
+void bt_estimates_json(bt_json *json, const char *key, const bt_estimate_input *in, double simulated);
 
 /// An object "estimate_labels": of each estimate, in the order of the registry, its label, its kind, and whether its
 /// curve differs between fields of one case. For readers of the file, which know no estimate by name.
-void bt_estimate_labels_json(bt_json *j, const char *key, const bt_estimate_input *in);
+void bt_estimate_labels_json(bt_json *json, const char *key, const bt_estimate_input *in);
 
-static inline const char *bt_estimate_kind_name(const bt_estimate_def *d)
+static inline const char *bt_estimate_kind_name(const bt_estimate_def *def)
 {
-    return d->on_top ? "on top" : "ice resistance";
+    return def->on_top ? "on top" : "ice resistance";
 }
 
 /// A table on stdout, each line begun with indent: estimate, force, simulated / estimate when there is a run, regime.

@@ -9,7 +9,7 @@
 
 /// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are distributed in equal blocks in the
 /// order of their ids; the other bodies are the last rank's. first: [size + 1].
-void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
+void bt_record_blocks(const bt_comm *comm, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
 
 /// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes
 /// first, then (on the last rank) other bodies. Without MPI the block is everything.

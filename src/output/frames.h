@@ -29,15 +29,16 @@ typedef struct bt_frames {
     int64_t n, cap;                 ///< frames
 } bt_frames;
 
-/// Collective. Write /floes and /bodies, make /frames and /xdmf. *f is zeroed memory. What fails shows in h->status of
-/// the rank that met it.
-void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b, const bt_map_axes *axes);
+/// Collective. Write /floes and /bodies, make /frames and /xdmf. *frames is zeroed memory. What fails shows in
+/// h5->status of the rank that met it.
+void bt_frames_create(bt_frames *frames, bt_h5 *h5, const bt_comm *comm, const bt_record_bodies *bodies,
+                      const bt_map_axes *axes);
 /// Where ParaView's part of the next frame is, into path, which is returned.
-char *bt_frames_group(const bt_frames *f, char path[64]);
+char *bt_frames_group(const bt_frames *frames, char path[64]);
 
 /// Collective. Add a frame, whose group is there: rows of this rank's block. Returns the same status on all ranks;
 /// after a failure the file stays as the last flush left it.
-bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, const bt_frame_line *line);
-void bt_frames_close(bt_frames *f); ///< datasets and memory
+bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows, const bt_frame_line *line);
+void bt_frames_close(bt_frames *frames); ///< datasets and memory
 
 #endif

@@ -23,75 +23,75 @@ typedef struct list {
     int64_t count;  ///< bodies of this rank's block
 } list;
 
-static list make_list(const bt_comm *c, const bt_world *w, const bt_roster *roster)
+static list make_list(const bt_comm *comm, const bt_world *world, const bt_roster *roster)
 {
-    const bt_splitting *s = w->splitting;
-    const size_t most = (size_t)w->bodies.n + (s ? (size_t)s->n : 0);
-    list l = {.row = bt_alloc(most, sizeof *l.row), .body = bt_alloc(most, sizeof *l.body),
-              .first = bt_alloc((size_t)c->size + 1, sizeof *l.first)};
-    for (bt_idx i = 0; i < w->bodies.n; i++) {
-        const bt_gid row = bt_roster_row(roster, w->bodies.gid[i]);
-        if (row < 0 || !bt_domain_owns(w, i)) continue;
-        l.row[l.n] = row;
-        l.body[l.n++] = i;
+    const bt_splitting *splitting = world->splitting;
+    const size_t most = (size_t)world->bodies.n + (splitting ? (size_t)splitting->n : 0);
+    list block = {.row = bt_alloc(most, sizeof *block.row), .body = bt_alloc(most, sizeof *block.body),
+                  .first = bt_alloc((size_t)comm->size + 1, sizeof *block.first)};
+    for (bt_idx i = 0; i < world->bodies.n; i++) {
+        const bt_gid row = bt_roster_row(roster, world->bodies.gid[i]);
+        if (row < 0 || !bt_domain_owns(world, i)) continue;
+        block.row[block.n] = row;
+        block.body[block.n++] = i;
     }
-    for (int64_t k = 0; s && k < s->n && c->rank == 0; k++) {
-        if (s->split[k].generation > 1) continue;
-        l.row[l.n] = bt_roster_row(roster, s->split[k].parent);
-        l.body[l.n++] = -1 - k;
+    for (int64_t k = 0; splitting && k < splitting->n && comm->rank == 0; k++) {
+        if (splitting->split[k].generation > 1) continue;
+        block.row[block.n] = bt_roster_row(roster, splitting->split[k].parent);
+        block.body[block.n++] = -1 - k;
     }
-    bt_record_blocks(c, roster->n_floes, (bt_idx)(w->bodies.n_global - roster->n_kept), l.first);
-    l.count = l.first[c->rank + 1] - l.first[c->rank];
-    return l;
+    bt_record_blocks(comm, roster->n_floes, (bt_idx)(world->bodies.n_global - roster->n_kept), block.first);
+    block.count = block.first[comm->rank + 1] - block.first[comm->rank];
+    return block;
 }
 
-static void free_list(list *l)
+static void free_list(list *block)
 {
-    free(l->row);
-    free(l->body);
-    free(l->first);
+    free(block->row);
+    free(block->body);
+    free(block->first);
 }
 
 /// Its outline in its own frame; returns the number of vertices.
-static int outline_of(const bt_world *w, int64_t body, const double **v)
+static int outline_of(const bt_world *world, int64_t body, const double **v)
 {
     if (body < 0) {
-        *v = bt_splitting_outline(w->splitting, -1 - body, 2);
-        return (int)w->splitting->split[-1 - body].corners[2];
+        *v = bt_splitting_outline(world->splitting, -1 - body, 2);
+        return (int)world->splitting->split[-1 - body].corners[2];
     }
-    *v = w->bodies.vertices + 2 * w->bodies.offset[body];
-    return bt_body_corners(&w->bodies, (bt_idx)body);
+    *v = world->bodies.vertices + 2 * world->bodies.offset[body];
+    return bt_body_corners(&world->bodies, (bt_idx)body);
 }
 
-static int most_vertices(const bt_comm *c, const bt_world *w, const list *l)
+static int most_vertices(const bt_comm *comm, const bt_world *world, const list *block)
 {
     double most = 0;
     const double *v;
-    for (bt_idx i = 0; i < l->n; i++) most = bt_max(most, outline_of(w, l->body[i], &v));
-    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
+    for (bt_idx i = 0; i < block->n; i++) most = bt_max(most, outline_of(world, block->body[i], &v));
+    bt_comm_reduce(comm, NULL, 0, &most, 1, NULL, 0);
     return (int)most;
 }
 
 /// Vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
-static bt_status hand_over_vertices(const bt_comm *c, const bt_world *w, const list *l, const int64_t *offsets,
+static bt_status hand_over_vertices(const bt_comm *comm, const bt_world *world, const list *l, const int64_t *offsets,
                                     double *vertices, bt_errors *err)
 {
     enum { PORTION = 4 };
-    const int most = most_vertices(c, w, l);
+    const int most = most_vertices(comm, world, l);
     double(*rows)[PORTION][2] = bt_alloc((size_t)l->n, sizeof *rows),
     (*block)[PORTION][2] = bt_alloc((size_t)l->count, sizeof *block);
     bt_status status = BT_OK;
     for (int from = 0; from < most && status == BT_OK; from += PORTION) {
         for (bt_idx i = 0; i < l->n; i++) {
             const double *v;
-            const int n = outline_of(w, l->body[i], &v);
+            const int n = outline_of(world, l->body[i], &v);
             for (int k = 0; k < PORTION; k++) {
                 const bool there = from + k < n;
                 rows[i][k][0] = there ? v[2 * (from + k)] : 0;
                 rows[i][k][1] = there ? v[2 * (from + k) + 1] : 0;
             }
         }
-        status = bt_comm_rows_by_gid(c, l->first, l->n, l->row, 2 * PORTION, &rows[0][0][0], &block[0][0][0], err);
+        status = bt_comm_rows_by_gid(comm, l->first, l->n, l->row, 2 * PORTION, &rows[0][0][0], &block[0][0][0], err);
         for (int64_t i = 0; i < l->count; i++)
             for (int k = 0; k < PORTION; k++) {
                 const int64_t v = offsets[i] + from + k;
@@ -105,21 +105,21 @@ static bt_status hand_over_vertices(const bt_comm *c, const bt_world *w, const l
     return status;
 }
 
-bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *out,
+bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_roster *roster, bt_record_bodies *out,
                              bt_errors *err)
 {
-    const bt_bodies *b = &w->bodies;
-    list l = make_list(c, w, roster);
+    const bt_bodies *bodies = &world->bodies;
+    list l = make_list(comm, world, roster);
     double (*rows)[3] = bt_alloc((size_t)l.n, sizeof *rows), (*block)[3] = bt_alloc((size_t)l.count, sizeof *block);
     for (bt_idx i = 0; i < l.n; i++) {
         const int64_t k = l.body[i];
         const double *v;
-        const int n = outline_of(w, k, &v);
+        const int n = outline_of(world, k, &v);
         rows[i][0] = n;
         rows[i][1] = roster->thickness[l.row[i]];
-        rows[i][2] = k < 0 ? bt_shape_extent(n, v).area : b->area[k];
+        rows[i][2] = k < 0 ? bt_shape_extent(n, v).area : bodies->area[k];
     }
-    bt_status status = bt_comm_rows_by_gid(c, l.first, l.n, l.row, 3, &rows[0][0], &block[0][0], err);
+    bt_status status = bt_comm_rows_by_gid(comm, l.first, l.n, l.row, 3, &rows[0][0], &block[0][0], err);
     int64_t *offsets = bt_alloc((size_t)l.count + 1, sizeof *offsets);
     double *thickness = bt_alloc((size_t)l.count, sizeof *thickness), *area = bt_alloc((size_t)l.count, sizeof *area);
     for (int64_t i = 0; i < l.count; i++) {
@@ -130,39 +130,39 @@ bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster 
     free(rows);
     free(block);
     double *vertices = bt_alloc(2 * (size_t)offsets[l.count], sizeof *vertices);
-    if (status == BT_OK) status = hand_over_vertices(c, w, &l, offsets, vertices, err);
+    if (status == BT_OK) status = hand_over_vertices(comm, world, &l, offsets, vertices, err);
     free_list(&l);
     *out = (bt_record_bodies){.n_floes = roster->n_floes,
-                              .n_bodies = (bt_idx)(b->n_global - roster->n_kept),
+                              .n_bodies = (bt_idx)(bodies->n_global - roster->n_kept),
                               .offsets = offsets,
                               .vertices = vertices,
                               .thickness = thickness,
                               .area = area,
                               .names = roster->names,
-                              .all = c->size == 1 && !w->splitting ? b : NULL, // none of whose floes goes
-                              .towed = w->towed < 0 ? -1 : (bt_idx)bt_roster_row(roster, w->towed),
-                              .branches = bt_tow_has_line(w->tow) ? w->tow->n_branches : 0};
+                              .all = comm->size == 1 && !world->splitting ? bodies : NULL, // none of whose floes goes
+                              .towed = world->towed < 0 ? -1 : (bt_idx)bt_roster_row(roster, world->towed),
+                              .branches = bt_tow_has_line(world->tow) ? world->tow->n_branches : 0};
     if (status != BT_OK) bt_gather_free(out);
     return status;
 }
 
-void bt_gather_free(bt_record_bodies *b)
+void bt_gather_free(bt_record_bodies *bodies)
 {
-    free((void *)b->offsets);
-    free((void *)b->vertices);
-    free((void *)b->thickness);
-    free((void *)b->area);
-    *b = (bt_record_bodies){0};
+    free((void *)bodies->offsets);
+    free((void *)bodies->vertices);
+    free((void *)bodies->thickness);
+    free((void *)bodies->area);
+    *bodies = (bt_record_bodies){0};
 }
 
 /// Body k in a frame; k < 0: a floe that has split.
-static bt_frame_row row_of(const bt_bodies *b, int64_t k, const double *force, double (*net)[2])
+static bt_frame_row row_of(const bt_bodies *bodies, int64_t k, const double *force, double (*net)[2])
 {
     if (k < 0) return (bt_frame_row){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
     return (bt_frame_row){
-        .x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
-        .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y, .fx = net[k][0],
-        .fy = net[k][1]};
+        .x = bodies->pose[k].x, .y = bodies->pose[k].y, .yaw = bodies->pose[k].yaw, .contact_force = force[k],
+        .speed = bt_hypot(bodies->vel[k].x, bodies->vel[k].y), .vx = bodies->vel[k].x, .vy = bodies->vel[k].y,
+        .fx = net[k][0], .fy = net[k][1]};
 }
 
 static int by_piece(const void *p, const void *q)
@@ -172,49 +172,50 @@ static int by_piece(const void *p, const void *q)
 }
 
 /// Collective. Pieces there are, in the order of their ids, on rank 0.
-static bt_piece_row *gather_pieces(const bt_comm *c, const bt_world *w, const double *force, double (*net)[2],
+static bt_piece_row *gather_pieces(const bt_comm *comm, const bt_world *world, const double *force, double (*net)[2],
                                    int64_t *n)
 {
     *n = 0;
-    const bt_splitting *s = w->splitting;
-    if (!s) return NULL;
-    const bt_bodies *b = &w->bodies;
-    bt_piece_row *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    const bt_splitting *splitting = world->splitting;
+    if (!splitting) return NULL;
+    const bt_bodies *bodies = &world->bodies;
+    bt_piece_row *mine = bt_alloc((size_t)bodies->n, sizeof *mine);
     int64_t count = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        const bt_gid k = b->gid[i] - s->first;
-        if (k < 0 || k >= s->reserve || !bt_domain_owns(w, i)) continue;
-        mine[count++] = (bt_piece_row){(double)k, row_of(b, i, force, net)};
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        const bt_gid k = bodies->gid[i] - splitting->first;
+        if (k < 0 || k >= splitting->reserve || !bt_domain_owns(world, i)) continue;
+        mine[count++] = (bt_piece_row){(double)k, row_of(bodies, i, force, net)};
     }
-    bt_piece_row *all = (bt_piece_row *)(void *)bt_comm_gather(c, count, 1 + BT_FRAME_ROW,
+    bt_piece_row *all = (bt_piece_row *)(void *)bt_comm_gather(comm, count, 1 + BT_FRAME_ROW,
                                                                (const double *)(const void *)mine, n);
     free(mine);
     if (*n > 0) qsort(all, (size_t)*n, sizeof *all, by_piece);
     return all;
 }
 
-bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out,
+bt_status bt_gather_frame(const bt_comm *comm, const bt_world *world, const bt_roster *roster, bt_frame_row **out,
                           bt_piece_row **pieces, int64_t *n_pieces, bt_errors *err)
 {
-    const bt_bodies *b = &w->bodies;
-    double *force = bt_alloc((size_t)b->n, sizeof *force);
-    double (*net)[2] = bt_alloc((size_t)b->n, sizeof *net);
-    bt_observe_contact_force(w, force);
-    bt_observe_net_force(c, w, roster, net);
-    if (w->stats.locked) // the contacts of this step have no solution
-        for (bt_idx i = 0; i < b->n; i++) force[i] = net[i][0] = net[i][1] = NAN;
-    list l = make_list(c, w, roster);
-    const bool alone = c->size == 1; // all bodies are of one block: each row is put where it belongs
+    const bt_bodies *bodies = &world->bodies;
+    double *force = bt_alloc((size_t)bodies->n, sizeof *force);
+    double (*net)[2] = bt_alloc((size_t)bodies->n, sizeof *net);
+    bt_observe_contact_force(world, force);
+    bt_observe_net_force(comm, world, roster, net);
+    if (world->stats.locked) // the contacts of this step have no solution
+        for (bt_idx i = 0; i < bodies->n; i++) force[i] = net[i][0] = net[i][1] = NAN;
+    list l = make_list(comm, world, roster);
+    const bool alone = comm->size == 1; // all bodies are of one block: each row is put where it belongs
     bt_frame_row *rows = bt_alloc((size_t)(alone ? l.count : l.n), sizeof *rows);
-    for (bt_idx i = 0; i < l.n; i++) rows[alone ? l.row[i] : i] = row_of(b, l.body[i], force, net);
-    *pieces = gather_pieces(c, w, force, net, n_pieces);
+    for (bt_idx i = 0; i < l.n; i++) rows[alone ? l.row[i] : i] = row_of(bodies, l.body[i], force, net);
+    *pieces = gather_pieces(comm, world, force, net, n_pieces);
     free(force);
     free(net);
     bt_frame_row *block = rows;
     bt_status status = BT_OK;
     if (!alone) {
         block = bt_alloc((size_t)l.count, sizeof *block);
-        status = bt_comm_rows_by_gid(c, l.first, l.n, l.row, BT_FRAME_ROW, (const double *)rows, (double *)block, err);
+        status = bt_comm_rows_by_gid(comm, l.first, l.n, l.row, BT_FRAME_ROW, (const double *)rows, (double *)block,
+                                     err);
         free(rows);
     }
     free_list(&l);
@@ -226,28 +227,28 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
 _Static_assert((int)BT_FRAME_BRANCHES == (int)BT_MAX_BRANCHES, "a frame has room for every branch");
 
 /// The towing end and the travel of the body are not wrapped and the pose is, so the end is drawn from the body on.
-bt_frame_line bt_gather_line(const bt_world *w)
+bt_frame_line bt_gather_line(const bt_world *world)
 {
     bt_frame_line line = {0};
-    const bt_tow *t = w->tow;
-    if (!bt_tow_has_line(t)) return line;
-    const bt_pose *p = &w->bodies.pose[bt_world_towed(w)];
-    const double c = bt_cos(p->yaw), s = bt_sin(p->yaw);
-    for (int k = 0; k < t->n_branches; k++) {
-        const bt_branch *b = &t->branch[k];
+    const bt_tow *tow = world->tow;
+    if (!bt_tow_has_line(tow)) return line;
+    const bt_pose *pose = &world->bodies.pose[bt_world_towed(world)];
+    const double c = bt_cos(pose->yaw), s = bt_sin(pose->yaw);
+    for (int k = 0; k < tow->n_branches; k++) {
+        const bt_branch *branch = &tow->branch[k];
         double (*at)[2] = line.point[k];
-        at[0][0] = p->x + c * b->hull_x - s * b->hull_y;
-        at[0][1] = p->y + s * b->hull_x + c * b->hull_y;
-        at[1][0] = b->broken ? at[0][0] : p->x + (t->carriage_x - t->travel_x);
-        at[1][1] = b->broken ? at[0][1] : p->y + (t->carriage_y - t->travel_y);
-        line.tension[k] = b->broken ? 0 : bt_tow_tension(t, k);
+        at[0][0] = pose->x + c * branch->hull_x - s * branch->hull_y;
+        at[0][1] = pose->y + s * branch->hull_x + c * branch->hull_y;
+        at[1][0] = branch->broken ? at[0][0] : pose->x + (tow->carriage_x - tow->travel_x);
+        at[1][1] = branch->broken ? at[0][1] : pose->y + (tow->carriage_y - tow->travel_y);
+        line.tension[k] = branch->broken ? 0 : bt_tow_tension(tow, k);
     }
     return line;
 }
 
-void bt_roster_free(bt_roster *r)
+void bt_roster_free(bt_roster *roster)
 {
-    free(r->thickness);
-    free(r->names);
-    *r = (bt_roster){0};
+    free(roster->thickness);
+    free(roster->names);
+    *roster = (bt_roster){0};
 }

@@ -22,27 +22,28 @@ typedef struct bt_roster {
 } bt_roster;
 
 /// Row of a body among those that were there from the start, in the order of their ids; −1: it is a piece of a floe.
-static inline bt_gid bt_roster_row(const bt_roster *r, bt_gid gid)
+static inline bt_gid bt_roster_row(const bt_roster *roster, bt_gid gid)
 {
-    return gid < r->n_free ? gid : gid < r->n_free + r->n_kept ? -1 : gid - r->n_kept;
+    return gid < roster->n_free ? gid : gid < roster->n_free + roster->n_kept ? -1 : gid - roster->n_kept;
 }
 
 /// Release what a roster holds.
-void bt_roster_free(bt_roster *r);
+void bt_roster_free(bt_roster *roster);
 
 /// Collective. The outlines of this rank's block, for bt_record_open; released with bt_gather_free.
 /// Errors, the same status on all ranks: BT_ERR_NUMERIC (bodies are lost or doubled).
-bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *b,
+bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_roster *roster,
+                           bt_record_bodies *bodies,
                              bt_errors *err);
-void bt_gather_free(bt_record_bodies *b);
+void bt_gather_free(bt_record_bodies *bodies);
 
 /// Collective. A frame of this rank's block, with NaN for floes that have split; and on rank 0 the pieces of floes
 /// [*n_pieces] that are there, in the order of their ids. *rows and *pieces are to be freed, NULL after an error or
 /// without any. Errors as above.
-bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **rows,
+bt_status bt_gather_frame(const bt_comm *comm, const bt_world *world, const bt_roster *roster, bt_frame_row **rows,
                           bt_piece_row **pieces, int64_t *n_pieces, bt_errors *err);
 
 /// The tow line beside it, the same on all ranks; zeros without one.
-bt_frame_line bt_gather_line(const bt_world *w);
+bt_frame_line bt_gather_line(const bt_world *world);
 
 #endif

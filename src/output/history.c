@@ -71,13 +71,14 @@ static const bt_total *total_of_law(int k)
     static bt_total made[BT_MAX_LAW_TOTALS];
     for (int law = 0, i = 0; !made[k].at.name && law < BT_LAWS; law++)
         for (int j = 0; j < bt_laws[law]->n_totals; j++, i++) {
-            const bt_law_total *t = &bt_laws[law]->totals[j];
-            const int number = bt_law_first_number(law) + t->number;
+            const bt_law_total *total = &bt_laws[law]->totals[j];
+            const int number = bt_law_first_number(law) + total->number;
             made[i] = (bt_total){
-                .at = {t->name, t->rule == BT_TOTAL_STEPS ? BT_ITEM_I64 : BT_ITEM_F64, 1,
-                       offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value), t->units, t->description,
-                       "one", BT_ROW_ANY, t->key},
-                .rule = t->rule,
+                .at = {total->name, total->rule == BT_TOTAL_STEPS ? BT_ITEM_I64 : BT_ITEM_F64, 1,
+                       offsetof(bt_history, laws) + (size_t)i * sizeof(bt_total_value), total->units,
+                       total->description,
+                       "one", BT_ROW_ANY, total->key},
+                .rule = total->rule,
                 .offset = offsetof(bt_sample, laws) + (size_t)number * sizeof(double)};
         }
     return &made[k];
@@ -86,58 +87,58 @@ static const bt_total *total_of_law(int k)
 const bt_total *bt_history_total(int k) { return k < N_TOTALS ? &totals[k] : total_of_law(k - N_TOTALS); }
 
 /// A step into a total. Counts of whole numbers are exact in a double up to 2⁵³, far beyond any run.
-static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
+static void add_total(bt_history *history, const bt_total *total, const bt_sample *sample)
 {
     double x = 0, sum = 0;
     int64_t whole = 0;
-    char *at = (char *)h + t->at.offset;
-    memcpy(&x, (const char *)s + t->offset, sizeof x);
-    if (t->rule == BT_TOTAL_STEPS) x = x != 0;
-    if (t->at.type == BT_ITEM_I64) {
+    char *at = (char *)history + total->at.offset;
+    memcpy(&x, (const char *)sample + total->offset, sizeof x);
+    if (total->rule == BT_TOTAL_STEPS) x = x != 0;
+    if (total->at.type == BT_ITEM_I64) {
         memcpy(&whole, at, sizeof whole);
         whole += (int64_t)x;
         memcpy(at, &whole, sizeof whole);
     } else {
         memcpy(&sum, at, sizeof sum);
-        sum = t->rule == BT_TOTAL_MAX ? bt_max_seen(sum, x) : t->rule == BT_TOTAL_LAST ? x : sum + x;
+        sum = total->rule == BT_TOTAL_MAX ? bt_max_seen(sum, x) : total->rule == BT_TOTAL_LAST ? x : sum + x;
         memcpy(at, &sum, sizeof sum);
     }
 }
 
 bt_state_row bt_history_column(int k, char name[BT_HISTORY_NAME])
 {
-    const bt_quantity *q = k < BT_N_COLUMNS ? bt_own_series : bt_added(k - BT_N_COLUMNS);
-    while (k < BT_N_COLUMNS && q->offset != places[k]) q++;
+    const bt_quantity *quantity = k < BT_N_COLUMNS ? bt_own_series : bt_added(k - BT_N_COLUMNS);
+    while (k < BT_N_COLUMNS && quantity->offset != places[k]) quantity++;
     if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "history/%s", names[k]);
-    else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", q->name);
-    return (bt_state_row){strchr(name, '/') + 1, BT_ITEM_F64, 1, q->offset, q->units, q->description, "time",
-                          BT_ROW_ANY, NULL};
+    else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", quantity->name);
+    return (bt_state_row){strchr(name, '/') + 1, BT_ITEM_F64, 1, quantity->offset, quantity->units,
+                          quantity->description, "time", BT_ROW_ANY, NULL};
 }
 
-void bt_history_init(bt_history *h) { *h = (bt_history){.n_columns = BT_N_COLUMNS + bt_n_added()}; }
+void bt_history_init(bt_history *history) { *history = (bt_history){.n_columns = BT_N_COLUMNS + bt_n_added()}; }
 
-void bt_history_free(bt_history *h)
+void bt_history_free(bt_history *history)
 {
-    for (int k = 0; k < h->n_columns; k++) free(h->column[k]);
-    bt_history_init(h);
+    for (int k = 0; k < history->n_columns; k++) free(history->column[k]);
+    bt_history_init(history);
 }
 
-void bt_history_add(bt_history *h, const bt_sample *s)
+void bt_history_add(bt_history *history, const bt_sample *sample)
 {
-    if (h->n == h->cap) {
-        h->cap = h->cap ? 2 * h->cap : 1024;
-        for (int k = 0; k < h->n_columns; k++)
-            h->column[k] = bt_realloc(h->column[k], (size_t)h->cap, sizeof(double));
+    if (history->n == history->cap) {
+        history->cap = history->cap ? 2 * history->cap : 1024;
+        for (int k = 0; k < history->n_columns; k++)
+            history->column[k] = bt_realloc(history->column[k], (size_t)history->cap, sizeof(double));
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
-        h->column[k][h->n] = *(const double *)(const void *)((const char *)s + places[k]);
+        history->column[k][history->n] = *(const double *)(const void *)((const char *)sample + places[k]);
     static const bt_column loads[] = {BT_COL_ICE, BT_COL_TOW, BT_COL_BUDGET, BT_COL_QUASI_STATIC};
-    for (size_t i = 0; s->no_load != 0 && i < sizeof loads / sizeof *loads; i++) {
-        double *x = h->column[loads[i]] + h->n;
-        if (isnan(*x)) *x = h->n > 0 ? x[-1] : 0;
+    for (size_t i = 0; sample->no_load != 0 && i < sizeof loads / sizeof *loads; i++) {
+        double *x = history->column[loads[i]] + history->n;
+        if (isnan(*x)) *x = history->n > 0 ? x[-1] : 0;
     }
-    for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
-        h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
-    h->n++;
-    for (int k = 0; k < bt_n_history_totals(); k++) add_total(h, bt_history_total(k), s);
+    for (int k = BT_N_COLUMNS; k < history->n_columns; k++)
+        history->column[k][history->n] = bt_sample_value(sample, bt_added(k - BT_N_COLUMNS));
+    history->n++;
+    for (int k = 0; k < bt_n_history_totals(); k++) add_total(history, bt_history_total(k), sample);
 }

@@ -81,8 +81,8 @@ static inline double bt_max_seen(double a, double b) { return a >= b || a != a ?
 double bt_history_largest(const double *x, int64_t from, int64_t to);
 
 /// Empty, with a column for each quantity that has been registered by now.
-void bt_history_init(bt_history *h);
-void bt_history_add(bt_history *h, const bt_sample *s);
-void bt_history_free(bt_history *h);
+void bt_history_init(bt_history *history);
+void bt_history_add(bt_history *history, const bt_sample *sample);
+void bt_history_free(bt_history *history);
 
 #endif

@@ -10,24 +10,27 @@
 #include "base/units.h"
 #include "output/summary.h"
 
-void bt_impact_count_init(bt_impact_count *c, const bt_impacts *m, const bt_history *h, const bt_steady *w)
+void bt_impact_count_init(bt_impact_count *count, const bt_impacts *impacts, const bt_history *history,
+                          const bt_steady *steady)
 {
-    const double *push = h->column[BT_COL_QUASI_STATIC];
-    *c = (bt_impact_count){.start = w->start, .hours = (double)w->n * m->dt / 3600, .start_peak = NAN};
-    bt_impact_describe(&m->rule, c->conversion);
-    c->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *c->peaks);
-    c->panel = bt_alloc((size_t)m->panels.n, sizeof *c->panel);
-    c->collision_resistance = bt_stats_mean(w->n ? h->column[BT_COL_COLLISION] + w->first : NULL, w->n).mean;
-    c->quasi_static_resistance = w->series[BT_REPORTED_ICE].mean.mean - c->collision_resistance;
-    c->largest_quasi_static_load = bt_history_largest(push, w->first, h->n);
-    c->start_quasi_static_load = bt_history_largest(push, 0, w->first);
+    const double *push = history->column[BT_COL_QUASI_STATIC];
+    *count = (bt_impact_count){.start = steady->start, .hours = (double)steady->n * impacts->dt / 3600,
+                               .start_peak = NAN};
+    bt_impact_describe(&impacts->rule, count->conversion);
+    count->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *count->peaks);
+    count->panel = bt_alloc((size_t)impacts->panels.n, sizeof *count->panel);
+    count->collision_resistance = bt_stats_mean(steady->n ? history->column[BT_COL_COLLISION] + steady->first : NULL,
+                                                steady->n).mean;
+    count->quasi_static_resistance = steady->series[BT_REPORTED_ICE].mean.mean - count->collision_resistance;
+    count->largest_quasi_static_load = bt_history_largest(push, steady->first, history->n);
+    count->start_quasi_static_load = bt_history_largest(push, 0, steady->first);
 }
 
-void bt_impact_count_free(bt_impact_count *c)
+void bt_impact_count_free(bt_impact_count *count)
 {
-    free(c->peaks);
-    free(c->panel);
-    *c = (bt_impact_count){0};
+    free(count->peaks);
+    free(count->panel);
+    *count = (bt_impact_count){0};
 }
 
 // --- the largest peaks -----------------------------------------------------------------------------------------------
@@ -45,17 +48,17 @@ static void sift_down(double *heap, int64_t n, int64_t i)
     }
 }
 
-static void keep_peak(bt_impact_count *c, double peak)
+static void keep_peak(bt_impact_count *count, double peak)
 {
-    if (c->n_peaks == BT_IMPACT_PEAKS) {
-        if (peak <= c->peaks[0]) return;
-        c->peaks[0] = peak;
-        sift_down(c->peaks, c->n_peaks, 0);
+    if (count->n_peaks == BT_IMPACT_PEAKS) {
+        if (peak <= count->peaks[0]) return;
+        count->peaks[0] = peak;
+        sift_down(count->peaks, count->n_peaks, 0);
         return;
     }
-    int64_t i = c->n_peaks++;
-    for (; i > 0 && c->peaks[(i - 1) / 2] > peak; i = (i - 1) / 2) c->peaks[i] = c->peaks[(i - 1) / 2];
-    c->peaks[i] = peak;
+    int64_t i = count->n_peaks++;
+    for (; i > 0 && count->peaks[(i - 1) / 2] > peak; i = (i - 1) / 2) count->peaks[i] = count->peaks[(i - 1) / 2];
+    count->peaks[i] = peak;
 }
 
 static int descending(const void *a, const void *b)
@@ -64,28 +67,28 @@ static int descending(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-void bt_impact_count_peaks(const bt_impact_count *c, double *peaks)
+void bt_impact_count_peaks(const bt_impact_count *count, double *peaks)
 {
-    if (c->n_peaks == 0) return;
-    memcpy(peaks, c->peaks, (size_t)c->n_peaks * sizeof *peaks);
-    qsort(peaks, (size_t)c->n_peaks, sizeof *peaks, descending);
+    if (count->n_peaks == 0) return;
+    memcpy(peaks, count->peaks, (size_t)count->n_peaks * sizeof *peaks);
+    qsort(peaks, (size_t)count->n_peaks, sizeof *peaks, descending);
 }
 
 // --- counting --------------------------------------------------------------------------------------------------------
 
-void bt_impact_count_add(bt_impact_count *c, const bt_impact *e)
+void bt_impact_count_add(bt_impact_count *count, const bt_impact *impact)
 {
-    bt_panel_hits *p = &c->panel[(int)e->panel];
-    c->n_all++;
-    if (!(e->time >= c->start)) {
-        if (!(e->peak <= c->start_peak)) c->start_peak = e->peak;
-        p->start_peak = bt_max(p->start_peak, e->peak);
+    bt_panel_hits *hits = &count->panel[(int)impact->panel];
+    count->n_all++;
+    if (!(impact->time >= count->start)) {
+        if (!(impact->peak <= count->start_peak)) count->start_peak = impact->peak;
+        hits->start_peak = bt_max(hits->start_peak, impact->peak);
         return;
     }
-    if (c->n++ == 0 || e->peak > c->largest.peak) c->largest = *e;
-    keep_peak(c, e->peak);
-    p->n++;
-    p->peak = bt_max(p->peak, e->peak);
+    if (count->n++ == 0 || impact->peak > count->largest.peak) count->largest = *impact;
+    keep_peak(count, impact->peak);
+    hits->n++;
+    hits->peak = bt_max(hits->peak, impact->peak);
 }
 
 // --- in the summary --------------------------------------------------------------------------------------------------
@@ -105,49 +108,50 @@ static int64_t rank_of(int k)
     return r;
 }
 
-static double *sorted(const bt_impact_count *c)
+static double *sorted(const bt_impact_count *count)
 {
-    double *p = bt_alloc((size_t)c->n_peaks + 1, sizeof *p);
-    bt_impact_count_peaks(c, p);
+    double *p = bt_alloc((size_t)count->n_peaks + 1, sizeof *p);
+    bt_impact_count_peaks(count, p);
     return p;
 }
 
-void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c)
+void bt_impacts_exceedance(bt_json *json, const char *key, const bt_impact_count *count)
 {
-    double *peaks = sorted(c);
-    bt_json_open(j, key, '[');
-    for (int k = 0; rank_of(k) <= c->n_peaks; k++) {
-        bt_json_open(j, NULL, '{');
-        bt_json_int(j, "rank", rank_of(k));
-        bt_json_number(j, "per_hour", (double)rank_of(k) / c->hours);
-        bt_json_number(j, "peak_n", peaks[rank_of(k) - 1]);
-        bt_json_close(j, '}');
+    double *peaks = sorted(count);
+    bt_json_open(json, key, '[');
+    for (int k = 0; rank_of(k) <= count->n_peaks; k++) {
+        bt_json_open(json, NULL, '{');
+        bt_json_int(json, "rank", rank_of(k));
+        bt_json_number(json, "per_hour", (double)rank_of(k) / count->hours);
+        bt_json_number(json, "peak_n", peaks[rank_of(k) - 1]);
+        bt_json_close(json, '}');
     }
-    bt_json_close(j, ']');
+    bt_json_close(json, ']');
     free(peaks);
 }
 
-void bt_impacts_print(const bt_impact_count *c, bool at_least)
+void bt_impacts_print(const bt_impact_count *count, bool at_least)
 {
-    if (!c || !(c->hours > 0)) return;
+    if (!count || !(count->hours > 0)) return;
     char a[32], b[32];
     const char *least = at_least ? "at least " : "";
     printf("  collisions          %lld in the window from %g s on, %.3g an hour; %s%s of the mean resistance, ",
-           (long long)c->n, c->start, (double)c->n / c->hours, least, bt_force_text(a, c->collision_resistance));
+           (long long)count->n, count->start, (double)count->n / count->hours, least,
+           bt_force_text(a, count->collision_resistance));
     if (at_least) printf("the quasi-static rest has no bound\n");
-    else printf("quasi-static %s\n", bt_force_text(b, c->quasi_static_resistance));
-    if (c->n > 0) {
-        printf("    peaks%s (%s)", at_least ? ", at least" : "", c->conversion);
-        double *peaks = sorted(c);
+    else printf("quasi-static %s\n", bt_force_text(b, count->quasi_static_resistance));
+    if (count->n > 0) {
+        printf("    peaks%s (%s)", at_least ? ", at least" : "", count->conversion);
+        double *peaks = sorted(count);
         // A few of the ranks: the largest, then tenfold.
-        for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
+        for (int k = 0; rank_of(k) <= count->n_peaks; k += 3)
             printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]),
-                   (double)rank_of(k) / c->hours);
-        printf("; largest quasi-static load %s%s\n", least, bt_force_text(a, c->largest_quasi_static_load));
+                   (double)rank_of(k) / count->hours);
+        printf("; largest quasi-static load %s%s\n", least, bt_force_text(a, count->largest_quasi_static_load));
         free(peaks);
     }
-    if (c->n_all > c->n)
+    if (count->n_all > count->n)
         printf("    start             %lld before the window, the largest peak %s, the largest quasi-static load %s\n",
-               (long long)(c->n_all - c->n), bt_force_text(a, c->start_peak),
-               bt_force_text(b, c->start_quasi_static_load));
+               (long long)(count->n_all - count->n), bt_force_text(a, count->start_peak),
+               bt_force_text(b, count->start_quasi_static_load));
 }

@@ -40,22 +40,23 @@ typedef struct bt_impact_count {
 } bt_impact_count;
 
 /// Begin to count over the window; what is of steps is taken at once.
-void bt_impact_count_init(bt_impact_count *c, const bt_impacts *m, const bt_history *h, const bt_steady *w);
-void bt_impact_count_free(bt_impact_count *c);
+void bt_impact_count_init(bt_impact_count *count, const bt_impacts *impacts, const bt_history *history,
+                          const bt_steady *steady);
+void bt_impact_count_free(bt_impact_count *count);
 
 /// A collision of the run, in any order.
-void bt_impact_count_add(bt_impact_count *c, const bt_impact *e);
+void bt_impact_count_add(bt_impact_count *count, const bt_impact *impact);
 
 /// The largest peaks kept, into peaks[n_peaks], largest first.
-void bt_impact_count_peaks(const bt_impact_count *c, double *peaks);
+void bt_impact_count_peaks(const bt_impact_count *count, double *peaks);
 
 // --- in the summary --------------------------------------------------------------------------------------------------
 
 // Collisions and quasi-static loads in the summary (private to it).
 
 /// An array of ranks, each with its peak and how often that is reached or exceeded.
-void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c);
-/// Two lines of the printed table; nothing when c is NULL. at_least: the loads are lower bounds.
-void bt_impacts_print(const bt_impact_count *c, bool at_least);
+void bt_impacts_exceedance(bt_json *json, const char *key, const bt_impact_count *count);
+/// Two lines of the printed table; nothing when `count` is NULL. at_least: the loads are lower bounds.
+void bt_impacts_print(const bt_impact_count *count, bool at_least);
 
 #endif

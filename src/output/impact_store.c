@@ -43,163 +43,169 @@ static void put_column(bt_impact *rows, int64_t n, int k, const double *x)
     for (int64_t i = 0; i < n; i++) memcpy((char *)&rows[i] + columns[k].offset, &x[i], sizeof *x);
 }
 
-static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
+static void create_panels(bt_impact_store *store, const bt_panels *panels, bool series)
 {
-    bt_h5 *h = s->h;
-    const hsize_t n = (hsize_t)p->n;
-    double *start = bt_alloc(2 * (size_t)p->n + 2, sizeof *start), *middle = bt_alloc(2 * (size_t)p->n, sizeof *middle),
-           *normal = bt_alloc(2 * (size_t)p->n, sizeof *normal);
-    for (int k = 0; k <= p->n; k++) bt_panels_point(p, k, start + 2 * k, NULL);
-    for (int k = 0; k < p->n; k++) bt_panels_point(p, k + 0.5, middle + 2 * k, normal + 2 * k);
-    bt_h5_group(h, "/panels");
-    bt_h5_attr_double(h, "/panels", "length", p->arc[p->n_vertices] / p->n);
-    bt_h5_attr_text(h, "/panels", "description",
+    bt_h5 *h5 = store->h;
+    const hsize_t n = (hsize_t)panels->n;
+    double *start = bt_alloc(2 * (size_t)panels->n + 2, sizeof *start),
+           *middle = bt_alloc(2 * (size_t)panels->n, sizeof *middle),
+           *normal = bt_alloc(2 * (size_t)panels->n, sizeof *normal);
+    for (int k = 0; k <= panels->n; k++) bt_panels_point(panels, k, start + 2 * k, NULL);
+    for (int k = 0; k < panels->n; k++) bt_panels_point(panels, k + 0.5, middle + 2 * k, normal + 2 * k);
+    bt_h5_group(h5, "/panels");
+    bt_h5_attr_double(h5, "/panels", "length", panels->arc[panels->n_vertices] / panels->n);
+    bt_h5_attr_text(h5, "/panels", "description",
                     "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the "
                     "body's own x axis");
-    bt_h5_write(h, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
-    bt_h5_describe(h, "/panels/ends", "panel_end xy", "m",
+    bt_h5_write(h5, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
+    bt_h5_describe(h5, "/panels/ends", "panel_end xy", "m",
                    "panel k reaches from point k to k + 1, frame of the towed body");
-    bt_h5_write(h, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
-    bt_h5_describe(h, "/panels/middle", "panel xy", "m", "middle of each panel, frame of the towed body");
-    bt_h5_write(h, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal);
-    bt_h5_describe(h, "/panels/normal", "panel xy", "1", "outward normal there");
+    bt_h5_write(h5, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
+    bt_h5_describe(h5, "/panels/middle", "panel xy", "m", "middle of each panel, frame of the towed body");
+    bt_h5_write(h5, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal);
+    bt_h5_describe(h5, "/panels/normal", "panel xy", "1", "outward normal there");
     free(start);
     free(middle);
     free(normal);
     if (!series) return;
-    s->force = bt_h5_growing(h, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n}, false);
-    s->normal = bt_h5_growing(h, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
-    bt_h5_describe(h, "/panels/force", "sample panel xy", "N",
+    store->force = bt_h5_growing(h5, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n},
+                                 false);
+    store->normal = bt_h5_growing(h5, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
+    bt_h5_describe(h5, "/panels/force", "sample panel xy", "N",
              "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry "
              "of /series");
-    bt_h5_describe(h, "/panels/load", "sample panel", "N",
+    bt_h5_describe(h5, "/panels/load", "sample panel", "N",
              "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
 }
 
-void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c)
+void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts *impacts, const bt_case *input)
 {
-    *s = (bt_impact_store){
-        .h = h, .from = m, .earliest = bt_case_earliest_window(c), .force = -1, .normal = -1, .n_panels = m->panels.n};
-    bt_panel_blocks_init(&s->blocks, s->n_panels);
-    bt_h5_group(h, "/impacts");
+    *store = (bt_impact_store){
+        .h = h5, .from = impacts, .earliest = bt_case_earliest_window(input), .force = -1, .normal = -1,
+        .n_panels = impacts->panels.n};
+    bt_panel_blocks_init(&store->blocks, store->n_panels);
+    bt_h5_group(h5, "/impacts");
     char text[160], path[64];
-    bt_impact_describe(&m->rule, text);
-    bt_h5_attr_text(h, "/impacts", "conversion", text);
-    bt_h5_attr_text(h, "/impacts", "description", "collisions with the towed body in the order in which they ended");
+    bt_impact_describe(&impacts->rule, text);
+    bt_h5_attr_text(h5, "/impacts", "conversion", text);
+    bt_h5_attr_text(h5, "/impacts", "description", "collisions with the towed body in the order in which they ended");
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
         snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-        s->column[k] = bt_h5_growing(h, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
-                                     (hsize_t[]){CHUNK, 1}, false);
-        bt_h5_describe(h, path, NULL, columns[k].units, columns[k].description);
+        store->column[k] = bt_h5_growing(h5, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
+                                         (hsize_t[]){CHUNK, 1}, false);
+        bt_h5_describe(h5, path, NULL, columns[k].units, columns[k].description);
     }
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++) { // when their time is there
         snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-        bt_h5_axes(h, path, "time");
+        bt_h5_axes(h5, path, "time");
     }
-    s->sum = bt_alloc(3 * (size_t)s->n_panels, sizeof *s->sum);
-    create_panels(s, &m->panels, c->output.panels);
+    store->sum = bt_alloc(3 * (size_t)store->n_panels, sizeof *store->sum);
+    create_panels(store, &impacts->panels, input->output.panels);
 }
 
-static void write_rows(bt_impact_store *s)
+static void write_rows(bt_impact_store *store)
 {
-    if (s->n_rows == 0) return;
-    double *x = bt_alloc((size_t)s->n_rows, sizeof *x);
+    if (store->n_rows == 0) return;
+    double *x = bt_alloc((size_t)store->n_rows, sizeof *x);
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
-        for (int64_t i = 0; i < s->n_rows; i++) memcpy(&x[i], (const char *)&s->rows[i] + columns[k].offset, sizeof *x);
-        bt_h5_append(s->h, s->column[k], H5T_NATIVE_DOUBLE, (hsize_t)s->written, (hsize_t)s->n_rows, x);
+        for (int64_t i = 0; i < store->n_rows; i++)
+            memcpy(&x[i], (const char *)&store->rows[i] + columns[k].offset, sizeof *x);
+        bt_h5_append(store->h, store->column[k], H5T_NATIVE_DOUBLE, (hsize_t)store->written, (hsize_t)store->n_rows, x);
     }
     free(x);
-    s->written += s->n_rows;
-    s->n_rows = 0;
+    store->written += store->n_rows;
+    store->n_rows = 0;
 }
 
-void bt_impact_store_take_closed(bt_impact_store *s)
+void bt_impact_store_take_closed(bt_impact_store *store)
 {
-    if (!s->h || s->from->n_closed == 0) return;
-    const int64_t n = s->from->n_closed;
-    if (s->n_rows + n > s->cap_rows) {
-        s->cap_rows = 2 * (s->n_rows + n);
-        s->rows = bt_realloc(s->rows, (size_t)s->cap_rows, sizeof *s->rows);
+    if (!store->h || store->from->n_closed == 0) return;
+    const int64_t n = store->from->n_closed;
+    if (store->n_rows + n > store->cap_rows) {
+        store->cap_rows = 2 * (store->n_rows + n);
+        store->rows = bt_realloc(store->rows, (size_t)store->cap_rows, sizeof *store->rows);
     }
-    memcpy(s->rows + s->n_rows, s->from->closed, (size_t)n * sizeof *s->rows);
-    s->n_rows += n;
-    if (s->n_rows >= CHUNK) write_rows(s);
+    memcpy(store->rows + store->n_rows, store->from->closed, (size_t)n * sizeof *store->rows);
+    store->n_rows += n;
+    if (store->n_rows >= CHUNK) write_rows(store);
 }
 
-void bt_impact_store_take(bt_impact_store *s, double time, bool no_load)
+void bt_impact_store_take(bt_impact_store *store, double time, bool no_load)
 {
-    if (!s->h) return;
-    bt_impact_store_take_closed(s);
-    bt_panel *none = no_load ? bt_alloc((size_t)s->n_panels, sizeof *none) : NULL;
-    const bt_panel *panels = no_load ? none : s->from->panels.panel;
-    bt_panel_blocks_add(&s->blocks, panels, time < s->earliest);
-    for (int k = 0; k < s->n_panels; k++) {
-        const bt_panel *p = &panels[k];
-        s->sum[3 * k] += p->fx;
-        s->sum[3 * k + 1] += p->fy;
-        s->sum[3 * k + 2] += p->normal;
+    if (!store->h) return;
+    bt_impact_store_take_closed(store);
+    bt_panel *none = no_load ? bt_alloc((size_t)store->n_panels, sizeof *none) : NULL;
+    const bt_panel *panels = no_load ? none : store->from->panels.panel;
+    bt_panel_blocks_add(&store->blocks, panels, time < store->earliest);
+    for (int k = 0; k < store->n_panels; k++) {
+        const bt_panel *panel = &panels[k];
+        store->sum[3 * k] += panel->fx;
+        store->sum[3 * k + 1] += panel->fy;
+        store->sum[3 * k + 2] += panel->normal;
     }
-    s->n_merged++;
+    store->n_merged++;
     free(none);
 }
 
-void bt_impact_store_end_sample(bt_impact_store *s)
+void bt_impact_store_end_sample(bt_impact_store *store)
 {
-    if (!s->h || s->n_merged == 0) return;
-    const size_t n = (size_t)s->n_panels;
-    if (s->force >= 0) {
-        if (s->n_samples == s->cap_samples) {
-            s->cap_samples = s->cap_samples ? 2 * s->cap_samples : 64;
-            s->forces = bt_realloc(s->forces, (size_t)s->cap_samples * n, 2 * sizeof *s->forces);
-            s->normals = bt_realloc(s->normals, (size_t)s->cap_samples * n, sizeof *s->normals);
+    if (!store->h || store->n_merged == 0) return;
+    const size_t n = (size_t)store->n_panels;
+    if (store->force >= 0) {
+        if (store->n_samples == store->cap_samples) {
+            store->cap_samples = store->cap_samples ? 2 * store->cap_samples : 64;
+            store->forces = bt_realloc(store->forces, (size_t)store->cap_samples * n, 2 * sizeof *store->forces);
+            store->normals = bt_realloc(store->normals, (size_t)store->cap_samples * n, sizeof *store->normals);
         }
-        double *f = s->forces + 2 * n * (size_t)s->n_samples, *l = s->normals + n * (size_t)s->n_samples;
+        double *f = store->forces + 2 * n * (size_t)store->n_samples,
+               *l = store->normals + n * (size_t)store->n_samples;
         for (size_t k = 0; k < n; k++) {
-            f[2 * k] = s->sum[3 * k] / (double)s->n_merged;
-            f[2 * k + 1] = s->sum[3 * k + 1] / (double)s->n_merged;
-            l[k] = s->sum[3 * k + 2] / (double)s->n_merged;
+            f[2 * k] = store->sum[3 * k] / (double)store->n_merged;
+            f[2 * k + 1] = store->sum[3 * k + 1] / (double)store->n_merged;
+            l[k] = store->sum[3 * k + 2] / (double)store->n_merged;
         }
-        s->n_samples++;
+        store->n_samples++;
     }
-    memset(s->sum, 0, 3 * n * sizeof *s->sum);
-    s->n_merged = 0;
+    memset(store->sum, 0, 3 * n * sizeof *store->sum);
+    store->n_merged = 0;
 }
 
-void bt_impact_store_write(bt_impact_store *s)
+void bt_impact_store_write(bt_impact_store *store)
 {
-    if (!s->h) return;
-    write_rows(s);
-    if (s->n_samples > 0) {
-        bt_h5_append(s->h, s->force, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->forces);
-        bt_h5_append(s->h, s->normal, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples,
-                     s->normals);
+    if (!store->h) return;
+    write_rows(store);
+    if (store->n_samples > 0) {
+        bt_h5_append(store->h, store->force, H5T_NATIVE_DOUBLE, (hsize_t)store->samples_written,
+                     (hsize_t)store->n_samples, store->forces);
+        bt_h5_append(store->h, store->normal, H5T_NATIVE_DOUBLE, (hsize_t)store->samples_written,
+                     (hsize_t)store->n_samples, store->normals);
     }
-    s->samples_written += s->n_samples;
-    s->n_samples = 0;
+    store->samples_written += store->n_samples;
+    store->n_samples = 0;
 }
 
-void bt_impact_store_count(bt_impact_store *s, bt_impact_count *c)
+void bt_impact_store_count(bt_impact_store *store, bt_impact_count *count)
 {
     bt_impact *rows = bt_alloc(PIECE, sizeof *rows);
     double *x = bt_alloc(PIECE, sizeof *x);
-    for (int64_t first = 0; first < s->written && s->h->status == BT_OK; first += PIECE) {
-        const int64_t n = s->written - first < PIECE ? s->written - first : PIECE;
+    for (int64_t first = 0; first < store->written && store->h->status == BT_OK; first += PIECE) {
+        const int64_t n = store->written - first < PIECE ? store->written - first : PIECE;
         for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
-            bt_h5_read_back(s->h, s->column[k], H5T_NATIVE_DOUBLE, (hsize_t)first, (hsize_t)n, x);
+            bt_h5_read_back(store->h, store->column[k], H5T_NATIVE_DOUBLE, (hsize_t)first, (hsize_t)n, x);
             put_column(rows, n, k, x);
         }
-        for (int64_t i = 0; i < n && s->h->status == BT_OK; i++) bt_impact_count_add(c, &rows[i]);
+        for (int64_t i = 0; i < n && store->h->status == BT_OK; i++) bt_impact_count_add(count, &rows[i]);
     }
     free(rows);
     free(x);
 }
 
-void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const bt_steady *w)
+void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, const bt_steady *steady)
 {
-    const size_t n = (size_t)s->n_panels;
-    const double steps = (double)w->n;
+    const size_t n = (size_t)store->n_panels;
+    const double steps = (double)steady->n;
     bt_panel_loads *before = bt_alloc(2 * n, sizeof *before), *within = before + n;
-    bt_panel_blocks_reduce(&s->blocks, w->put_off, before, within);
+    bt_panel_blocks_reduce(&store->blocks, steady->put_off, before, within);
     double *x = bt_alloc(7 * n, sizeof *x);
     int64_t *count = bt_alloc(n, sizeof *count);
     for (size_t k = 0; k < n; k++) {
@@ -211,11 +217,11 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
         x[6 * n + k] = c->panel[k].start_peak;
         count[k] = c->panel[k].n;
     }
-    bt_h5 *h = s->h;
-    bt_h5_attr_double(h, "/panels", "from", w->start);
-    bt_h5_attr_int(h, "/panels", "steps", w->n);
-    bt_h5_write(h, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
-    bt_h5_describe(h, "/panels/mean_force", "panel xy", "N",
+    bt_h5 *h5 = store->h;
+    bt_h5_attr_double(h5, "/panels", "from", steady->start);
+    bt_h5_attr_int(h5, "/panels", "steps", steady->n);
+    bt_h5_write(h5, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
+    bt_h5_describe(h5, "/panels/mean_force", "panel xy", "N",
              "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
     const struct { const char *path, *text; } of_normals[] = {
         {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
@@ -225,11 +231,11 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
         {"/panels/start_max_peak", "largest peak of a collision before the window by the conversion of /impacts"},
     };
     for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++) {
-        bt_h5_write(h, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n);
-        bt_h5_describe(h, of_normals[k].path, "panel", "N", of_normals[k].text);
+        bt_h5_write(h5, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n);
+        bt_h5_describe(h5, of_normals[k].path, "panel", "N", of_normals[k].text);
     }
-    bt_h5_write(h, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
-    bt_h5_describe(h, "/panels/collisions", "panel", "1", "collisions in the window");
+    bt_h5_write(h5, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
+    bt_h5_describe(h5, "/panels/collisions", "panel", "1", "collisions in the window");
     free(x);
     free(count);
     free(before);
@@ -246,42 +252,43 @@ static const bt_state_row state_rows[] = {
 };
 enum { N_STATE = sizeof state_rows / sizeof *state_rows, LOADS_WIDTH = sizeof(bt_panel_loads) / sizeof(double) };
 
-void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to)
+void bt_impact_store_save(const bt_impact_store *store, bt_snapshot *to)
 {
-    if (!s->h) return;
-    bt_snapshot_add_rows(to, "collisions", state_rows, N_STATE, s);
-    bt_snapshot_add(to, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
-    bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64, bt_panel_blocks_rows(&s->blocks, s->blocks.steps),
-                    LOADS_WIDTH, s->blocks.load);
+    if (!store->h) return;
+    bt_snapshot_add_rows(to, "collisions", state_rows, N_STATE, store);
+    bt_snapshot_add(to, "collisions/sum", BT_ITEM_F64, store->n_panels, 3, store->sum);
+    bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64,
+                    bt_panel_blocks_rows(&store->blocks, store->blocks.steps), LOADS_WIDTH, store->blocks.load);
 }
 
 /// Can the rows that are kept be counted?
-static bool rows_sound(const bt_impact_store *s)
+static bool rows_sound(const bt_impact_store *store)
 {
     bool sound = true;
-    for (int64_t i = 0; i < s->n_rows; i++) {
-        const bt_impact *e = &s->rows[i];
-        sound = sound && e->panel >= 0 && e->panel < s->n_panels && isfinite(e->time) && isfinite(e->peak);
+    for (int64_t i = 0; i < store->n_rows; i++) {
+        const bt_impact *impact = &store->rows[i];
+        sound = sound && impact->panel >= 0 && impact->panel < store->n_panels && isfinite(impact->time) &&
+                isfinite(impact->peak);
     }
     return sound;
 }
 
 /// The first n rows of the old file into the new one.
-static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
+static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc(PIECE, sizeof *x);
-    s->cap_rows = PIECE;
-    s->rows = bt_realloc(s->rows, PIECE, sizeof *s->rows);
+    store->cap_rows = PIECE;
+    store->rows = bt_realloc(store->rows, PIECE, sizeof *store->rows);
     for (int64_t first = 0; first < n && old->status == BT_OK; first += PIECE) {
-        s->n_rows = n - first < PIECE ? n - first : PIECE;
+        store->n_rows = n - first < PIECE ? n - first : PIECE;
         for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
             char path[64];
             snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-            bt_h5_read(old, path, H5T_NATIVE_DOUBLE, first, s->n_rows, 1, x);
-            put_column(s->rows, s->n_rows, k, x);
+            bt_h5_read(old, path, H5T_NATIVE_DOUBLE, first, store->n_rows, 1, x);
+            put_column(store->rows, store->n_rows, k, x);
         }
-        if (old->status == BT_OK && rows_sound(s)) {
-            write_rows(s);
+        if (old->status == BT_OK && rows_sound(store)) {
+            write_rows(store);
         } else if (old->status == BT_OK) {
             bt_errors_add(old->err,
                           "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is "
@@ -294,68 +301,69 @@ static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
 }
 
 /// Steps up to `step` that do not end before the earliest start.
-static int64_t late_steps(const bt_impact_store *s, int64_t step)
+static int64_t late_steps(const bt_impact_store *store, int64_t step)
 {
     int64_t n = 0;
-    for (int64_t k = 1; k <= step; k++) n += !((double)k * s->from->dt < s->earliest);
+    for (int64_t k = 1; k <= step; k++) n += !((double)k * store->from->dt < store->earliest);
     return n;
 }
 
-static void load_blocks(bt_impact_store *s, bt_snapshot *from, int64_t steps)
+static void load_blocks(bt_impact_store *store, bt_snapshot *from, int64_t steps)
 {
     int64_t rows = 0;
     double *load = bt_snapshot_copy(from, "collisions/panel_blocks", BT_ITEM_F64, LOADS_WIDTH, &rows);
     bool finite = true;
     for (int64_t k = 0; k < rows * LOADS_WIDTH; k++) finite = finite && isfinite(load[k]);
     bt_snapshot_want(from, finite, "collisions/panel_blocks", -1, "is not finite");
-    bt_snapshot_want(from, steps == late_steps(s, bt_snapshot_int(from, "world/step")), "collisions/panel_steps", -1,
+    bt_snapshot_want(from, steps == late_steps(store, bt_snapshot_int(from, "world/step")), "collisions/panel_steps",
+                     -1,
                      "does not fit the number of steps");
     if (!from->faulty)
-        bt_snapshot_want(from, rows == bt_panel_blocks_rows(&s->blocks, steps), "collisions/panel_blocks", -1,
+        bt_snapshot_want(from, rows == bt_panel_blocks_rows(&store->blocks, steps), "collisions/panel_blocks", -1,
                          "does not fit the number of steps");
     if (from->faulty) free(load);
-    else bt_panel_blocks_restore(&s->blocks, steps, (bt_panel_loads *)(void *)load);
+    else bt_panel_blocks_restore(&store->blocks, steps, (bt_panel_loads *)(void *)load);
 }
 
-void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old)
+void bt_impact_store_load(bt_impact_store *store, bt_snapshot *from, bt_h5_reader *old)
 {
-    if (!s->h) return;
-    bt_impact_store then = *s;
+    if (!store->h) return;
+    bt_impact_store then = *store;
     bt_snapshot_take_rows(from, "collisions", state_rows, N_STATE, &then);
-    bt_snapshot_take(from, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
+    bt_snapshot_take(from, "collisions/sum", BT_ITEM_F64, store->n_panels, 3, store->sum);
     const int64_t there = bt_h5_size(old, "/impacts/time", 0), entries = bt_snapshot_int(from, "record/entries");
     bt_snapshot_want(from, then.n_merged == bt_snapshot_int(from, "record/merged_steps"), "collisions/n_merged", -1,
                      "is not the number of steps in the entry under way");
     bt_snapshot_want(from, then.written >= 0 && then.written <= there, "collisions/written", -1,
                      "is not a number of collisions that result.h5 has");
-    bt_snapshot_want(from, then.samples_written == (s->force >= 0 ? entries : 0), "collisions/samples_written", -1,
+    bt_snapshot_want(from, then.samples_written == (store->force >= 0 ? entries : 0), "collisions/samples_written", -1,
                      "is not the number of entries");
-    load_blocks(s, from, then.blocks.steps);
+    load_blocks(store, from, then.blocks.steps);
     if (from->faulty || old->status != BT_OK) return;
-    s->n_merged = then.n_merged;
-    load_rows(s, old, then.written);
-    const size_t n = (size_t)then.samples_written, width = (size_t)s->n_panels;
-    if (s->force >= 0 && n > 0) {
-        s->cap_samples = s->n_samples = then.samples_written;
-        s->forces = bt_realloc(s->forces, n * width, 2 * sizeof *s->forces);
-        s->normals = bt_realloc(s->normals, n * width, sizeof *s->normals);
-        bt_h5_read(old, "/panels/force", H5T_NATIVE_DOUBLE, 0, s->n_samples, 2 * s->n_panels, s->forces);
-        bt_h5_read(old, "/panels/load", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->n_panels, s->normals);
+    store->n_merged = then.n_merged;
+    load_rows(store, old, then.written);
+    const size_t n = (size_t)then.samples_written, width = (size_t)store->n_panels;
+    if (store->force >= 0 && n > 0) {
+        store->cap_samples = store->n_samples = then.samples_written;
+        store->forces = bt_realloc(store->forces, n * width, 2 * sizeof *store->forces);
+        store->normals = bt_realloc(store->normals, n * width, sizeof *store->normals);
+        bt_h5_read(old, "/panels/force", H5T_NATIVE_DOUBLE, 0, store->n_samples, 2 * store->n_panels, store->forces);
+        bt_h5_read(old, "/panels/load", H5T_NATIVE_DOUBLE, 0, store->n_samples, store->n_panels, store->normals);
     }
-    if (old->status == BT_OK) bt_impact_store_write(s);
+    if (old->status == BT_OK) bt_impact_store_write(store);
 }
 
-void bt_impact_store_close(bt_impact_store *s)
+void bt_impact_store_close(bt_impact_store *store)
 {
-    if (!s->h) return;
+    if (!store->h) return;
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++)
-        if (s->column[k] >= 0) H5Dclose(s->column[k]);
-    if (s->force >= 0) H5Dclose(s->force);
-    if (s->normal >= 0) H5Dclose(s->normal);
-    free(s->rows);
-    free(s->forces);
-    free(s->normals);
-    free(s->sum);
-    bt_panel_blocks_free(&s->blocks);
-    *s = (bt_impact_store){0};
+        if (store->column[k] >= 0) H5Dclose(store->column[k]);
+    if (store->force >= 0) H5Dclose(store->force);
+    if (store->normal >= 0) H5Dclose(store->normal);
+    free(store->rows);
+    free(store->forces);
+    free(store->normals);
+    free(store->sum);
+    bt_panel_blocks_free(&store->blocks);
+    *store = (bt_impact_store){0};
 }

@@ -29,25 +29,25 @@ typedef struct bt_impact_store {
     int64_t n_merged, n_samples, cap_samples, samples_written;
 } bt_impact_store;
 
-/// Make the groups of case c. With output.panels the panel loads of every sample are in them.
-void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c);
+/// Make the groups of the case. With output.panels the panel loads of every sample are in them.
+void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts *impacts, const bt_case *input);
 /// Collisions that ended in the last step, and its panel loads; time: its end, s. no_load: they are no numbers, and
 /// count as none.
-void bt_impact_store_take(bt_impact_store *s, double time, bool no_load);
+void bt_impact_store_take(bt_impact_store *store, double time, bool no_load);
 /// Collisions alone: those that the end of the run has closed.
-void bt_impact_store_take_closed(bt_impact_store *s);
+void bt_impact_store_take_closed(bt_impact_store *store);
 /// The present sample is complete.
-void bt_impact_store_end_sample(bt_impact_store *s);
+void bt_impact_store_end_sample(bt_impact_store *store);
 /// What is kept into the file.
-void bt_impact_store_write(bt_impact_store *s);
-/// Everything is written: the collisions of the file, one after the other, into c.
-void bt_impact_store_count(bt_impact_store *s, bt_impact_count *c);
-/// Means and maxima by panel, over the window w and before it.
-void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const bt_steady *w);
+void bt_impact_store_write(bt_impact_store *store);
+/// Everything is written: the collisions of the file, one after the other, into `count`.
+void bt_impact_store_count(bt_impact_store *store, bt_impact_count *count);
+/// Means and maxima by panel, over the window `steady` and before it.
+void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, const bt_steady *steady);
 /// Where it stands, after bt_impact_store_write.
-void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to);
+void bt_impact_store_save(const bt_impact_store *store, bt_snapshot *to);
 /// Go on from there: what had been written by then comes from `old`, the result file of that run.
-void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old);
-void bt_impact_store_close(bt_impact_store *s);
+void bt_impact_store_load(bt_impact_store *store, bt_snapshot *from, bt_h5_reader *old);
+void bt_impact_store_close(bt_impact_store *store);
 
 #endif

@@ -9,20 +9,20 @@
 #include "bergtow/world.h"
 
 /// Collective. Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.
-void bt_observe(bt_world *w, double reference_speed, bt_sample *s);
+void bt_observe(bt_world *world, double reference_speed, bt_sample *sample);
 
 /// What the numbers of this world's samples apply to: bit 1 << k for each bt_applies k.
-unsigned bt_observe_applies(const bt_world *w);
+unsigned bt_observe_applies(const bt_world *world);
 
 /// Collective. Area of all floes, m².
-double bt_observe_ice_area(const bt_world *w);
+double bt_observe_ice_area(const bt_world *world);
 
 /// Collective. Largest normal contact force on each body of this rank in the step just done, N. force: [n bodies].
-void bt_observe_contact_force(const bt_world *w, double *force);
+void bt_observe_contact_force(const bt_world *world, double *force);
 
 /// Collective. Sum of all contact forces on each body in the last step, N, to force [n]: of floes that move
 /// freely from their momentum, m (U2 - U*) / dt, which needs no order of their contacts; of the others, few, which may
 /// be led or fixed, from their contacts. As the last step left it: 0 before the first.
-void bt_observe_net_force(const bt_comm *c, const bt_world *w, const bt_roster *roster, double (*force)[2]);
+void bt_observe_net_force(const bt_comm *comm, const bt_world *world, const bt_roster *roster, double (*force)[2]);
 
 #endif

@@ -42,140 +42,143 @@ static const struct { const char *name; bool single; hsize_t width; const char *
     {"/frames/piece_thickness", false, 0, "piece_in_frame", "m", "thickness of the piece"},
 };
 
-static hid_t grow(bt_h5 *h, const char *name, hid_t type, hsize_t width)
+static hid_t grow(bt_h5 *h5, const char *name, hid_t type, hsize_t width)
 {
-    return bt_h5_growing(h, name, type, width ? 2 : 1, &width, (hsize_t[]){256, width ? width : 1}, false);
+    return bt_h5_growing(h5, name, type, width ? 2 : 1, &width, (hsize_t[]){256, width ? width : 1}, false);
 }
 
-void bt_piece_store_create(bt_piece_store *p, bt_h5 *h, const bt_splitting *s, const bt_roster *roster, double dt,
-                           const bt_map_axes *axes)
+void bt_piece_store_create(bt_piece_store *store, bt_h5 *h5, const bt_splitting *splitting, const bt_roster *roster,
+                           double dt, const bt_map_axes *axes)
 {
-    *p = (bt_piece_store){.h = h, .s = s, .roster = roster, .dt = dt, .axes = *axes};
-    bt_h5_group(h, "/splits");
-    bt_h5_group(h, "/pieces");
+    *store = (bt_piece_store){.h = h5, .s = splitting, .roster = roster, .dt = dt, .axes = *axes};
+    bt_h5_group(h5, "/splits");
+    bt_h5_group(h5, "/pieces");
     for (int k = 0; k < BT_SPLIT_COLUMNS; k++) {
         const column *c = &splits[k];
-        p->split[k] = grow(h, c->name, c->whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, c->width);
-        bt_h5_describe(h, c->name, c->axes, c->units, c->text);
+        store->split[k] = grow(h5, c->name, c->whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, c->width);
+        bt_h5_describe(h5, c->name, c->axes, c->units, c->text);
     }
-    p->area = grow(h, "/pieces/area", H5T_NATIVE_DOUBLE, 0);
-    p->offsets = grow(h, "/pieces/offsets", H5T_NATIVE_INT64, 0);
-    p->vertices = grow(h, "/pieces/vertices", H5T_NATIVE_DOUBLE, 2);
-    bt_h5_append(h, p->offsets, H5T_NATIVE_INT64, 0, 1, &(int64_t){0});
-    bt_h5_describe(h, "/pieces/area", "piece", "m2", "area of each piece: split k made the pieces 2 k and 2 k + 1");
-    bt_h5_describe(h, "/pieces/offsets", "piece_end", "1", "piece i has the vertices offsets[i] up to offsets[i + 1]");
-    bt_h5_describe(h, "/pieces/vertices", "piece_vertex xy", "m",
+    store->area = grow(h5, "/pieces/area", H5T_NATIVE_DOUBLE, 0);
+    store->offsets = grow(h5, "/pieces/offsets", H5T_NATIVE_INT64, 0);
+    store->vertices = grow(h5, "/pieces/vertices", H5T_NATIVE_DOUBLE, 2);
+    bt_h5_append(h5, store->offsets, H5T_NATIVE_INT64, 0, 1, &(int64_t){0});
+    bt_h5_describe(h5, "/pieces/area", "piece", "m2", "area of each piece: split k made the pieces 2 k and 2 k + 1");
+    bt_h5_describe(h5, "/pieces/offsets", "piece_end", "1", "piece i has the vertices offsets[i] up to offsets[i + 1]");
+    bt_h5_describe(h5, "/pieces/vertices", "piece_vertex xy", "m",
                    "x, y in the frame of the piece, anticlockwise about its centroid");
-    p->end = grow(h, "/frames/piece_end", H5T_NATIVE_INT64, 0);
-    bt_h5_describe(h, "/frames/piece_end", "time", "1", "end of the rows of each frame in piece, piece_pose, ...");
+    store->end = grow(h5, "/frames/piece_end", H5T_NATIVE_INT64, 0);
+    bt_h5_describe(h5, "/frames/piece_end", "time", "1", "end of the rows of each frame in piece, piece_pose, ...");
     for (int k = 0; k < BT_PIECE_COLUMNS; k++) {
         const hid_t type = k == 0 ? H5T_NATIVE_INT64 : pieces[k].single ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
-        p->piece[k] = grow(h, pieces[k].name, type, pieces[k].width);
-        bt_h5_describe(h, pieces[k].name, pieces[k].axes, pieces[k].units, pieces[k].text);
+        store->piece[k] = grow(h5, pieces[k].name, type, pieces[k].width);
+        bt_h5_describe(h5, pieces[k].name, pieces[k].axes, pieces[k].units, pieces[k].text);
     }
 }
 
 /// A floe as a row of /floes, or from n_floes on of /pieces.
-static int64_t floe_of(const bt_piece_store *p, bt_gid gid)
+static int64_t floe_of(const bt_piece_store *store, bt_gid gid)
 {
-    const bt_gid row = bt_roster_row(p->roster, gid);
-    return row >= 0 ? row : p->roster->n_floes + (gid - p->s->first);
+    const bt_gid row = bt_roster_row(store->roster, gid);
+    return row >= 0 ? row : store->roster->n_floes + (gid - store->s->first);
 }
 
-void bt_piece_store_write(bt_piece_store *p)
+void bt_piece_store_write(bt_piece_store *store)
 {
-    if (!p->h) return;
-    for (; p->n_splits < p->s->n; p->n_splits++) {
-        const bt_split_record *r = &p->s->split[p->n_splits];
-        const hsize_t at = (hsize_t)p->n_splits;
-        const int64_t whole[] = {[PARENT] = floe_of(p, r->parent), [GENERATION] = r->generation, [MODE] = r->mode};
-        const double real[] = {[TIME] = (double)(r->step + 1) * p->dt, [RATIO] = r->ratio, [THICKNESS] = r->thickness};
+    if (!store->h) return;
+    for (; store->n_splits < store->s->n; store->n_splits++) {
+        const bt_split_record *record = &store->s->split[store->n_splits];
+        const hsize_t at = (hsize_t)store->n_splits;
+        const int64_t whole[] = {[PARENT] = floe_of(store, record->parent), [GENERATION] = record->generation,
+                                 [MODE] = record->mode};
+        const double real[] = {[TIME] = (double)(record->step + 1) * store->dt, [RATIO] = record->ratio,
+                               [THICKNESS] = record->thickness};
         for (int k = 0; k < CRACK; k++) {
             const void *value = splits[k].whole ? (const void *)&whole[k] : (const void *)&real[k];
-            bt_h5_append(p->h, p->split[k], splits[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, at, 1, value);
+            bt_h5_append(store->h, store->split[k], splits[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, at, 1,
+                         value);
         }
-        const double crack[4] = {r->near[0], r->near[1], r->far[0], r->far[1]};
-        bt_h5_append(p->h, p->split[CRACK], H5T_NATIVE_DOUBLE, at, 1, crack);
-        bt_h5_append(p->h, p->area, H5T_NATIVE_DOUBLE, 2 * at, 2, r->area);
-        const int64_t first = p->n_vertices, both = r->corners[0] + r->corners[1];
-        const int64_t end[2] = {first + r->corners[0], first + both};
-        bt_h5_append(p->h, p->offsets, H5T_NATIVE_INT64, 2 * at + 1, 2, end);
-        bt_h5_append(p->h, p->vertices, H5T_NATIVE_DOUBLE, (hsize_t)first, (hsize_t)both,
-                     bt_splitting_outline(p->s, p->n_splits, 0));
-        p->n_vertices += both;
+        const double crack[4] = {record->near[0], record->near[1], record->far[0], record->far[1]};
+        bt_h5_append(store->h, store->split[CRACK], H5T_NATIVE_DOUBLE, at, 1, crack);
+        bt_h5_append(store->h, store->area, H5T_NATIVE_DOUBLE, 2 * at, 2, record->area);
+        const int64_t first = store->n_vertices, both = record->corners[0] + record->corners[1];
+        const int64_t end[2] = {first + record->corners[0], first + both};
+        bt_h5_append(store->h, store->offsets, H5T_NATIVE_INT64, 2 * at + 1, 2, end);
+        bt_h5_append(store->h, store->vertices, H5T_NATIVE_DOUBLE, (hsize_t)first, (hsize_t)both,
+                     bt_splitting_outline(store->s, store->n_splits, 0));
+        store->n_vertices += both;
     }
 }
 
 /// Columns of the frames from rows of the world.
-static void fill(const bt_piece_store *p, int k, const bt_piece_row *rows, int64_t n, void *to)
+static void fill(const bt_piece_store *store, int k, const bt_piece_row *rows, int64_t n, void *to)
 {
     double *d = to;
     float *f = to;
     for (int64_t i = 0; i < n; i++) {
-        const bt_frame_row *r = &rows[i].row;
+        const bt_frame_row *row = &rows[i].row;
         switch (k) {
         case 0: ((int64_t *)to)[i] = (int64_t)rows[i].piece; break;
-        case 1: d[3 * i] = r->x, d[3 * i + 1] = r->y, d[3 * i + 2] = r->yaw; break;
-        case 2: d[i] = r->contact_force; break;
-        case 3: d[i] = r->speed; break;
-        case 4: f[2 * i] = (float)r->vx, f[2 * i + 1] = (float)r->vy; break;
-        case 5: f[2 * i] = (float)r->fx, f[2 * i + 1] = (float)r->fy; break;
-        default: d[i] = bt_splitting_birth(p->s, (bt_gid)rows[i].piece)->thickness;
+        case 1: d[3 * i] = row->x, d[3 * i + 1] = row->y, d[3 * i + 2] = row->yaw; break;
+        case 2: d[i] = row->contact_force; break;
+        case 3: d[i] = row->speed; break;
+        case 4: f[2 * i] = (float)row->vx, f[2 * i + 1] = (float)row->vy; break;
+        case 5: f[2 * i] = (float)row->fx, f[2 * i + 1] = (float)row->fy; break;
+        default: d[i] = bt_splitting_birth(store->s, (bt_gid)rows[i].piece)->thickness;
         }
     }
 }
 
 /// Polygons as ParaView draws them: topology and points.
-static void draw(const bt_piece_store *p, const bt_piece_row *rows, int64_t n, int64_t n_points, int32_t *topology,
+static void draw(const bt_piece_store *store, const bt_piece_row *rows, int64_t n, int64_t n_points, int32_t *topology,
                  float *points)
 {
     int64_t at = 0, t = 0;
     (void)n_points;
     for (int64_t i = 0; i < n; i++) {
-        const int64_t k = (int64_t)rows[i].piece, corners = p->s->split[k / 2].corners[k % 2];
-        const double *v = bt_splitting_outline(p->s, k / 2, (int)(k % 2)), c = bt_cos(rows[i].row.yaw),
+        const int64_t k = (int64_t)rows[i].piece, corners = store->s->split[k / 2].corners[k % 2];
+        const double *v = bt_splitting_outline(store->s, k / 2, (int)(k % 2)), c = bt_cos(rows[i].row.yaw),
                      s = bt_sin(rows[i].row.yaw);
         topology[t++] = BT_XDMF_POLYGON;
         topology[t++] = (int32_t)corners;
         for (int64_t q = 0; q < corners; q++) {
             double drawn[2];
-            bt_map_axes_point(&p->axes, rows[i].row.x + c * v[2 * q] - s * v[2 * q + 1],
+            bt_map_axes_point(&store->axes, rows[i].row.x + c * v[2 * q] - s * v[2 * q + 1],
                               rows[i].row.y + s * v[2 * q] + c * v[2 * q + 1], drawn);
             points[2 * (at + q)] = (float)drawn[0], points[2 * (at + q) + 1] = (float)drawn[1];
-            topology[t++] = (int32_t)(at + (p->axes.swapped ? corners - 1 - q : q));
+            topology[t++] = (int32_t)(at + (store->axes.swapped ? corners - 1 - q : q));
         }
         at += corners;
     }
 }
 
-static void write_paraview(const bt_piece_store *p, const bt_piece_row *rows, int64_t n, int64_t n_points)
+static void write_paraview(const bt_piece_store *store, const bt_piece_row *rows, int64_t n, int64_t n_points)
 {
     char path[64];
     const size_t cells = (size_t)n;
     int32_t *topology = bt_alloc((size_t)n_points + 2 * cells, sizeof *topology), *id = bt_alloc(cells, sizeof *id);
     float *points = bt_alloc(2 * (size_t)n_points, sizeof *points), *one = bt_alloc(cells, sizeof *one),
           *three = bt_alloc(3 * cells, sizeof *three);
-    draw(p, rows, n, n_points, topology, points);
-#define NAMED(name) (snprintf(path, sizeof path, "/xdmf/%06lld/piece" name, (long long)p->n_frames), path)
-    bt_h5_write(p->h, NAMED("s"), H5T_NATIVE_INT32, (hsize_t)(n_points + 2 * n), 0, topology);
-    bt_h5_write(p->h, NAMED("_points"), H5T_NATIVE_FLOAT, (hsize_t)n_points, 2, points);
+    draw(store, rows, n, n_points, topology, points);
+#define NAMED(name) (snprintf(path, sizeof path, "/xdmf/%06lld/piece" name, (long long)store->n_frames), path)
+    bt_h5_write(store->h, NAMED("s"), H5T_NATIVE_INT32, (hsize_t)(n_points + 2 * n), 0, topology);
+    bt_h5_write(store->h, NAMED("_points"), H5T_NATIVE_FLOAT, (hsize_t)n_points, 2, points);
     for (size_t i = 0; i < cells; i++) one[i] = (float)rows[i].row.speed;
-    bt_h5_write(p->h, NAMED("_speed"), H5T_NATIVE_FLOAT, cells, 0, one);
+    bt_h5_write(store->h, NAMED("_speed"), H5T_NATIVE_FLOAT, cells, 0, one);
     for (size_t i = 0; i < cells; i++) one[i] = (float)rows[i].row.contact_force;
-    bt_h5_write(p->h, NAMED("_force"), H5T_NATIVE_FLOAT, cells, 0, one);
+    bt_h5_write(store->h, NAMED("_force"), H5T_NATIVE_FLOAT, cells, 0, one);
     for (int net = 0; net < 2; net++) {
         for (size_t i = 0; i < cells; i++) {
-            const bt_frame_row *r = &rows[i].row;
+            const bt_frame_row *row = &rows[i].row;
             double drawn[2];
-            bt_map_axes_vector(&p->axes, net ? r->fx : r->vx, net ? r->fy : r->vy, drawn);
+            bt_map_axes_vector(&store->axes, net ? row->fx : row->vx, net ? row->fy : row->vy, drawn);
             three[3 * i] = (float)drawn[0], three[3 * i + 1] = (float)drawn[1], three[3 * i + 2] = 0;
         }
-        bt_h5_write(p->h, net ? NAMED("_net_force") : NAMED("_velocity"), H5T_NATIVE_FLOAT, cells, 3, three);
+        bt_h5_write(store->h, net ? NAMED("_net_force") : NAMED("_velocity"), H5T_NATIVE_FLOAT, cells, 3, three);
     }
-    for (size_t i = 0; i < cells; i++) one[i] = (float)bt_splitting_birth(p->s, (bt_gid)rows[i].piece)->thickness;
-    bt_h5_write(p->h, NAMED("_thickness"), H5T_NATIVE_FLOAT, cells, 0, one);
-    for (size_t i = 0; i < cells; i++) id[i] = (int32_t)(p->roster->n_floes + (int64_t)rows[i].piece);
-    bt_h5_write(p->h, NAMED("_id"), H5T_NATIVE_INT32, cells, 0, id);
+    for (size_t i = 0; i < cells; i++) one[i] = (float)bt_splitting_birth(store->s, (bt_gid)rows[i].piece)->thickness;
+    bt_h5_write(store->h, NAMED("_thickness"), H5T_NATIVE_FLOAT, cells, 0, one);
+    for (size_t i = 0; i < cells; i++) id[i] = (int32_t)(store->roster->n_floes + (int64_t)rows[i].piece);
+    bt_h5_write(store->h, NAMED("_id"), H5T_NATIVE_INT32, cells, 0, id);
 #undef NAMED
     free(topology);
     free(id);
@@ -184,30 +187,30 @@ static void write_paraview(const bt_piece_store *p, const bt_piece_row *rows, in
     free(three);
 }
 
-void bt_piece_store_frame(bt_piece_store *p, const bt_piece_row *rows, int64_t n)
+void bt_piece_store_frame(bt_piece_store *store, const bt_piece_row *rows, int64_t n)
 {
-    if (!p->h) return;
-    bt_piece_store_write(p);
+    if (!store->h) return;
+    bt_piece_store_write(store);
     void *buffer = bt_alloc((size_t)n, 3 * sizeof(double));
     for (int k = 0; k < BT_PIECE_COLUMNS; k++) {
         const hid_t type = k == 0 ? H5T_NATIVE_INT64 : pieces[k].single ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
-        fill(p, k, rows, n, buffer);
-        bt_h5_append(p->h, p->piece[k], type, (hsize_t)p->n_rows, (hsize_t)n, buffer);
+        fill(store, k, rows, n, buffer);
+        bt_h5_append(store->h, store->piece[k], type, (hsize_t)store->n_rows, (hsize_t)n, buffer);
     }
     free(buffer);
     int64_t points = 0;
     for (int64_t i = 0; i < n; i++) {
         const int64_t k = (int64_t)rows[i].piece;
-        points += p->s->split[k / 2].corners[k % 2];
+        points += store->s->split[k / 2].corners[k % 2];
     }
-    if (n > 0) write_paraview(p, rows, n, points);
-    if (p->n_frames == p->cap) {
-        p->cap = p->cap ? 2 * p->cap : 64;
-        p->frame = bt_realloc(p->frame, (size_t)p->cap, sizeof *p->frame);
+    if (n > 0) write_paraview(store, rows, n, points);
+    if (store->n_frames == store->cap) {
+        store->cap = store->cap ? 2 * store->cap : 64;
+        store->frame = bt_realloc(store->frame, (size_t)store->cap, sizeof *store->frame);
     }
-    p->frame[p->n_frames] = (bt_piece_count){n, points};
-    p->n_rows += n;
-    bt_h5_append(p->h, p->end, H5T_NATIVE_INT64, (hsize_t)p->n_frames++, 1, &p->n_rows);
+    store->frame[store->n_frames] = (bt_piece_count){n, points};
+    store->n_rows += n;
+    bt_h5_append(store->h, store->end, H5T_NATIVE_INT64, (hsize_t)store->n_frames++, 1, &store->n_rows);
 }
 
 bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n)
@@ -224,14 +227,14 @@ bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n)
         const hid_t type = c == 0 ? H5T_NATIVE_INT64 : pieces[c].single ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
         bt_h5_read(old, pieces[c].name, type, ends[0], *n, pieces[c].width ? (int64_t)pieces[c].width : 1, buffer);
         for (int64_t i = 0; i < *n; i++) {
-            bt_frame_row *r = &rows[i].row;
+            bt_frame_row *row = &rows[i].row;
             switch (c) {
             case 0: rows[i].piece = (double)((const int64_t *)buffer)[i]; break;
-            case 1: r->x = d[3 * i], r->y = d[3 * i + 1], r->yaw = d[3 * i + 2]; break;
-            case 2: r->contact_force = d[i]; break;
-            case 3: r->speed = d[i]; break;
-            case 4: r->vx = (double)f[2 * i], r->vy = (double)f[2 * i + 1]; break;
-            default: r->fx = (double)f[2 * i], r->fy = (double)f[2 * i + 1];
+            case 1: row->x = d[3 * i], row->y = d[3 * i + 1], row->yaw = d[3 * i + 2]; break;
+            case 2: row->contact_force = d[i]; break;
+            case 3: row->speed = d[i]; break;
+            case 4: row->vx = (double)f[2 * i], row->vy = (double)f[2 * i + 1]; break;
+            default: row->fx = (double)f[2 * i], row->fy = (double)f[2 * i + 1];
             }
         }
     }
@@ -239,16 +242,16 @@ bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n)
     return rows;
 }
 
-void bt_piece_store_close(bt_piece_store *p)
+void bt_piece_store_close(bt_piece_store *store)
 {
-    if (!p->h) return;
-    const hid_t others[] = {p->area, p->offsets, p->vertices, p->end};
+    if (!store->h) return;
+    const hid_t others[] = {store->area, store->offsets, store->vertices, store->end};
     for (int k = 0; k < BT_SPLIT_COLUMNS; k++)
-        if (p->split[k] >= 0) H5Dclose(p->split[k]);
+        if (store->split[k] >= 0) H5Dclose(store->split[k]);
     for (int k = 0; k < BT_PIECE_COLUMNS; k++)
-        if (p->piece[k] >= 0) H5Dclose(p->piece[k]);
+        if (store->piece[k] >= 0) H5Dclose(store->piece[k]);
     for (int k = 0; k < 4; k++)
         if (others[k] >= 0) H5Dclose(others[k]);
-    free(p->frame);
-    *p = (bt_piece_store){0};
+    free(store->frame);
+    *store = (bt_piece_store){0};
 }

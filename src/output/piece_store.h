@@ -35,14 +35,14 @@ typedef struct bt_piece_store {
 } bt_piece_store;
 
 /// On rank 0, before the first frame. All arguments must stay valid.
-void bt_piece_store_create(bt_piece_store *p, bt_h5 *h, const struct bt_splitting *s, const bt_roster *roster,
-                           double dt, const bt_map_axes *axes);
+void bt_piece_store_create(bt_piece_store *store, bt_h5 *h5, const struct bt_splitting *splitting,
+                           const bt_roster *roster, double dt, const bt_map_axes *axes);
 /// The splits since the last call.
-void bt_piece_store_write(bt_piece_store *p);
+void bt_piece_store_write(bt_piece_store *store);
 /// The pieces [n] of a frame, in the order of their ids; the frame is in /xdmf.
-void bt_piece_store_frame(bt_piece_store *p, const bt_piece_row *rows, int64_t n);
+void bt_piece_store_frame(bt_piece_store *store, const bt_piece_row *rows, int64_t n);
 /// Those of frame k of an older file, for bt_piece_store_frame; [*n], to be freed.
 bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n);
-void bt_piece_store_close(bt_piece_store *p);
+void bt_piece_store_close(bt_piece_store *store);
 
 #endif

@@ -54,12 +54,12 @@ static bool is_taken(const char *name)
 }
 
 /// mean_NAME_n for a mean in N: the units as the other keys of summary.json end with them.
-static void make_key(const bt_quantity *q, char key[MOST_KEY])
+static void make_key(const bt_quantity *quantity, char key[MOST_KEY])
 {
-    int n = snprintf(key, MOST_KEY, "%s_%s", bt_keep_names[q->keep], q->name);
-    if (!strcmp(q->units, "1")) return;
+    int n = snprintf(key, MOST_KEY, "%s_%s", bt_keep_names[quantity->keep], quantity->name);
+    if (!strcmp(quantity->units, "1")) return;
     if (n + 1 < MOST_KEY) key[n++] = '_';
-    for (const char *u = q->units; *u && n + 1 < MOST_KEY; u++)
+    for (const char *u = quantity->units; *u && n + 1 < MOST_KEY; u++)
         key[n++] = isalnum((unsigned char)*u) ? (char)tolower((unsigned char)*u) : '_';
     key[n] = '\0';
 }
@@ -86,23 +86,24 @@ static void registry_check(const char *name, int more, bt_errors *err)
                       "force whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
 }
 
-bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
+bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
 {
     const size_t before = err->n;
-    const char *name = q->name ? q->name : "";
+    const char *name = quantity->name ? quantity->name : "";
     registry_check(name, 1, err);
-    if (!q->units || !*q->units)
+    if (!quantity->units || !*quantity->units)
         bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
-    if (!q->description || strlen(q->description) < 8)
+    if (!quantity->description || strlen(quantity->description) < 8)
         bt_errors_add(err, "quantity %s: say in a sentence what it is (`description`)", name);
-    if (!q->of_world == !q->of_floe) bt_errors_add(err, "quantity %s: give it one of `of_world` and `of_floe`", name);
-    if ((unsigned)q->keep >= BT_KEEP_KINDS || (unsigned)q->applies >= BT_APPLIES_KINDS ||
-        (unsigned)q->role >= BT_ROLE_KINDS)
+    if (!quantity->of_world == !quantity->of_floe)
+        bt_errors_add(err, "quantity %s: give it one of `of_world` and `of_floe`", name);
+    if ((unsigned)quantity->keep >= BT_KEEP_KINDS || (unsigned)quantity->applies >= BT_APPLIES_KINDS ||
+        (unsigned)quantity->role >= BT_ROLE_KINDS)
         bt_errors_add(err, "quantity %s: keep, applies or role is none of its kinds", name);
     if (err->n > before) return BT_ERR_USAGE;
     bt_quantity *own = &added[n_added];
-    *own = *q;
-    make_key(q, added_keys[n_added]);
+    *own = *quantity;
+    make_key(quantity, added_keys[n_added]);
     own->summary = added_keys[n_added];
     if (!own->label) own->label = in_words(own->name);
     own->offset = offsetof(bt_sample, added) + (size_t)n_added * sizeof(double);
@@ -126,10 +127,10 @@ static void add_quantity(const bt_force_series *of)
     bt_errors err = {0};
     char *name = bt_text_of("%s_force", of->name),
          *text = bt_text_of("%s on the towed body against the tow direction", of->law ? of->law->doc : of->name);
-    const bt_quantity q = {.name = name, .units = "N", .description = text, .label = of->name, .keep = BT_KEEP_MEAN,
-                           .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE, .of_world = bt_force_of,
-                           .context = of->name};
-    if (bt_quantity_register(&q, &err) != BT_OK) bt_errors_print(&err);
+    const bt_quantity quantity = {.name = name, .units = "N", .description = text, .label = of->name,
+                                  .keep = BT_KEEP_MEAN, .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE,
+                                  .of_world = bt_force_of, .context = of->name};
+    if (bt_quantity_register(&quantity, &err) != BT_OK) bt_errors_print(&err);
     bt_errors_free(&err);
 }
 
@@ -147,9 +148,9 @@ static void force_quantities(void)
 
 static bt_quantity own[BT_MAX_LAW_NUMBERS];
 
-static double own_number(const bt_world *w, const void *quantity)
+static double own_number(const bt_world *world, const void *quantity)
 {
-    return w->stats.laws[(const bt_quantity *)quantity - own];
+    return world->stats.laws[(const bt_quantity *)quantity - own];
 }
 
 /// Those of the program's own, in the order of the laws.
@@ -164,18 +165,18 @@ static const bt_quantity *law_series(int k)
 {
     for (int law = 0, i = 0; !own[k].name && law < BT_LAWS; law++)
         for (int j = 0; j < bt_laws[law]->n_numbers; j++, i++) {
-            const bt_law_number *n = &bt_laws[law]->numbers[j];
-            own[i] = (bt_quantity){.name = n->name, .units = n->units, .description = n->description, .keep = n->keep,
-                                   .applies = BT_APPLIES_ALWAYS, .summary = n->key, .of_world = own_number,
-                                   .context = &own[i],
+            const bt_law_number *number = &bt_laws[law]->numbers[j];
+            own[i] = (bt_quantity){.name = number->name, .units = number->units, .description = number->description,
+                                   .keep = number->keep, .applies = BT_APPLIES_ALWAYS, .summary = number->key,
+                                   .of_world = own_number, .context = &own[i],
                                    .offset = offsetof(bt_sample, laws) + (size_t)i * sizeof(double)};
         }
     return &own[k];
 }
 
-static double number(const bt_world *w, const void *place)
+static double number(const bt_world *world, const void *place)
 {
-    return ((const double *)w->stats.added)[*(const int *)place];
+    return ((const double *)world->stats.added)[*(const int *)place];
 }
 
 /// Its texts stay for the life of the program, as the law does.
@@ -184,9 +185,10 @@ static void add_number(const bt_quantity *like, int law, int k)
     static int place[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS];
     place[law][k] = law * (1 + BT_MAX_CONTACT_NUMBERS) + k;
     bt_errors err = {0};
-    bt_quantity q = *like;
-    q.applies = BT_APPLIES_ALWAYS, q.role = BT_ROLE_NONE, q.of_world = number, q.context = &place[law][k];
-    if (bt_quantity_register(&q, &err) != BT_OK) bt_errors_print(&err);
+    bt_quantity quantity = *like;
+    quantity.applies = BT_APPLIES_ALWAYS, quantity.role = BT_ROLE_NONE, quantity.of_world = number,
+    quantity.context = &place[law][k];
+    if (bt_quantity_register(&quantity, &err) != BT_OK) bt_errors_print(&err);
     bt_errors_free(&err);
 }
 
@@ -197,9 +199,9 @@ static void add_law(int law)
          *text = bt_text_of("work taken by contact points at their bound: %s", l->doc);
     add_number(&(bt_quantity){.name = name, .units = "J", .description = text, .keep = BT_KEEP_SUM}, law, 0);
     for (int k = 0; k < l->n_numbers; k++) {
-        const bt_contact_number *n = &l->numbers[k];
-        add_number(&(bt_quantity){.name = n->name, .units = n->units, .description = n->description,
-                                  .keep = n->state ? BT_KEEP_LAST : BT_KEEP_SUM}, law, 1 + k);
+        const bt_contact_number *number = &l->numbers[k];
+        add_number(&(bt_quantity){.name = number->name, .units = number->units, .description = number->description,
+                                  .keep = number->state ? BT_KEEP_LAST : BT_KEEP_SUM}, law, 1 + k);
     }
 }
 
@@ -251,10 +253,11 @@ const bt_quantity *bt_series_find(const char *name)
 }
 
 /// Does the balance name this series by itself: at its begin (tow), as what it gives (ice), at its end (inertia)?
-static bool is_end_of_balance(const bt_quantity *q)
+static bool is_end_of_balance(const bt_quantity *quantity)
 {
-    return q->offset == offsetof(bt_sample, tow_force) || q->offset == offsetof(bt_sample, ice_resistance) ||
-           q->offset == offsetof(bt_sample, inertia_force);
+    return quantity->offset == offsetof(bt_sample, tow_force) ||
+           quantity->offset == offsetof(bt_sample, ice_resistance) ||
+           quantity->offset == offsetof(bt_sample, inertia_force);
 }
 
 const char *bt_balance_words(void)
@@ -279,27 +282,27 @@ static const size_t loads[] = {
 };
 enum { N_LOADS = sizeof loads / sizeof *loads };
 
-void bt_sample_lose_load(bt_sample *s, bool prescribed)
+void bt_sample_lose_load(bt_sample *sample, bool prescribed)
 {
     for (int k = 0; k < N_LOADS - !prescribed; k++)
-        memcpy((char *)s + loads[k], &(double){NAN}, sizeof(double));
+        memcpy((char *)sample + loads[k], &(double){NAN}, sizeof(double));
 }
 
-static bool is_load(const bt_quantity *q)
+static bool is_load(const bt_quantity *quantity)
 {
     bool found = false;
-    for (int k = 0; k < N_LOADS; k++) found = found || q->offset == loads[k];
+    for (int k = 0; k < N_LOADS; k++) found = found || quantity->offset == loads[k];
     return found;
 }
 
-const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has)
+const bt_quantity *bt_sample_fault(const bt_sample *sample, unsigned has)
 {
     for (int k = 0, n = bt_n_series(); k < n; k++) {
-        const bt_quantity *q = bt_series(k);
-        const double x = bt_sample_value(s, q);
-        if (s->no_load != 0 && isnan(x) && is_load(q)) continue;
-        if (s->locked != 0 && isnan(x) && q->offset == offsetof(bt_sample, contact_work)) continue;
-        if (has & 1u << q->applies ? !(fabs(x) < BT_SAMPLE_MOST) : !isnan(x)) return q;
+        const bt_quantity *quantity = bt_series(k);
+        const double x = bt_sample_value(sample, quantity);
+        if (sample->no_load != 0 && isnan(x) && is_load(quantity)) continue;
+        if (sample->locked != 0 && isnan(x) && quantity->offset == offsetof(bt_sample, contact_work)) continue;
+        if (has & 1u << quantity->applies ? !(fabs(x) < BT_SAMPLE_MOST) : !isnan(x)) return quantity;
     }
     return NULL;
 }

@@ -24,10 +24,10 @@ static void list_series(FILE *out)
 {
     fprintf(out, "%-24s %-6s %-5s %-32s %s\n", "series", "units", "merge", "applies", "meaning");
     for (int k = 0; k < bt_n_series(); k++) {
-        const bt_quantity *q = bt_series(k);
-        fprintf(out, "%-24s %-6s %-5s %-32s %s", q->name, q->units, bt_keep_names[q->keep],
-                bt_applies_names[q->applies], q->description);
-        fprintf(out, q->summary ? "; %s in the summary\n" : "\n", q->summary);
+        const bt_quantity *quantity = bt_series(k);
+        fprintf(out, "%-24s %-6s %-5s %-32s %s", quantity->name, quantity->units, bt_keep_names[quantity->keep],
+                bt_applies_names[quantity->applies], quantity->description);
+        fprintf(out, quantity->summary ? "; %s in the summary\n" : "\n", quantity->summary);
     }
 }
 
@@ -36,11 +36,11 @@ static void list_summary(FILE *out)
     fprintf(out, "\n%-46s %-6s %s\n", "summary.json", "units", "meaning");
     for (int t = 0, n; t < N_TABLES; t++) {
         const bt_json_key *keys = table(t, &n);
-        for (const bt_json_key *k = keys; k < keys + n; k++) {
-            if (k->kind == BT_JSON_ADDED) continue;
+        for (const bt_json_key *key = keys; key < keys + n; key++) {
+            if (key->kind == BT_JSON_ADDED) continue;
             char name[96];
-            snprintf(name, sizeof name, "%s%s", tables[t].prefix, k->key);
-            fprintf(out, "%-46s %-6s %s\n", name, k->units, k->description);
+            snprintf(name, sizeof name, "%s%s", tables[t].prefix, key->key);
+            fprintf(out, "%-46s %-6s %s\n", name, key->units, key->description);
         }
     }
     for (int k = 0; k < bt_n_added(); k++)
@@ -54,91 +54,93 @@ void bt_quantities_list(void *stream)
     list_summary(out);
     fprintf(out, "\n%-24s %-15s %-24s %s\n", "estimate", "kind", "label", "formula; source");
     for (int k = 0; k < bt_n_estimates(); k++) {
-        const bt_estimate_def *d = bt_estimate_of(k);
-        fprintf(out, "%-24s %-15s %-24s %s; %s\n", d->name, bt_estimate_kind_name(d), d->label, d->formula, d->source);
+        const bt_estimate_def *def = bt_estimate_of(k);
+        fprintf(out, "%-24s %-15s %-24s %s; %s\n", def->name, bt_estimate_kind_name(def), def->label, def->formula,
+                def->source);
     }
     fprintf(out, "\n%-24s %s\n", "warning, reason", "meaning");
     for (int k = 0; k < BT_N_WARNINGS; k++)
         fprintf(out, "%-24s %s\n", bt_warning_rows[k].code, bt_warning_rows[k].meaning);
 }
 
-static void json_texts(bt_json *j, const char *name, const char *units, const char *description)
+static void json_texts(bt_json *json, const char *name, const char *units, const char *description)
 {
-    bt_json_string(j, "name", name);
-    bt_json_string(j, "units", units);
-    bt_json_string(j, "description", description);
+    bt_json_string(json, "name", name);
+    bt_json_string(json, "units", units);
+    bt_json_string(json, "description", description);
 }
 
-static void json_series(bt_json *j, const bt_quantity *q)
+static void json_series(bt_json *json, const bt_quantity *quantity)
 {
-    bt_json_open(j, NULL, '{');
-    json_texts(j, q->name, q->units, q->description);
-    bt_json_string(j, "merge", bt_keep_names[q->keep]);
-    bt_json_string(j, "applies", bt_applies_names[q->applies]);
-    bt_json_string(j, "role", q->role == BT_ROLE_NONE ? NULL : bt_role_names[q->role]);
-    bt_json_string(j, "label", q->label);
-    bt_json_string(j, "summary", q->summary);
-    bt_json_close(j, '}');
+    bt_json_open(json, NULL, '{');
+    json_texts(json, quantity->name, quantity->units, quantity->description);
+    bt_json_string(json, "merge", bt_keep_names[quantity->keep]);
+    bt_json_string(json, "applies", bt_applies_names[quantity->applies]);
+    bt_json_string(json, "role", quantity->role == BT_ROLE_NONE ? NULL : bt_role_names[quantity->role]);
+    bt_json_string(json, "label", quantity->label);
+    bt_json_string(json, "summary", quantity->summary);
+    bt_json_close(json, '}');
 }
 
-static void json_summary_key(bt_json *j, const char *prefix, const bt_json_key *k)
+static void json_summary_key(bt_json *json, const char *prefix, const bt_json_key *key)
 {
     char name[96];
-    snprintf(name, sizeof name, "%s%s", prefix, k->key);
-    bt_json_open(j, NULL, '{');
-    json_texts(j, name, k->units, k->description);
-    bt_json_bool(j, "number", k->kind != BT_JSON_TEXT && k->kind != BT_JSON_GROUP && k->kind != BT_JSON_WRITTEN);
-    bt_json_bool(j, "machine", k->machine);
-    bt_json_close(j, '}');
+    snprintf(name, sizeof name, "%s%s", prefix, key->key);
+    bt_json_open(json, NULL, '{');
+    json_texts(json, name, key->units, key->description);
+    bt_json_bool(json, "number", key->kind != BT_JSON_TEXT && key->kind != BT_JSON_GROUP &&
+                 key->kind != BT_JSON_WRITTEN);
+    bt_json_bool(json, "machine", key->machine);
+    bt_json_close(json, '}');
 }
 
-static void json_added(bt_json *j, const bt_quantity *q)
+static void json_added(bt_json *json, const bt_quantity *quantity)
 {
-    bt_json_open(j, NULL, '{');
-    json_texts(j, q->summary, q->units, q->description);
-    bt_json_bool(j, "number", true);
-    bt_json_bool(j, "machine", false);
-    bt_json_close(j, '}');
+    bt_json_open(json, NULL, '{');
+    json_texts(json, quantity->summary, quantity->units, quantity->description);
+    bt_json_bool(json, "number", true);
+    bt_json_bool(json, "machine", false);
+    bt_json_close(json, '}');
 }
 
-static void json_estimate(bt_json *j, const bt_estimate_def *d)
+static void json_estimate(bt_json *json, const bt_estimate_def *def)
 {
-    bt_json_open(j, NULL, '{');
-    bt_json_string(j, "name", d->name);
-    bt_json_string(j, "label", d->label);
-    bt_json_string(j, "kind", bt_estimate_kind_name(d));
-    bt_json_string(j, "units", "N");
-    bt_json_string(j, "formula", d->formula);
-    bt_json_string(j, "source", d->source);
-    bt_json_close(j, '}');
+    bt_json_open(json, NULL, '{');
+    bt_json_string(json, "name", def->name);
+    bt_json_string(json, "label", def->label);
+    bt_json_string(json, "kind", bt_estimate_kind_name(def));
+    bt_json_string(json, "units", "N");
+    bt_json_string(json, "formula", def->formula);
+    bt_json_string(json, "source", def->source);
+    bt_json_close(json, '}');
 }
 
 void bt_quantities_list_json(void *stream)
 {
-    bt_json j = {0};
-    bt_json_open(&j, NULL, '{');
-    bt_json_open(&j, "series", '[');
-    for (int k = 0; k < bt_n_series(); k++) json_series(&j, bt_series(k));
-    bt_json_close(&j, ']');
-    bt_json_open(&j, "summary", '[');
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    bt_json_open(&json, "series", '[');
+    for (int k = 0; k < bt_n_series(); k++) json_series(&json, bt_series(k));
+    bt_json_close(&json, ']');
+    bt_json_open(&json, "summary", '[');
     for (int t = 0, n; t < N_TABLES; t++) {
         const bt_json_key *keys = table(t, &n);
-        for (const bt_json_key *k = keys; k < keys + n; k++)
-            if (k->kind != BT_JSON_ADDED) json_summary_key(&j, tables[t].prefix, k);
+        for (const bt_json_key *key = keys; key < keys + n; key++)
+            if (key->kind != BT_JSON_ADDED) json_summary_key(&json, tables[t].prefix, key);
     }
-    for (int k = 0; k < bt_n_added(); k++) json_added(&j, bt_added(k));
-    bt_json_close(&j, ']');
-    bt_json_open(&j, "estimates", '[');
-    for (int k = 0; k < bt_n_estimates(); k++) json_estimate(&j, bt_estimate_of(k));
-    bt_json_close(&j, ']');
-    bt_json_open(&j, "warnings", '[');
+    for (int k = 0; k < bt_n_added(); k++) json_added(&json, bt_added(k));
+    bt_json_close(&json, ']');
+    bt_json_open(&json, "estimates", '[');
+    for (int k = 0; k < bt_n_estimates(); k++) json_estimate(&json, bt_estimate_of(k));
+    bt_json_close(&json, ']');
+    bt_json_open(&json, "warnings", '[');
     for (int k = 0; k < BT_N_WARNINGS; k++) {
-        bt_json_open(&j, NULL, '{');
-        json_texts(&j, bt_warning_rows[k].code, "", bt_warning_rows[k].meaning);
-        bt_json_close(&j, '}');
+        bt_json_open(&json, NULL, '{');
+        json_texts(&json, bt_warning_rows[k].code, "", bt_warning_rows[k].meaning);
+        bt_json_close(&json, '}');
     }
-    bt_json_close(&j, ']');
-    bt_json_close(&j, '}');
-    fputs(j.text, stream);
-    bt_json_free(&j);
+    bt_json_close(&json, ']');
+    bt_json_close(&json, '}');
+    fputs(json.text, stream);
+    bt_json_free(&json);
 }

@@ -46,17 +46,17 @@ struct bt_record {
 };
 
 /// What is buffered into the file, and the file to the system.
-void bt_record_flush(bt_record *r);
+void bt_record_flush(bt_record *record);
 
 /// Collective. A frame, with the pieces of floes in it, on rank 0.
-bt_status bt_record_add_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
+bt_status bt_record_add_frame(bt_record *record, double time, const bt_frame_row *rows, const bt_frame_line *line,
                               const bt_piece_row *pieces, int64_t n_pieces);
 
 /// frames.xdmf for the frames there are; the caller frees it.
-char *bt_record_xdmf(const bt_record *r);
+char *bt_record_xdmf(const bt_record *record);
 
 /// A file of the folder goes, if it is there.
-bt_status bt_record_remove(const bt_record *r, const char *name, bt_errors *err);
+bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors *err);
 
 /// The next step of an entry: m of those before, x its own.
 static inline double bt_record_merge(bt_keep keep, double m, double x)
@@ -73,6 +73,6 @@ static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
 #define BT_RECORD_IDENTITY "about/run" // in a checkpoint
 
 /// A text file of the folder.
-bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err);
+bt_status bt_record_write_text(const bt_record *record, const char *name, const char *text, bt_errors *err);
 
 #endif

@@ -32,23 +32,23 @@
 #define CASE_FILE "case.resolved.yml"
 #define IDENTITY "run" // attribute of the root
 
-bt_status bt_record_identify(bt_record *r, const char *identity, bt_errors *err)
+bt_status bt_record_identify(bt_record *record, const char *identity, bt_errors *err)
 {
-    if (r->comm->rank != 0) return BT_OK;
-    r->h5.err = err;
-    snprintf(r->identity, sizeof r->identity, "%s", identity);
-    bt_h5_attr_word(&r->h5, "/", IDENTITY, r->identity);
-    return r->h5.status;
+    if (record->comm->rank != 0) return BT_OK;
+    record->h5.err = err;
+    snprintf(record->identity, sizeof record->identity, "%s", identity);
+    bt_h5_attr_word(&record->h5, "/", IDENTITY, record->identity);
+    return record->h5.status;
 }
 
 /// Does a text say the same of every key? Tables that it names are those that the case has: no file is read.
-static bool same_values(const bt_case *c, const char *text)
+static bool same_values(const bt_case *input, const char *text)
 {
     bt_case other;
     bt_errors unheard = {0};
-    const bool read = bt_case_read_kept(&other, c->path ? c->path : CASE_FILE, text, &c->water.table, &c->air.table,
-                                        &unheard) == BT_OK;
-    char *mine = bt_case_resolved(c), *its = read ? bt_case_resolved(&other) : NULL;
+    const bool read = bt_case_read_kept(&other, input->path ? input->path : CASE_FILE, text, &input->water.table,
+                                        &input->air.table, &unheard) == BT_OK;
+    char *mine = bt_case_resolved(input), *its = read ? bt_case_resolved(&other) : NULL;
     const bool same = !strcmp(text, mine) || (its && !strcmp(its, mine));
     free(mine);
     free(its);
@@ -57,23 +57,23 @@ static bool same_values(const bt_case *c, const char *text)
     return same;
 }
 
-static void refuse(bt_h5_reader *old, const bt_snapshot *s, const char *why)
+static void refuse(bt_h5_reader *old, const bt_snapshot *snap, const char *why)
 {
     if (old->status != BT_OK) return;
     bt_errors_add(old->err,
                   "%s: is of another run than %s: %s; restore the result of that run, or go on from a checkpoint of "
                   "this one",
-                  old->path, s->path, why);
+                  old->path, snap->path, why);
     old->status = BT_ERR_CASE;
 }
 
-/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint s: by what both began with, and by
-/// the first n entries x of series k.
-static void record_check_run(bt_snapshot *s, bt_h5_reader *old)
+/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint `snap`: by what both began with, and
+/// by the first n entries x of series k.
+static void record_check_run(bt_snapshot *snap, bt_h5_reader *old)
 {
     char *its = bt_h5_read_word(old, IDENTITY);
-    if (strcmp(its ? its : "", bt_snapshot_text(s, BT_RECORD_IDENTITY)) != 0)
-        refuse(old, s, "it began with another case or other ice");
+    if (strcmp(its ? its : "", bt_snapshot_text(snap, BT_RECORD_IDENTITY)) != 0)
+        refuse(old, snap, "it began with another case or other ice");
     free(its);
 }
 
@@ -85,7 +85,7 @@ static double entry_of(bt_keep keep, const double *step, int64_t every)
     return bt_record_merged(keep, m, every);
 }
 
-static void record_check_series(const bt_record *r, int k, const double *x, int64_t n, const bt_snapshot *s,
+static void record_check_series(const bt_record *record, int k, const double *x, int64_t n, const bt_snapshot *snap,
                                 bt_h5_reader *old)
 {
     static const struct {
@@ -93,18 +93,18 @@ static void record_check_series(const bt_record *r, int k, const double *x, int6
         bt_column column;
     } kept[] = {{"time", BT_COL_TIME}, {"ice_resistance", BT_COL_ICE}, {"tow_force", BT_COL_TOW},
                 {"residual", BT_COL_RESIDUAL}}; // also of ice that has not met the body
-    const bt_quantity *q = bt_series(k);
-    const int64_t every = r->c->output.sample_every > 1 ? r->c->output.sample_every : 1;
+    const bt_quantity *quantity = bt_series(k);
+    const int64_t every = record->c->output.sample_every > 1 ? record->c->output.sample_every : 1;
     for (size_t j = 0; j < sizeof kept / sizeof *kept; j++) {
-        if (strcmp(kept[j].name, q->name) != 0) continue;
+        if (strcmp(kept[j].name, quantity->name) != 0) continue;
         for (int64_t i = 0; i < n && old->status == BT_OK; i++) {
-            const double entry = entry_of(q->keep, r->history.column[kept[j].column] + i * every, every);
+            const double entry = entry_of(quantity->keep, record->history.column[kept[j].column] + i * every, every);
             if (entry == x[i] || (isnan(entry) && isnan(x[i]))) continue;
-            const bool lost = entry_of(BT_KEEP_MAX, r->history.column[BT_COL_NO_LOAD] + i * every, every) > 0;
+            const bool lost = entry_of(BT_KEEP_MAX, record->history.column[BT_COL_NO_LOAD] + i * every, every) > 0;
             if (lost && isnan(x[i])) continue;
-            char *why = bt_text_of("/series/%s is %.17g in entry %lld, where the run had %.17g", q->name, x[i],
+            char *why = bt_text_of("/series/%s is %.17g in entry %lld, where the run had %.17g", quantity->name, x[i],
                                    (long long)i, entry);
-            refuse(old, s, why);
+            refuse(old, snap, why);
             free(why);
         }
     }
@@ -112,21 +112,22 @@ static void record_check_series(const bt_record *r, int k, const double *x, int6
 
 /// On rank 0, of a run that goes on. Write case.resolved.yml anew where it is no more what the run began with, and warn
 /// of it. Errors: BT_ERR_IO.
-static bt_status record_keep_case(const bt_record *r, bt_errors *err)
+static bt_status record_keep_case(const bt_record *record, bt_errors *err)
 {
-    char *path = bt_file_join(r->dir, CASE_FILE), *text = NULL, *resolved = bt_case_resolved(r->c);
+    char *path = bt_file_join(record->dir, CASE_FILE), *text = NULL, *resolved = bt_case_resolved(record->c);
     size_t size = 0;
     bt_errors unheard = {0}, warnings = {0};
     const bool read = bt_file_read(path, "a case", &text, &size, &unheard) == BT_OK;
-    char *digests = read ? bt_case_digests_in(r->c, text) : NULL, *wanted = bt_case_with_digests(resolved, digests);
+    char *digests = read ? bt_case_digests_in(record->c, text) : NULL,
+         *wanted = bt_case_with_digests(resolved, digests);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        if (!read || !same_values(r->c, text)) // otherwise its comments have been edited
+        if (!read || !same_values(record->c, text)) // otherwise its comments have been edited
             bt_errors_add(&warnings,
                           "warning: %s: was not the case that the run began with; it is written anew, by the "
                           "checkpoint",
                           path);
-        status = bt_record_write_text(r, CASE_FILE, wanted, err);
+        status = bt_record_write_text(record, CASE_FILE, wanted, err);
     }
     if (status == BT_OK) bt_errors_print(&warnings);
     bt_errors_free(&warnings);
@@ -148,138 +149,144 @@ static const char *merged_name(int k, char name[BT_HISTORY_NAME])
     return name;
 }
 
-bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_errors *err)
+bt_status bt_record_save(bt_record *record, int64_t n_frames, bt_snapshot *snap, bt_errors *err)
 {
-    if (r->comm->rank != 0) return BT_OK;
-    r->h5.err = err;
-    bt_record_flush(r);
-    bt_history *h = &r->history;
+    if (record->comm->rank != 0) return BT_OK;
+    record->h5.err = err;
+    bt_record_flush(record);
+    bt_history *history = &record->history;
     char name[BT_HISTORY_NAME];
-    for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_add_rows(s, "history", &bt_history_total(k)->at, 1, h);
-    for (int k = 0; k < h->n_columns; k++) {
+    for (int k = 0; k < bt_n_history_totals(); k++)
+        bt_snapshot_add_rows(snap, "history", &bt_history_total(k)->at, 1, history);
+    for (int k = 0; k < history->n_columns; k++) {
         const bt_state_row column = bt_history_column(k, name);
-        bt_snapshot_add_row(s, "history", &column, h->n, h->column[k]);
+        bt_snapshot_add_row(snap, "history", &column, history->n, history->column[k]);
     }
-    bt_snapshot_add_text(s, BT_RECORD_IDENTITY, r->identity);
-    bt_snapshot_add_int(s, "record/entries", r->written);
-    bt_snapshot_add_int(s, "record/frames", n_frames);
-    bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
+    bt_snapshot_add_text(snap, BT_RECORD_IDENTITY, record->identity);
+    bt_snapshot_add_int(snap, "record/entries", record->written);
+    bt_snapshot_add_int(snap, "record/frames", n_frames);
+    bt_snapshot_add_int(snap, "record/merged_steps", record->n_merged);
     // Between two entries the sum is over: its last value would only make states that are alike look different.
-    for (int k = 0; k < r->n_series && r->n_merged > 0; k++)
-        bt_snapshot_add(s, merged_name(k, name), BT_ITEM_F64, 1, 1, &r->merged[k]);
-    bt_impact_store_save(&r->impacts, s);
-    return r->h5.status;
+    for (int k = 0; k < record->n_series && record->n_merged > 0; k++)
+        bt_snapshot_add(snap, merged_name(k, name), BT_ITEM_F64, 1, 1, &record->merged[k]);
+    bt_impact_store_save(&record->impacts, snap);
+    return record->h5.status;
 }
 
-bt_status bt_record_publish(bt_record *r, bt_errors *err)
+bt_status bt_record_publish(bt_record *record, bt_errors *err)
 {
-    r->h5.err = err;
-    bt_h5_sync_raw(&r->h5);
-    bt_status status = bt_comm_agree(r->comm, r->h5.status);
+    record->h5.err = err;
+    bt_h5_sync_raw(&record->h5);
+    bt_status status = bt_comm_agree(record->comm, record->h5.status);
     if (status != BT_OK) return status;
-    if (r->comm->rank == 0) {
-        char *part = bt_file_join(r->dir, BT_RESULT_PART), *copy = bt_file_join(r->dir, BT_RESULT_FILE ".tmp"),
-             *path = bt_file_join(r->dir, BT_RESULT_FILE);
-        bt_record_flush(r);
-        status = r->h5.status;
+    if (record->comm->rank == 0) {
+        char *part = bt_file_join(record->dir, BT_RESULT_PART),
+             *copy = bt_file_join(record->dir, BT_RESULT_FILE ".tmp"),
+             *path = bt_file_join(record->dir, BT_RESULT_FILE);
+        bt_record_flush(record);
+        status = record->h5.status;
         if (status == BT_OK) status = bt_file_copy(part, copy, err);
         if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);
         if (status == BT_OK) status = bt_file_rename(copy, path, err);
-        char *xdmf = bt_record_xdmf(r);
-        if (status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
+        char *xdmf = bt_record_xdmf(record);
+        if (status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
         free(xdmf);
         free(part);
         free(copy);
         free(path);
     }
-    return bt_comm_agree(r->comm, status);
+    return bt_comm_agree(record->comm, status);
 }
 
 // --- going on --------------------------------------------------------------------------------------------------------
 
 /// A force that the run had not: it was 0. Of the series, those that programs have added alone.
-static bool was_zero(const bt_quantity *q) { return q->role == BT_ROLE_BALANCE; }
+static bool was_zero(const bt_quantity *quantity) { return quantity->role == BT_ROLE_BALANCE; }
 static bool may_lack(int k) { return k >= bt_n_program_series() && was_zero(bt_series(k)); }
 
 /// NaN: a force on the towed body where there is none.
-static bool all_zero(const bt_item *i)
+static bool all_zero(const bt_item *item)
 {
-    for (int64_t k = 0; k < i->n; k++)
-        if (i->type != BT_ITEM_F64 || !(isnan(((const double *)i->data)[k]) || ((const double *)i->data)[k] == 0))
+    for (int64_t k = 0; k < item->n; k++)
+        if (item->type != BT_ITEM_F64 ||
+            !(isnan(((const double *)item->data)[k]) || ((const double *)item->data)[k] == 0))
             return false;
     return true;
 }
 
 /// What programs add (forces, quantities) goes on as it was, or not at all: a run without one of its forces would be
 /// another run.
-static void check_added(bt_snapshot *s)
+static void check_added(bt_snapshot *snap)
 {
     const char *missing = NULL, *left_over = NULL;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < bt_n_added() && !missing; k++) {
         bt_history_column(BT_N_COLUMNS + k, name);
-        if (!bt_snapshot_find(s, name) && !was_zero(bt_added(k))) missing = bt_added(k)->name;
+        if (!bt_snapshot_find(snap, name) && !was_zero(bt_added(k))) missing = bt_added(k)->name;
     }
-    for (int i = 0; i < s->n && !left_over; i++) {
-        if (strncmp(s->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || all_zero(&s->item[i])) continue;
-        left_over = s->item[i].name + strlen(BT_HISTORY_ADDED);
+    for (int i = 0; i < snap->n && !left_over; i++) {
+        if (strncmp(snap->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || all_zero(&snap->item[i]))
+            continue;
+        left_over = snap->item[i].name + strlen(BT_HISTORY_ADDED);
         for (int k = 0; k < bt_n_added() && left_over; k++)
             if (!strcmp(bt_added(k)->name, left_over)) left_over = NULL;
     }
-    if (missing && !s->faulty)
-        bt_errors_add(s->err,
+    if (missing && !snap->faulty)
+        bt_errors_add(snap->err,
                       "%s: the run had no %s, which this program has added; go on in one that adds no other quantities",
-                      s->path, missing);
-    else if (left_over && !s->faulty)
+                      snap->path, missing);
+    else if (left_over && !snap->faulty)
         bt_errors_add(
-            s->err, "%s: the run had %s, which a program had added (a force or a quantity); go on in one that adds it",
-            s->path, left_over);
-    s->faulty |= missing || left_over;
+            snap->err,
+            "%s: the run had %s, which a program had added (a force or a quantity); go on in one that adds it",
+            snap->path, left_over);
+    snap->faulty |= missing || left_over;
 }
 
 /// n: steps done; each has a value.
-static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
+static void load_history(bt_history *history, bt_snapshot *snap, int64_t n)
 {
-    for (int k = 0; k < bt_n_history_totals(); k++) bt_snapshot_take_rows(s, "history", &bt_history_total(k)->at, 1, h);
-    check_added(s);
-    h->n = h->cap = n;
+    for (int k = 0; k < bt_n_history_totals(); k++)
+        bt_snapshot_take_rows(snap, "history", &bt_history_total(k)->at, 1, history);
+    check_added(snap);
+    history->n = history->cap = n;
     char name[BT_HISTORY_NAME];
-    for (int k = 0; k < h->n_columns; k++) {
-        free(h->column[k]);
+    for (int k = 0; k < history->n_columns; k++) {
+        free(history->column[k]);
         bt_history_column(k, name);
-        const bool there = k < BT_N_COLUMNS || bt_snapshot_find(s, name);
-        h->column[k] = there ? bt_snapshot_copy(s, name, BT_ITEM_F64, 1, &n)
-                             : bt_alloc((size_t)n, sizeof *h->column[k]);
-        bt_snapshot_want(s, n == h->n, name, -1, "has not a value for each step");
+        const bool there = k < BT_N_COLUMNS || bt_snapshot_find(snap, name);
+        history->column[k] = there ? bt_snapshot_copy(snap, name, BT_ITEM_F64, 1, &n)
+                                   : bt_alloc((size_t)n, sizeof *history->column[k]);
+        bt_snapshot_want(snap, n == history->n, name, -1, "has not a value for each step");
     }
-    if (s->faulty) h->n = 0;
+    if (snap->faulty) history->n = 0;
 }
 
 /// The entry under way.
-static void load_merged(bt_record *r, bt_snapshot *s)
+static void load_merged(bt_record *record, bt_snapshot *snap)
 {
     char name[BT_HISTORY_NAME];
-    for (int k = 0; k < r->n_series; k++) {
-        if (may_lack(k) && !bt_snapshot_find(s, merged_name(k, name))) r->merged[k] = 0;
-        else bt_snapshot_take(s, merged_name(k, name), BT_ITEM_F64, 1, 1, &r->merged[k]);
+    for (int k = 0; k < record->n_series; k++) {
+        if (may_lack(k) && !bt_snapshot_find(snap, merged_name(k, name))) record->merged[k] = 0;
+        else bt_snapshot_take(snap, merged_name(k, name), BT_ITEM_F64, 1, 1, &record->merged[k]);
     }
 }
 
 /// Entries 0 up to n of all series.
-static void load_series(bt_record *r, const bt_snapshot *s, bt_h5_reader *old, int64_t n)
+static void load_series(bt_record *record, const bt_snapshot *snap, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
-    for (int k = 0; k < r->n_series && old->status == BT_OK; k++) {
+    for (int k = 0; k < record->n_series && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
         if (may_lack(k) && !bt_h5_there(old, name))
             for (int64_t i = 0; i < n; i++) x[i] = 0;
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
-        if (old->status == BT_OK) record_check_series(r, k, x, n, s, old);
-        if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
+        if (old->status == BT_OK) record_check_series(record, k, x, n, snap, old);
+        if (old->status == BT_OK) bt_h5_append(&record->h5, record->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
     }
     free(x);
-    r->written = n;
+    record->written = n;
 }
 
 static void read_velocities_and_forces(bt_h5_reader *old, int64_t k, bt_idx n, bt_frame_row *rows)
@@ -319,15 +326,17 @@ static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bo
 }
 
 /// Collective. The first n frames, through the function that takes any frame.
-static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_errors *err)
+static bt_status load_frames(bt_record *record, bt_h5_reader *old, int64_t n, bt_errors *err)
 {
-    const bool first = r->comm->rank == 0;
-    const bt_idx n_floes = (bt_idx)r->frames.n_floes, n_bodies = (bt_idx)(r->frames.n_floes + r->frames.n_others);
-    int64_t *blocks = bt_alloc((size_t)r->comm->size + 1, sizeof *blocks);
-    bt_record_blocks(r->comm, n_floes, n_bodies, blocks);
+    const bool first = record->comm->rank == 0;
+    const bt_idx n_floes = (bt_idx)record->frames.n_floes,
+                 n_bodies = (bt_idx)(record->frames.n_floes + record->frames.n_others);
+    int64_t *blocks = bt_alloc((size_t)record->comm->size + 1, sizeof *blocks);
+    bt_record_blocks(record->comm, n_floes, n_bodies, blocks);
     const bt_idx mine = first ? n_bodies : 0;
     bt_frame_row *rows = bt_alloc((size_t)mine, sizeof *rows),
-                 *block = bt_alloc((size_t)(blocks[r->comm->rank + 1] - blocks[r->comm->rank]), sizeof *block);
+                 *block = bt_alloc((size_t)(blocks[record->comm->rank + 1] - blocks[record->comm->rank]),
+                                   sizeof *block);
     bt_gid *gid = bt_alloc((size_t)mine, sizeof *gid);
     for (bt_idx i = 0; i < mine; i++) gid[i] = i;
     bt_status status = BT_OK;
@@ -335,19 +344,19 @@ static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_erro
         double time = 0;
         bt_frame_line line = {0};
         if (first) read_frame(old, k, n_floes, n_bodies, &time, rows);
-        if (first) read_line(old, k, r->frames.branches, &line);
+        if (first) read_line(old, k, record->frames.branches, &line);
         int64_t n_pieces = 0;
-        bt_piece_row *pieces = first && r->pieces.h ? bt_piece_store_read(old, k, &n_pieces) : NULL;
-        status = bt_comm_agree(r->comm, first ? old->status : BT_OK);
+        bt_piece_row *pieces = first && record->pieces.h ? bt_piece_store_read(old, k, &n_pieces) : NULL;
+        status = bt_comm_agree(record->comm, first ? old->status : BT_OK);
         if (status != BT_OK) {
             free(pieces);
             break;
         }
-        bt_comm_bcast(r->comm, &time, sizeof time);
-        bt_comm_bcast(r->comm, &line, sizeof line);
-        status = bt_comm_rows_by_gid(r->comm, blocks, mine, gid, BT_FRAME_ROW, (const double *)(const void *)rows,
+        bt_comm_bcast(record->comm, &time, sizeof time);
+        bt_comm_bcast(record->comm, &line, sizeof line);
+        status = bt_comm_rows_by_gid(record->comm, blocks, mine, gid, BT_FRAME_ROW, (const double *)(const void *)rows,
                                      (double *)(void *)block, err);
-        if (status == BT_OK) status = bt_record_add_frame(r, time, block, &line, pieces, n_pieces);
+        if (status == BT_OK) status = bt_record_add_frame(record, time, block, &line, pieces, n_pieces);
         free(pieces);
     }
     free(blocks);
@@ -372,37 +381,38 @@ static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int
     old->status = BT_ERR_CASE;
 }
 
-bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_errors *err)
+bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *events, bt_errors *err)
 {
-    const bool first = r->comm->rank == 0;
-    r->h5.err = err;
-    const int64_t entries = bt_snapshot_int(s, "record/entries"), frames = bt_snapshot_int(s, "record/frames"),
-                  step = bt_snapshot_int(s, "world/step");
-    const int64_t every = r->c->output.sample_every > 1 ? r->c->output.sample_every : 1;
-    r->n_merged = bt_snapshot_int(s, "record/merged_steps");
-    bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1,
+    const bool first = record->comm->rank == 0;
+    record->h5.err = err;
+    const int64_t entries = bt_snapshot_int(snap, "record/entries"), frames = bt_snapshot_int(snap, "record/frames"),
+                  step = bt_snapshot_int(snap, "world/step");
+    const int64_t every = record->c->output.sample_every > 1 ? record->c->output.sample_every : 1;
+    record->n_merged = bt_snapshot_int(snap, "record/merged_steps");
+    bt_snapshot_want(snap, entries == step / every && record->n_merged == step % every, "record/entries", -1,
                      "does not fit the number of steps");
-    if (r->n_merged > 0) load_merged(r, s);
-    char *path = bt_file_join(r->dir, BT_RESULT_FILE);
+    if (record->n_merged > 0) load_merged(record, snap);
+    char *path = bt_file_join(record->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {
-        load_history(&r->history, s, step);
-        if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
-        if (!s->faulty && old.status == BT_OK) record_check_run(s, &old);
-        if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
-        if (!s->faulty && old.status == BT_OK) load_series(r, s, &old, entries);
-        if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
-        bt_record_events(r, e, err);
+        load_history(&record->history, snap, step);
+        if (!snap->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
+        if (!snap->faulty && old.status == BT_OK) record_check_run(snap, &old);
+        if (!snap->faulty) check_counts(&old, entries, frames, record->frames.n_floes);
+        if (!snap->faulty && old.status == BT_OK) load_series(record, snap, &old, entries);
+        if (!snap->faulty && old.status == BT_OK) bt_impact_store_load(&record->impacts, snap, &old);
+        bt_record_events(record, events, err);
     }
-    bt_status status = bt_comm_agree(r->comm, s->faulty                      ? BT_ERR_CASE
-                                              : first && old.status != BT_OK ? old.status
-                                                                             : r->h5.status);
-    if (status == BT_OK) status = load_frames(r, &old, frames, err);
+    bt_status status = bt_comm_agree(record->comm, snap->faulty                      ? BT_ERR_CASE
+                                                   : first && old.status != BT_OK ? old.status
+                                                                                  : record->h5.status);
+    if (status == BT_OK) status = load_frames(record, &old, frames, err);
     bt_h5_end(&old);
-    if (status == BT_OK && first) bt_record_flush(r);
-    if (status == BT_OK) status = r->h5.status;
-    if (status == BT_OK && first) status = record_keep_case(r, err);
-    if (status == BT_OK && first) status = bt_record_remove(r, "summary.json", err); // of an end that is none any more
+    if (status == BT_OK && first) bt_record_flush(record);
+    if (status == BT_OK) status = record->h5.status;
+    if (status == BT_OK && first) status = record_keep_case(record, err);
+    // of an end that is none any more
+    if (status == BT_OK && first) status = bt_record_remove(record, "summary.json", err);
     free(path);
-    return bt_comm_agree(r->comm, status);
+    return bt_comm_agree(record->comm, status);
 }

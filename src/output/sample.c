@@ -18,10 +18,10 @@ typedef struct {
     enum { REAL, WHOLE, FLAG, NO_FLAG } kind; ///< NO_FLAG: 1 where it is false
 } place;
 
-static double at_place(const bt_world *w, const void *context)
+static double at_place(const bt_world *world, const void *context)
 {
     const place *p = context;
-    const void *at = (const char *)w + p->offset;
+    const void *at = (const char *)world + p->offset;
     switch (p->kind) {
     case WHOLE: return (double)*(const int64_t *)at;
     case FLAG: return *(const bool *)at;
@@ -30,15 +30,15 @@ static double at_place(const bt_world *w, const void *context)
     }
 }
 
-double bt_force_against(const bt_world *w, int k)
+double bt_force_against(const bt_world *world, int k)
 {
-    const bt_impulse *j = &w->forces->series[k];
-    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
+    const bt_impulse *j = &world->forces->series[k];
+    return 0.0 - (j->x * world->tow->ux + j->y * world->tow->uy) / world->par.dt; // 0 − x, for no −0 in open water
 }
 
-double bt_force_of(const bt_world *w, const void *series)
+double bt_force_of(const bt_world *world, const void *series)
 {
-    return bt_force_against(w, bt_force_series_find(series));
+    return bt_force_against(world, bt_force_series_find(series));
 }
 
 #define PLACE(at_, kind_) .of_world = at_place, .context = &(const place){offsetof(bt_world, at_), kind_}

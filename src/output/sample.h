@@ -37,22 +37,22 @@ enum { BT_SERIES_AFTER_LAWS = 3 };
 int bt_n_program_series(void);
 
 /// Force of series k (bt_force_series_of) on the towed body against the tow direction in the step just solved, N.
-double bt_force_against(const bt_world *w, int k);
+double bt_force_against(const bt_world *world, int k);
 
 /// The same by the name of the series: of_world of a quantity whose context is that name.
-double bt_force_of(const bt_world *w, const void *series);
+double bt_force_of(const bt_world *world, const void *series);
 
 /// A number of a sample by its quantity.
-static inline double bt_sample_value(const bt_sample *s, const bt_quantity *f)
+static inline double bt_sample_value(const bt_sample *sample, const bt_quantity *quantity)
 {
     double value;
-    memcpy(&value, (const char *)s + f->offset, sizeof value);
+    memcpy(&value, (const char *)sample + quantity->offset, sizeof value);
     return value;
 }
 
-static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double value)
+static inline void bt_sample_set(bt_sample *sample, const bt_quantity *quantity, double value)
 {
-    memcpy((char *)s + f->offset, &value, sizeof value);
+    memcpy((char *)sample + quantity->offset, &value, sizeof value);
 }
 
 /// Larger than any quantity of a run, and small enough for the squares that the statistics sum up.
@@ -61,10 +61,10 @@ static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double valu
 /// The first quantity that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the
 /// sample is sound.
 /// has: bit 1 << k for each bt_applies k of the run.
-const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
+const bt_quantity *bt_sample_fault(const bt_sample *sample, unsigned has);
 
 /// The contact forces of a step in which the load of the towed body has no bound (solve/islands.h) become NaN. The tow
 /// force is one of them at a prescribed speed, and stays a number on a line.
-void bt_sample_lose_load(bt_sample *s, bool prescribed);
+void bt_sample_lose_load(bt_sample *sample, bool prescribed);
 
 #endif

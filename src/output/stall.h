@@ -33,9 +33,9 @@ typedef struct bt_stall {
 struct bt_world;
 
 /// After each step. ice, pull: resistance of the ice and force of the tow in it, N; path: asked path of a window, m.
-void bt_stall_step(bt_stall *s, const struct bt_world *w, double ice, double pull, double path);
+void bt_stall_step(bt_stall *stall, const struct bt_world *world, double ice, double pull, double path);
 
 /// The same by numbers: asked path of the step m, its length s, where the body is then, and the forces.
-void bt_stall_add(bt_stall *s, double asked, double dt, const double at[2], double ice, double pull, double path);
+void bt_stall_add(bt_stall *stall, double asked, double dt, const double at[2], double ice, double pull, double path);
 
 #endif

@@ -208,41 +208,41 @@ static const bt_state_row body_columns[] = {
     BODY("disturbed", I64, 1, disturbed, "1", "body", YES_OR_NO, "1 = disturbed since it came to rest"),
 };
 
-static body_row row_of(const bt_bodies *b, bt_idx i)
+static body_row row_of(const bt_bodies *bodies, bt_idx i)
 {
     return (body_row){
-        .pose = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw},
-        .vel = {b->vel[i].x, b->vel[i].y, b->vel[i].w},
-        .path = b->path[i],
-        .exposure = {b->exposure[i].skin, b->exposure[i].water_form, b->exposure[i].air_form},
-        .cell = {b->cell[i][0], b->cell[i][1]},
-        .copy = b->home ? b->home[i].copy : 0,
-        .lap = b->lap[i],
-        .disturbed = b->disturbed[i],
+        .pose = {bodies->pose[i].x, bodies->pose[i].y, bodies->pose[i].yaw},
+        .vel = {bodies->vel[i].x, bodies->vel[i].y, bodies->vel[i].w},
+        .path = bodies->path[i],
+        .exposure = {bodies->exposure[i].skin, bodies->exposure[i].water_form, bodies->exposure[i].air_form},
+        .cell = {bodies->cell[i][0], bodies->cell[i][1]},
+        .copy = bodies->home ? bodies->home[i].copy : 0,
+        .lap = bodies->lap[i],
+        .disturbed = bodies->disturbed[i],
     };
 }
 
-static void put_row(bt_world *w, bt_idx i, const body_row *r)
+static void put_row(bt_world *world, bt_idx i, const body_row *row)
 {
-    bt_bodies *b = &w->bodies;
-    b->pose[i] = (bt_pose){.x = r->pose[0], .y = r->pose[1], .yaw = r->pose[2]};
-    bt_bodies_turn(&w->bodies, i);
-    b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
-    b->path[i] = r->path;
-    b->exposure[i] = (bt_exposure){r->exposure[0], r->exposure[1], r->exposure[2]};
-    b->cell[i][0] = r->cell[0];
-    b->cell[i][1] = r->cell[1];
-    if (b->home) b->home[i].copy = r->copy;
-    b->lap[i] = r->lap;
-    b->disturbed[i] = r->disturbed != 0;
+    bt_bodies *bodies = &world->bodies;
+    bodies->pose[i] = (bt_pose){.x = row->pose[0], .y = row->pose[1], .yaw = row->pose[2]};
+    bt_bodies_turn(&world->bodies, i);
+    bodies->vel[i] = (bt_vel){.x = row->vel[0], .y = row->vel[1], .w = row->vel[2]};
+    bodies->path[i] = row->path;
+    bodies->exposure[i] = (bt_exposure){row->exposure[0], row->exposure[1], row->exposure[2]};
+    bodies->cell[i][0] = row->cell[0];
+    bodies->cell[i][1] = row->cell[1];
+    if (bodies->home) bodies->home[i].copy = row->copy;
+    bodies->lap[i] = row->lap;
+    bodies->disturbed[i] = row->disturbed != 0;
 }
 
 /// A column of rows of `size` bytes, to or from an array of its own.
-static void column(const bt_state_row *c, char *rows, size_t size, int64_t n, char *array, bool out)
+static void column(const bt_state_row *row, char *rows, size_t size, int64_t n, char *array, bool out)
 {
-    const size_t bytes = bt_item_size(c->type) * (size_t)c->width;
+    const size_t bytes = bt_item_size(row->type) * (size_t)row->width;
     for (int64_t i = 0; i < n; i++) {
-        char *in_row = rows + (size_t)i * size + c->offset, *in_array = array + (size_t)i * bytes;
+        char *in_row = rows + (size_t)i * size + row->offset, *in_array = array + (size_t)i * bytes;
         memcpy(out ? in_array : in_row, out ? in_row : in_array, bytes);
     }
 }
@@ -250,33 +250,33 @@ static void column(const bt_state_row *c, char *rows, size_t size, int64_t n, ch
 /// Rows that a column is taken from at a time.
 enum { PORTION = 4096 };
 
-static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, void *rows,
+static void save_columns(bt_snapshot *snap, const char *group, const bt_state_row *columns, int n_columns, void *rows,
                          size_t size, int64_t n)
 {
     for (int k = 0; k < n_columns; k++) {
-        bt_snapshot_begin_row(s, group, &columns[k], n);
+        bt_snapshot_begin_row(snap, group, &columns[k], n);
         char *portion = bt_alloc(PORTION * (size_t)columns[k].width, bt_item_size(columns[k].type));
-        if (n == 0) bt_snapshot_put(s, 0, portion);
+        if (n == 0) bt_snapshot_put(snap, 0, portion);
         for (int64_t i = 0; i < n; i += PORTION) {
             const int64_t now = n - i < PORTION ? n - i : PORTION;
             column(&columns[k], (char *)rows + (size_t)i * size, size, now, portion, true);
-            bt_snapshot_put(s, now, portion);
+            bt_snapshot_put(snap, now, portion);
         }
         free(portion);
     }
 }
 
 /// n < 0: as many rows as there are. The rows in new memory.
-static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, size_t size,
+static void *load_columns(bt_snapshot *snap, const char *group, const bt_state_row *columns, int n_columns, size_t size,
                           int64_t *n)
 {
     char name[64];
     snprintf(name, sizeof name, "%s/%s", group, columns[0].name);
-    if (*n < 0) *n = bt_snapshot_rows(s, name);
+    if (*n < 0) *n = bt_snapshot_rows(snap, name);
     char *rows = bt_alloc((size_t)*n, size);
     for (int k = 0; k < n_columns; k++) {
         char *array = bt_alloc((size_t)*n * (size_t)columns[k].width, bt_item_size(columns[k].type));
-        bt_snapshot_take_row(s, group, &columns[k], *n, array);
+        bt_snapshot_take_row(snap, group, &columns[k], *n, array);
         column(&columns[k], rows, size, *n, array, false);
         free(array);
     }
@@ -284,41 +284,41 @@ static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row 
 }
 
 /// Column by column: rows of all bodies at once would be the largest thing in memory on rank 0, twice.
-static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+static bt_status save_bodies(const bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err)
 {
-    const bt_bodies *b = &w->bodies;
-    const int64_t count = c->rank == 0 ? b->n_global : 0;
+    const bt_bodies *bodies = &world->bodies;
+    const int64_t count = comm->rank == 0 ? bodies->n_global : 0;
     bt_idx n = 0;
     // every id has a row, also those of floes that have split and of pieces yet to come: zeros, from rank 0
-    const size_t most = (size_t)(w->splitting ? b->n_global : b->n);
+    const size_t most = (size_t)(world->splitting ? bodies->n_global : bodies->n);
     bt_gid *gid = bt_alloc(most, sizeof *gid);
     bt_idx *body = bt_alloc(most, sizeof *body);
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (!bt_domain_owns(w, i)) continue;
-        gid[n] = b->gid[i];
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (!bt_domain_owns(world, i)) continue;
+        gid[n] = bodies->gid[i];
         body[n++] = i;
     }
-    for (bt_gid g = 0; g < b->n_global && w->splitting && c->rank == 0; g++) {
-        if (!b->gone[g]) continue;
+    for (bt_gid g = 0; g < bodies->n_global && world->splitting && comm->rank == 0; g++) {
+        if (!bodies->gone[g]) continue;
         gid[n] = g;
         body[n++] = -1;
     }
-    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
-    for (int k = 1; k <= c->size; k++) first[k] = b->n_global; // all to rank 0
+    int64_t *first = bt_alloc((size_t)comm->size + 1, sizeof *first);
+    for (int k = 1; k <= comm->size; k++) first[k] = bodies->n_global; // all to rank 0
     bt_status status = BT_OK;
     for (int k = 0; k < BT_N_OF(body_columns) && status == BT_OK; k++) {
         bt_state_row in_row = body_columns[k];
         const size_t bytes = bt_item_size(in_row.type) * (size_t)in_row.width, width = (bytes + 7) / 8;
         double *mine = bt_alloc((size_t)n, width * sizeof *mine), *all = bt_alloc((size_t)count, width * sizeof *all);
         for (bt_idx i = 0; i < n; i++) {
-            const body_row row = body[i] < 0 ? (body_row){0} : row_of(b, body[i]);
+            const body_row row = body[i] < 0 ? (body_row){0} : row_of(bodies, body[i]);
             memcpy(mine + (size_t)i * width, (const char *)&row + in_row.offset, bytes);
         }
-        status = bt_comm_rows_by_gid(c, first, n, gid, (int)width, mine, all, err);
+        status = bt_comm_rows_by_gid(comm, first, n, gid, (int)width, mine, all, err);
         free(mine);
         in_row.offset = 0;
-        if (status == BT_OK && c->rank == 0)
-            save_columns(s, "bodies", &in_row, 1, all, width * sizeof *all, count);
+        if (status == BT_OK && comm->rank == 0)
+            save_columns(snap, "bodies", &in_row, 1, all, width * sizeof *all, count);
         free(all);
     }
     free(first);
@@ -327,40 +327,41 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
     return status;
 }
 
-static void load_bodies(bt_world *w, bt_snapshot *s)
+static void load_bodies(bt_world *world, bt_snapshot *snap)
 {
-    int64_t n = w->bodies.n_global;
-    body_row *rows = load_columns(s, "bodies", body_columns, BT_N_OF(body_columns), sizeof *rows, &n);
-    for (bt_gid g = 0; g < n && !s->faulty; g++)
-        if (!w->bodies.gone[g]) put_row(w, bt_world_index(w, g), &rows[g]);
+    int64_t n = world->bodies.n_global;
+    body_row *rows = load_columns(snap, "bodies", body_columns, BT_N_OF(body_columns), sizeof *rows, &n);
+    for (bt_gid g = 0; g < n && !snap->faulty; g++)
+        if (!world->bodies.gone[g]) put_row(world, bt_world_index(world, g), &rows[g]);
     free(rows);
 }
 
 // --- floes that split ------------------------------------------------------------------------------------------------
 
-static void save_splitting(const bt_splitting *p, bt_snapshot *s)
+static void save_splitting(const bt_splitting *splitting, bt_snapshot *snap)
 {
-    bt_snapshot_add_rows(s, "splitting", bt_split_total_rows, bt_n_split_total_rows, &p->total);
-    save_columns(s, "splits", split_columns, BT_N_OF(split_columns), p->split, sizeof *p->split, p->n);
-    bt_snapshot_add(s, "splits/vertices", BT_ITEM_F64, p->n_vertices, 2, p->vertex);
+    bt_snapshot_add_rows(snap, "splitting", bt_split_total_rows, bt_n_split_total_rows, &splitting->total);
+    save_columns(snap, "splits", split_columns, BT_N_OF(split_columns), splitting->split, sizeof *splitting->split,
+                 splitting->n);
+    bt_snapshot_add(snap, "splits/vertices", BT_ITEM_F64, splitting->n_vertices, 2, splitting->vertex);
 }
 
 /// The history, and pieces in the place of the floes that have split.
-static void load_splitting(bt_world *w, bt_snapshot *s)
+static void load_splitting(bt_world *world, bt_snapshot *snap)
 {
-    bt_splitting *p = w->splitting;
+    bt_splitting *splitting = world->splitting;
     int64_t n = -1, n_vertices = 0, at = 0;
-    bt_snapshot_take_rows(s, "splitting", bt_split_total_rows, bt_n_split_total_rows, &p->total);
-    bt_split_record *rows = load_columns(s, "splits", split_columns, BT_N_OF(split_columns), sizeof *rows, &n);
-    double *vertex = bt_snapshot_copy(s, "splits/vertices", BT_ITEM_F64, 2, &n_vertices);
-    if (!s->faulty) bt_state_check_splits(w, rows, n, vertex, n_vertices, s);
-    for (int64_t k = 0; k < n && !s->faulty; k++) {
-        bt_splitting_append(p, &rows[k], vertex + 2 * at);
+    bt_snapshot_take_rows(snap, "splitting", bt_split_total_rows, bt_n_split_total_rows, &splitting->total);
+    bt_split_record *rows = load_columns(snap, "splits", split_columns, BT_N_OF(split_columns), sizeof *rows, &n);
+    double *vertex = bt_snapshot_copy(snap, "splits/vertices", BT_ITEM_F64, 2, &n_vertices);
+    if (!snap->faulty) bt_state_check_splits(world, rows, n, vertex, n_vertices, snap);
+    for (int64_t k = 0; k < n && !snap->faulty; k++) {
+        bt_splitting_append(splitting, &rows[k], vertex + 2 * at);
         at += rows[k].corners[0] + rows[k].corners[1] + rows[k].corners[2];
     }
     free(rows);
     free(vertex);
-    if (!s->faulty) bt_splitting_restore(w);
+    if (!snap->faulty) bt_splitting_restore(world);
 }
 
 // --- contacts --------------------------------------------------------------------------------------------------------
@@ -383,87 +384,88 @@ static const bt_state_row memory_columns[] = {
 };
 
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
-static void blank(bt_memory *t)
+static void blank(bt_memory *memory)
 {
-    if (t->n_points < 2) t->feature[1] = 0, t->value[1] = 0;
+    if (memory->n_points < 2) memory->feature[1] = 0, memory->value[1] = 0;
 }
 
 /// Names of the laws that a program has added, in the order of their numbers; "" without any. The caller frees it.
-static char *added_laws(const bt_world *w)
+static char *added_laws(const bt_world *world)
 {
-    bt_text t;
-    bt_text_begin(&t);
-    for (int k = 0; k < w->par.added_laws; k++) fprintf(t.out, "%s%s", k ? ", " : "", bt_contact_law_of(k)->name);
-    return bt_text_end(&t);
+    bt_text text;
+    bt_text_begin(&text);
+    for (int k = 0; k < world->par.added_laws; k++)
+        fprintf(text.out, "%s%s", k ? ", " : "", bt_contact_law_of(k)->name);
+    return bt_text_end(&text);
 }
 
 /// Records name their law by its number, and the numbers of added laws follow from the order of their registration.
-static void check_added_laws(const bt_world *w, bt_snapshot *s)
+static void check_added_laws(const bt_world *world, bt_snapshot *snap)
 {
-    if (!bt_snapshot_find(s, ADDED_LAWS)) return; // none
-    const char *then = bt_snapshot_text(s, ADDED_LAWS);
-    char *now = added_laws(w);
-    if (strcmp(now, then) && s->err)
-        bt_errors_add(s->err,
+    if (!bt_snapshot_find(snap, ADDED_LAWS)) return; // none
+    const char *then = bt_snapshot_text(snap, ADDED_LAWS);
+    char *now = added_laws(world);
+    if (strcmp(now, then) && snap->err)
+        bt_errors_add(snap->err,
                       "%s: the run had the added contact laws %s, in this order, and this program has %s; go on in one "
                       "that registers the same laws in the same order",
-                      s->path, then, *now ? now : "none");
-    s->faulty |= strcmp(now, then) != 0;
+                      snap->path, then, *now ? now : "none");
+    snap->faulty |= strcmp(now, then) != 0;
     free(now);
 }
 
 /// Names of the force laws of a program that have acted, in the order in which they add.
-static char *added_forces(const bt_forces *f)
+static char *added_forces(const bt_forces *forces)
 {
-    bt_text t;
-    bt_text_begin(&t);
+    bt_text text;
+    bt_text_begin(&text);
     const char *comma = "";
-    for (int k = BT_LISTED_LAWS; k < f->n; k++) {
-        if (!f->acted[k]) continue;
-        fprintf(t.out, "%s%s", comma, bt_force_laws[k]->name);
+    for (int k = BT_LISTED_LAWS; k < forces->n; k++) {
+        if (!forces->acted[k]) continue;
+        fprintf(text.out, "%s%s", comma, bt_force_laws[k]->name);
         comma = ", ";
     }
-    return bt_text_end(&t);
+    return bt_text_end(&text);
 }
 
 /// Without a force the run would be another run, and with another order of sums it would have other bits. Forces that
 /// come later are welcome.
-static void load_added_forces(bt_forces *f, bt_snapshot *s)
+static void load_added_forces(bt_forces *forces, bt_snapshot *snap)
 {
-    if (!bt_snapshot_find(s, ADDED_FORCES)) return; // none
-    const char *then = bt_snapshot_text(s, ADDED_FORCES), *next = then;
-    for (int k = BT_LISTED_LAWS; k < f->n && *next; k++) {
+    if (!bt_snapshot_find(snap, ADDED_FORCES)) return; // none
+    const char *then = bt_snapshot_text(snap, ADDED_FORCES), *next = then;
+    for (int k = BT_LISTED_LAWS; k < forces->n && *next; k++) {
         const size_t n = strlen(bt_force_laws[k]->name);
         if (bt_force_is_released(bt_force_laws[k]) || strncmp(next, bt_force_laws[k]->name, n)) continue;
         if (next[n] && next[n] != ',') continue;
-        f->acted[k] = true;
+        forces->acted[k] = true;
         next += next[n] ? n + 2 : n;
     }
     if (!*next) return;
-    if (s->err)
-        bt_errors_add(s->err,
+    if (snap->err)
+        bt_errors_add(snap->err,
                       "%s: the run had %s, which a program had added (force laws, in this order); go on in one that "
                       "adds the same in the same order, before any other: in a new process",
-                      s->path, then);
-    s->faulty = true;
+                      snap->path, then);
+    snap->faulty = true;
 }
 
-static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
+static void save_contacts(const bt_world *world, const bt_comm *comm, bt_snapshot *snap)
 {
     int64_t n, all;
-    bt_memory *memory = bt_cells_take_memory(w, &n);
+    bt_memory *memory = bt_cells_take_memory(world, &n);
     all = n;
-    if (c->size > 1) {
+    if (comm->size > 1) {
         bt_memory *mine = memory;
-        memory = (bt_memory *)(void *)bt_comm_gather(c, n, MEMORY_WIDTH, (const double *)(const void *)mine, &all);
+        memory = (bt_memory *)(void *)bt_comm_gather(comm, n, MEMORY_WIDTH, (const double *)(const void *)mine, &all);
         free(mine);
     }
-    if (c->rank == 0) {
+    if (comm->rank == 0) {
         if (all > 0) qsort(memory, (size_t)all, sizeof *memory, bt_memory_by_names);
         for (int64_t k = 0; k < all; k++) blank(&memory[k]);
-        save_columns(s, "contacts", memory_columns, BT_N_OF(memory_columns), memory, sizeof *memory, all);
-        char *laws = added_laws(w);
-        if (*laws) bt_snapshot_add_text(s, ADDED_LAWS, laws);
+        save_columns(snap, "contacts", memory_columns, BT_N_OF(memory_columns), memory, sizeof *memory, all);
+        char *laws = added_laws(world);
+        if (*laws) bt_snapshot_add_text(snap, ADDED_LAWS, laws);
         free(laws);
     }
     free(memory);
@@ -482,27 +484,28 @@ static const bt_state_row event_columns[] = {
 
 // --- the whole -------------------------------------------------------------------------------------------------------
 
-bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+bt_status bt_state_save(const bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err)
 {
-    const uint64_t hash = bt_world_hash(w);
-    const bt_status status = save_bodies(w, c, s, err);
-    save_contacts(w, c, s);
-    if (c->rank != 0) return status;
-    char *forces = added_forces(w->forces);
-    if (*forces) bt_snapshot_add_text(s, ADDED_FORCES, forces);
+    const uint64_t hash = bt_world_hash(world);
+    const bt_status status = save_bodies(world, comm, snap, err);
+    save_contacts(world, comm, snap);
+    if (comm->rank != 0) return status;
+    char *forces = added_forces(world->forces);
+    if (*forces) bt_snapshot_add_text(snap, ADDED_FORCES, forces);
     free(forces);
-    bt_snapshot_add_rows(s, "world", world_rows, BT_N_OF(world_rows), w);
-    bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
-    bt_snapshot_add_rows(s, "step", par_rows, BT_N_OF(par_rows), &w->par);
-    bt_snapshot_add_rows(s, "cells", cells_rows, BT_N_OF(cells_rows), w->cells);
-    if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, BT_N_OF(tow_rows), w->tow);
-    if (w->window) bt_snapshot_add_rows(s, "window", window_rows, BT_N_OF(window_rows), w->window);
-    if (w->undisturbed)
-        bt_snapshot_add_rows(s, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), w->undisturbed);
-    if (w->splitting) save_splitting(w->splitting, s);
-    if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
-    save_columns(s, "events", event_columns, BT_N_OF(event_columns), w->events.event, sizeof *w->events.event,
-                 w->events.n);
+    bt_snapshot_add_rows(snap, "world", world_rows, BT_N_OF(world_rows), world);
+    bt_snapshot_add_int(snap, "world/hash", (int64_t)hash);
+    bt_snapshot_add_rows(snap, "step", par_rows, BT_N_OF(par_rows), &world->par);
+    bt_snapshot_add_rows(snap, "cells", cells_rows, BT_N_OF(cells_rows), world->cells);
+    if (world->tow) bt_snapshot_add_rows(snap, "tow", tow_rows, BT_N_OF(tow_rows), world->tow);
+    if (world->window) bt_snapshot_add_rows(snap, "window", window_rows, BT_N_OF(window_rows), world->window);
+    if (world->undisturbed)
+        bt_snapshot_add_rows(snap, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), world->undisturbed);
+    if (world->splitting) save_splitting(world->splitting, snap);
+    if (world->impacts)
+        bt_snapshot_add(snap, "impacts/open", BT_ITEM_F64, world->impacts->n_open, OPEN_WIDTH, world->impacts->open);
+    save_columns(snap, "events", event_columns, BT_N_OF(event_columns), world->events.event,
+                 sizeof *world->events.event, world->events.n);
     return status;
 }
 
@@ -528,20 +531,21 @@ static bool open_finite(const bt_impact_open *o)
     return bt_state_finite(real, BT_N_OF(real));
 }
 
-const char *bt_state_not_finite(const bt_world *w, char name[64])
+const char *bt_state_not_finite(const bt_world *world, char name[64])
 {
-    const char *found = rows_not_finite("world", world_rows, BT_N_OF(world_rows), w, name);
-    if (!found) found = rows_not_finite("step", par_rows, BT_N_OF(par_rows), &w->par, name);
-    if (!found) found = rows_not_finite("tow", tow_rows, BT_N_OF(tow_rows), w->tow, name);
-    if (!found) found = rows_not_finite("window", window_rows, BT_N_OF(window_rows), w->window, name);
+    const char *found = rows_not_finite("world", world_rows, BT_N_OF(world_rows), world, name);
+    if (!found) found = rows_not_finite("step", par_rows, BT_N_OF(par_rows), &world->par, name);
+    if (!found) found = rows_not_finite("tow", tow_rows, BT_N_OF(tow_rows), world->tow, name);
+    if (!found) found = rows_not_finite("window", window_rows, BT_N_OF(window_rows), world->window, name);
     if (!found)
-        found = rows_not_finite("undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), w->undisturbed, name);
-    const bt_impacts *m = w->impacts;
-    if (found || !m) return found;
-    if (!bt_state_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
-    for (int64_t k = 0; k < m->n_open; k++)
-        if (!open_finite(&m->open[k])) return "impacts/open";
-    return bt_state_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL
+        found = rows_not_finite("undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), world->undisturbed, name);
+    const bt_impacts *impacts = world->impacts;
+    if (found || !impacts) return found;
+    if (!bt_state_finite((const double *)(const void *)impacts->closed, impacts->n_closed * IMPACT_WIDTH))
+        return "impacts/closed";
+    for (int64_t k = 0; k < impacts->n_open; k++)
+        if (!open_finite(&impacts->open[k])) return "impacts/open";
+    return bt_state_finite((const double *)(const void *)impacts->panels.panel, impacts->panels.n * PANEL_WIDTH) ? NULL
                                                                                                 : "impacts/panels";
 }
 
@@ -558,52 +562,53 @@ static bool same_constants(const bt_params *now, const bt_params *then, bool ste
            now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
 }
 
-bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err)
 {
-    const bt_params made = w->par;
-    if (!s->path) s->path = "checkpoint";
-    bt_snapshot_take_rows(s, "world", world_rows, BT_N_OF(world_rows), w);
-    const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
-    bt_snapshot_take_rows(s, "step", par_rows, BT_N_OF(par_rows), &w->par);
-    if (w->splitting && !s->faulty) load_splitting(w, s);
-    load_bodies(w, s);
-    bt_snapshot_take_rows(s, "cells", cells_rows, BT_N_OF(cells_rows), w->cells);
-    if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, BT_N_OF(tow_rows), w->tow);
-    if (w->window) bt_snapshot_take_rows(s, "window", window_rows, BT_N_OF(window_rows), w->window);
-    if (w->undisturbed)
-        bt_snapshot_take_rows(s, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), w->undisturbed);
-    if (w->impacts && c->rank == 0) {
-        free(w->impacts->open);
-        w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);
+    const bt_params made = world->par;
+    if (!snap->path) snap->path = "checkpoint";
+    bt_snapshot_take_rows(snap, "world", world_rows, BT_N_OF(world_rows), world);
+    const uint64_t hash = (uint64_t)bt_snapshot_int(snap, "world/hash");
+    bt_snapshot_take_rows(snap, "step", par_rows, BT_N_OF(par_rows), &world->par);
+    if (world->splitting && !snap->faulty) load_splitting(world, snap);
+    load_bodies(world, snap);
+    bt_snapshot_take_rows(snap, "cells", cells_rows, BT_N_OF(cells_rows), world->cells);
+    if (world->tow) bt_snapshot_take_rows(snap, "tow", tow_rows, BT_N_OF(tow_rows), world->tow);
+    if (world->window) bt_snapshot_take_rows(snap, "window", window_rows, BT_N_OF(window_rows), world->window);
+    if (world->undisturbed)
+        bt_snapshot_take_rows(snap, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), world->undisturbed);
+    if (world->impacts && comm->rank == 0) {
+        free(world->impacts->open);
+        world->impacts->open = bt_snapshot_copy(snap, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &world->impacts->n_open);
     }
-    bt_events_free(&w->events);
-    w->events.n = -1;
-    w->events.event =
-        load_columns(s, "events", event_columns, BT_N_OF(event_columns), sizeof *w->events.event, &w->events.n);
-    w->events.cap = w->events.n;
+    bt_events_free(&world->events);
+    world->events.n = -1;
+    world->events.event =
+        load_columns(snap, "events", event_columns, BT_N_OF(event_columns), sizeof *world->events.event,
+                     &world->events.n);
+    world->events.cap = world->events.n;
     int64_t n = -1;
-    if (!s->faulty) check_added_laws(w, s);
-    if (!s->faulty) load_added_forces(w->forces, s);
-    bt_memory *memory = load_columns(s, "contacts", memory_columns, BT_N_OF(memory_columns), sizeof *memory, &n);
-    if (!s->faulty) bt_state_check(w, memory, n, w->impacts && c->rank == 0, s);
-    bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
-    if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
+    if (!snap->faulty) check_added_laws(world, snap);
+    if (!snap->faulty) load_added_forces(world->forces, snap);
+    bt_memory *memory = load_columns(snap, "contacts", memory_columns, BT_N_OF(memory_columns), sizeof *memory, &n);
+    if (!snap->faulty) bt_state_check(world, memory, n, world->impacts && comm->rank == 0, snap);
+    bt_status status = bt_comm_agree(comm, snap->faulty ? BT_ERR_CASE : BT_OK);
+    if (status == BT_OK && !same_constants(&made, &world->par, !world->environment)) {
         bt_errors_add(err,
                       "%s: the case it holds makes other constants of the step now; it was written by another version "
                       "of the program: go on with that one",
-                      s->path);
+                      snap->path);
         status = BT_ERR_CASE;
     }
     if (status != BT_OK) {
         free(memory);
         return status;
     }
-    bt_domain_create(w, c);
-    bt_cells_restore(w, memory, n);
-    if (bt_world_hash(w) == hash) return BT_OK;
+    bt_domain_create(world, comm);
+    bt_cells_restore(world, memory, n);
+    if (bt_world_hash(world) == hash) return BT_OK;
     bt_errors_add(err,
                   "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
                   "; go on with the program that wrote it",
-                  s->path, hash);
+                  snap->path, hash);
     return BT_ERR_NUMERIC;
 }

@@ -14,31 +14,32 @@
 
 /// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:
 /// BT_ERR_NUMERIC (bodies lost).
-bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
+bt_status bt_state_save(const bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err);
 
 /// Collective. The state into a world that bt_setup_world has made from the same case and field, all of it on every
-/// rank; it is distributed to the ranks here. s is the same on all ranks. Errors: BT_ERR_CASE (not of this case, or of
-/// another version), BT_ERR_NUMERIC (the state does not have the hash it was saved with).
-bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
+/// rank; it is distributed to the ranks here. `snap` is the same on all ranks. Errors: BT_ERR_CASE (not of this case,
+/// or of another version), BT_ERR_NUMERIC (the state does not have the hash it was saved with).
+bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err);
 
 /// The first number of world, step, tow, window and collisions that is NaN or infinite, by its name in a checkpoint
 /// ("tow/vessel_vx"); NULL = all are numbers. Those of the bodies are not looked at.
-const char *bt_state_not_finite(const bt_world *w, char name[64]);
+const char *bt_state_not_finite(const bt_world *world, char name[64]);
 
 /// Collective. The ice field at time zero, on rank 0. Its outlines are those of the bodies, which keep them to the bit:
-/// f->vertices may be NULL. Errors: BT_ERR_NUMERIC.
-bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
-void bt_state_load_field(bt_field *f, bt_snapshot *s);
+/// field->vertices may be NULL. Errors: BT_ERR_NUMERIC.
+bt_status bt_state_save_field(const bt_field *field, const bt_world *world, const bt_comm *comm, bt_snapshot *snap,
+                              bt_errors *err);
+void bt_state_load_field(bt_field *field, bt_snapshot *snap);
 
 /// What floes that split have come to (bt_split_totals): in checkpoints, and keys of summary.json.
 extern const bt_state_row bt_split_total_rows[];
 extern const int bt_n_split_total_rows;
 
 /// Structs of the run beside the world, by their tables.
-void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s);
-void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s);
-void bt_state_save_stall(const bt_stall *t, bt_snapshot *s);
-void bt_state_load_stall(bt_stall *t, bt_snapshot *s);
+void bt_state_save_lead(const bt_lead_stats *stats, bt_snapshot *snap);
+void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap);
+void bt_state_save_stall(const bt_stall *stall, bt_snapshot *snap);
+void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 
 // --- rows of members (private to state.c and state_field.c) ----------------------------------------------------------
 
@@ -62,16 +63,16 @@ static inline bool bt_state_finite(const double *x, int64_t n)
     return true;
 }
 
-/// Complains into s of the first thing that is wrong with a field, whose arrays have the lengths that the first two
-/// give.
-void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertices, bt_snapshot *s);
+/// Complains into `snap` of the first thing that is wrong with a field, whose arrays have the lengths that the first
+/// two give.
+void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_vertices, bt_snapshot *snap);
 
 /// The same for a world before it is distributed, and for the memory of contacts [n]; impacts: those were taken too.
-void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *s);
+void bt_state_check(const bt_world *world, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *snap);
 
 struct bt_split_record;
 /// The same for the history of splits [n] with its vertices, for a world as it was in the beginning.
-void bt_state_check_splits(const bt_world *w, const struct bt_split_record *rows, int64_t n, const double *vertex,
-                           int64_t n_vertices, bt_snapshot *s);
+void bt_state_check_splits(const bt_world *world, const struct bt_split_record *rows, int64_t n, const double *vertex,
+                           int64_t n_vertices, bt_snapshot *snap);
 
 #endif

@@ -75,73 +75,74 @@ static const bt_state_row field_rows[] = {
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
 
-void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
+void bt_state_save_stall(const bt_stall *stall, bt_snapshot *snap)
 {
-    bt_snapshot_add_rows(s, "stall", stall_rows, BT_N_OF(stall_rows), t);
+    bt_snapshot_add_rows(snap, "stall", stall_rows, BT_N_OF(stall_rows), stall);
 }
-void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
+void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap)
 {
-    bt_snapshot_take_rows(s, "stall", stall_rows, BT_N_OF(stall_rows), t);
+    bt_snapshot_take_rows(snap, "stall", stall_rows, BT_N_OF(stall_rows), stall);
 }
-void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
+void bt_state_save_lead(const bt_lead_stats *stats, bt_snapshot *snap)
 {
-    bt_snapshot_add_rows(s, "lead", lead_rows, BT_N_OF(lead_rows), l);
+    bt_snapshot_add_rows(snap, "lead", lead_rows, BT_N_OF(lead_rows), stats);
 }
-void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
+void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap)
 {
     int32_t mode = 0;
-    bt_snapshot_take(s, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
+    bt_snapshot_take(snap, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
     // before it is taken as one
-    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead");
-    if (!s->faulty) bt_snapshot_take_rows(s, "lead", lead_rows, BT_N_OF(lead_rows), l);
+    bt_snapshot_want(snap, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead");
+    if (!snap->faulty) bt_snapshot_take_rows(snap, "lead", lead_rows, BT_N_OF(lead_rows), stats);
 }
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
 /// Collective. Outlines of the floes of the field, which are the first n bodies. `offset`: on rank 0.
-static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, const int64_t *offset, bt_snapshot *s,
-                               bt_errors *err)
+static bt_status save_outlines(const bt_world *world, const bt_comm *comm, bt_gid n, const int64_t *offset,
+                               bt_snapshot *snap, bt_errors *err)
 {
     enum { FLOES = 1024 }; // at a time
-    const bt_bodies *b = &w->bodies;
-    const bt_splitting *p = w->splitting;
+    const bt_bodies *bodies = &world->bodies;
+    const bt_splitting *splitting = world->splitting;
     int64_t *split = bt_alloc((size_t)n, sizeof *split); // 1 + the split of a floe that is gone, 0 = none
     double most = 0;
-    for (bt_idx i = 0; i < b->n; i++)
-        if (b->gid[i] < n) most = bt_max(most, bt_body_corners(b, i));
-    for (int64_t k = 0; p && k < p->n; k++) {
-        if (p->split[k].parent >= n) continue;
-        split[p->split[k].parent] = k + 1;
-        most = bt_max(most, (double)p->split[k].corners[2]);
+    for (bt_idx i = 0; i < bodies->n; i++)
+        if (bodies->gid[i] < n) most = bt_max(most, bt_body_corners(bodies, i));
+    for (int64_t k = 0; splitting && k < splitting->n; k++) {
+        if (splitting->split[k].parent >= n) continue;
+        split[splitting->split[k].parent] = k + 1;
+        most = bt_max(most, (double)splitting->split[k].corners[2]);
     }
-    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
+    bt_comm_reduce(comm, NULL, 0, &most, 1, NULL, 0);
     const size_t width = 2 * (size_t)most, size = width * sizeof(double);
     double *mine = bt_alloc(FLOES, size), *all = bt_alloc(FLOES, size), *packed = bt_alloc(FLOES, size);
     bt_gid *gid = bt_alloc(FLOES, sizeof *gid);
-    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    int64_t *first = bt_alloc((size_t)comm->size + 1, sizeof *first);
     bt_status status = BT_OK;
-    if (c->rank == 0) bt_snapshot_begin(s, "field/vertices", BT_ITEM_F64, offset[n], 2);
-    if (c->rank == 0 && n == 0) bt_snapshot_put(s, 0, packed);
+    if (comm->rank == 0) bt_snapshot_begin(snap, "field/vertices", BT_ITEM_F64, offset[n], 2);
+    if (comm->rank == 0 && n == 0) bt_snapshot_put(snap, 0, packed);
     for (bt_gid from = 0; from < n && status == BT_OK; from += FLOES) {
         const bt_gid end = n - from < FLOES ? n : from + FLOES;
         bt_idx own = 0;
         for (bt_gid g = from; g < end; g++) {
-            const bt_idx i = bt_world_index(w, g);
+            const bt_idx i = bt_world_index(world, g);
             const bool gone = split[g] > 0;
-            if (gone ? c->rank != 0 : i < 0 || !bt_domain_owns(w, i)) continue;
-            const double *v = gone ? bt_splitting_outline(p, split[g] - 1, 2) : b->vertices + 2 * b->offset[i];
-            const int corners = gone ? (int)p->split[split[g] - 1].corners[2] : bt_body_corners(b, i);
+            if (gone ? comm->rank != 0 : i < 0 || !bt_domain_owns(world, i)) continue;
+            const double *v = gone ? bt_splitting_outline(splitting, split[g] - 1, 2)
+                                   : bodies->vertices + 2 * bodies->offset[i];
+            const int corners = gone ? (int)splitting->split[split[g] - 1].corners[2] : bt_body_corners(bodies, i);
             memcpy(mine + (size_t)own * width, v, 2 * sizeof *mine * (size_t)corners);
             gid[own++] = g;
         }
         first[0] = from;
-        for (int k = 1; k <= c->size; k++) first[k] = end; // all to rank 0
-        status = bt_comm_rows_by_gid(c, first, own, gid, (int)width, mine, all, err);
-        if (status != BT_OK || c->rank != 0) continue;
+        for (int k = 1; k <= comm->size; k++) first[k] = end; // all to rank 0
+        status = bt_comm_rows_by_gid(comm, first, own, gid, (int)width, mine, all, err);
+        if (status != BT_OK || comm->rank != 0) continue;
         for (bt_gid g = from; g < end; g++)
             memcpy(packed + 2 * (offset[g] - offset[from]), all + (size_t)(g - from) * width,
                    2 * sizeof *all * (size_t)(offset[g + 1] - offset[g]));
-        bt_snapshot_put(s, offset[end] - offset[from], packed);
+        bt_snapshot_put(snap, offset[end] - offset[from], packed);
     }
     free(mine);
     free(all);
@@ -152,49 +153,50 @@ static bt_status save_outlines(const bt_world *w, const bt_comm *c, bt_gid n, co
     return status;
 }
 
-static void save_field_head(const bt_field *f, bt_snapshot *s)
+static void save_field_head(const bt_field *field, bt_snapshot *snap)
 {
-    bt_snapshot_add_rows(s, "field", field_rows, BT_N_OF(field_rows), f);
-    bt_snapshot_add_text(s, "field/crs", f->outlines.crs);
-    bt_snapshot_add_text(s, "field/nearly", f->outlines.nearly);
-    bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
+    bt_snapshot_add_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
+    bt_snapshot_add_text(snap, "field/crs", field->outlines.crs);
+    bt_snapshot_add_text(snap, "field/nearly", field->outlines.nearly);
+    bt_snapshot_add(snap, "field/offsets", BT_ITEM_I64, field->n + 1, 1, field->offsets);
 }
 
-bt_status bt_state_save_field(const bt_field *f, const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+bt_status bt_state_save_field(const bt_field *field, const bt_world *world, const bt_comm *comm, bt_snapshot *snap,
+                              bt_errors *err)
 {
-    double n = c->rank == 0 ? f->n : 0;
-    bt_comm_reduce(c, NULL, 0, &n, 1, NULL, 0);
-    if (c->rank == 0) save_field_head(f, s);
-    const bt_status status = save_outlines(w, c, (bt_gid)n, f->offsets, s, err);
-    if (c->rank != 0) return status;
-    bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
-    bt_snapshot_add(s, "field/thickness", BT_ITEM_F64, f->n, 1, f->thickness);
-    bt_snapshot_add(s, "field/area", BT_ITEM_F64, f->n, 1, f->area);
+    double n = comm->rank == 0 ? field->n : 0;
+    bt_comm_reduce(comm, NULL, 0, &n, 1, NULL, 0);
+    if (comm->rank == 0) save_field_head(field, snap);
+    const bt_status status = save_outlines(world, comm, (bt_gid)n, field->offsets, snap, err);
+    if (comm->rank != 0) return status;
+    bt_snapshot_add(snap, "field/pose", BT_ITEM_F64, field->n, 3, field->pose);
+    bt_snapshot_add(snap, "field/thickness", BT_ITEM_F64, field->n, 1, field->thickness);
+    bt_snapshot_add(snap, "field/area", BT_ITEM_F64, field->n, 1, field->area);
     return status;
 }
 
-void bt_state_load_field(bt_field *f, bt_snapshot *s)
+void bt_state_load_field(bt_field *field, bt_snapshot *snap)
 {
-    bt_field_free(f);
-    bt_field_init(f);
+    bt_field_free(field);
+    bt_field_init(field);
     int64_t n = 0, n_vertices = 0;
-    bt_snapshot_take_rows(s, "field", field_rows, BT_N_OF(field_rows), f);
-    snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "field/crs"));
-    snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "field/nearly"));
-    free(f->offsets);
-    f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
-    f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);
-    double **const arrays[] = {&f->pose, &f->thickness, &f->area};
+    bt_snapshot_take_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
+    snprintf(field->outlines.crs, sizeof field->outlines.crs, "%s", bt_snapshot_text(snap, "field/crs"));
+    snprintf(field->outlines.nearly, sizeof field->outlines.nearly, "%s", bt_snapshot_text(snap, "field/nearly"));
+    free(field->offsets);
+    field->offsets = bt_snapshot_copy(snap, "field/offsets", BT_ITEM_I64, 1, &n);
+    field->vertices = bt_snapshot_copy(snap, "field/vertices", BT_ITEM_F64, 2, &n_vertices);
+    double **const arrays[] = {&field->pose, &field->thickness, &field->area};
     static const char *const names[] = {"field/pose", "field/thickness", "field/area"};
     for (int k = 0; k < 3; k++) {
         int64_t rows = 0;
-        *arrays[k] = bt_snapshot_copy(s, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
-        bt_snapshot_want(s, rows == n - 1, names[k], -1, "has not a row for each floe");
+        *arrays[k] = bt_snapshot_copy(snap, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
+        bt_snapshot_want(snap, rows == n - 1, names[k], -1, "has not a row for each floe");
     }
-    if (!s->faulty) f->n = f->cap = (bt_idx)(n - 1);
-    f->cap_vertices = n_vertices;
-    bt_state_check_field(f, n, n_vertices, s);
-    if (!s->faulty) return;
-    bt_field_free(f); // nothing of it is to be trusted
-    bt_field_init(f);
+    if (!snap->faulty) field->n = field->cap = (bt_idx)(n - 1);
+    field->cap_vertices = n_vertices;
+    bt_state_check_field(field, n, n_vertices, snap);
+    if (!snap->faulty) return;
+    bt_field_free(field); // nothing of it is to be trusted
+    bt_field_init(field);
 }

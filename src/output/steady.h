@@ -81,12 +81,12 @@ typedef struct bt_steady {
 } bt_steady;
 
 /// The larger of the two branches' peaks in the window, or before it, N; NaN without a line.
-double bt_steady_peak_tension(const bt_steady *s, bool before);
+double bt_steady_peak_tension(const bt_steady *steady, bool before);
 
 /// Of a run without a towed body: nothing is known.
-void bt_steady_none(bt_steady *s);
+void bt_steady_none(bt_steady *steady);
 
 /// The window of a run with a towed body.
-void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t);
+void bt_steady_find(bt_steady *steady, const bt_history *history, const bt_case *input, const bt_run_totals *totals);
 
 #endif

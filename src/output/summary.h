@@ -33,22 +33,22 @@ typedef struct bt_summary {
     bt_errors warnings;
 } bt_summary;
 
-void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
-                     bool body);
+void bt_summary_make(bt_summary *summary, const bt_history *history, const bt_case *input, const bt_run_totals *totals,
+                     bt_idx n_floes, bool body);
 /// summary.json as text; the caller frees it.
-char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
-                      bt_idx n_floes);
-void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
-                      bt_idx n_floes);
+char *bt_summary_json(const bt_summary *summary, const bt_history *history, const bt_case *input,
+                      const bt_run_totals *totals, bt_idx n_floes);
+void bt_summary_print(const bt_summary *summary, const bt_history *history, const bt_case *input,
+                      const bt_run_totals *totals, bt_idx n_floes);
 /// Mean ice resistance that estimates are held against, N; NaN where the body met no ice in the window.
-double bt_summary_held_against(const bt_summary *s);
-void bt_summary_free(bt_summary *s);
+double bt_summary_held_against(const bt_summary *summary);
+void bt_summary_free(bt_summary *summary);
 
 // --- the moving window -----------------------------------------------------------------------------------------------
 
 // The moving window in the summary: table, warnings. Nothing where there is none (NULL).
 
-void bt_summary_window_print(const bt_window *v);
+void bt_summary_window_print(const bt_window *window);
 /// Of a moving window that goes, or is to go, so many times its length through the ice.
 void bt_summary_window_warn_laps(bt_errors *warnings, double laps);
 

@@ -26,157 +26,170 @@ enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_UND
 
 static double number_or_nan(bool there, double x) { return there ? x : NAN; }
 
-static const char *version(const view *v) { return (void)v, BT_VERSION; }
-static const char *peak_conversion(const view *v) { return (void)v, "mean over a step, impulse / dt"; }
-static double n_floes(const view *v) { return v->n_floes; }
-static double memory_per_floe(const view *v)
+static const char *version(const view *from) { return (void)from, BT_VERSION; }
+static const char *peak_conversion(const view *from) { return (void)from, "mean over a step, impulse / dt"; }
+static double n_floes(const view *from) { return from->n_floes; }
+static double memory_per_floe(const view *from)
 {
-    return number_or_nan(v->n_floes > 0, v->t->memory / (double)v->n_floes);
+    return number_or_nan(from->n_floes > 0, from->t->memory / (double)from->n_floes);
 }
-static double overlap_relative(const view *v)
+static double overlap_relative(const view *from)
 {
-    return number_or_nan(v->t->mean_size > 0, v->h->max_overlap / v->t->mean_size);
-}
-
-static double rafted_share(const view *v)
-{
-    const double area = v->h->laws[bt_law_first_total(BT_LAW_RAFTING) + BT_RAFT_TOTAL_AREA].real;
-    return v->t->ice_area > 0 ? area / v->t->ice_area : 0;
+    return number_or_nan(from->t->mean_size > 0, from->h->max_overlap / from->t->mean_size);
 }
 
-static const bt_lead_stats *lead(const view *v) { return &v->t->lead; }
-static bool has_lead(const view *v) { return lead(v)->mode != BT_LEAD_NONE; }
-static bool is_channel(const view *v) { return lead(v)->mode == BT_LEAD_CHANNEL; }
-static bool is_managed(const view *v) { return lead(v)->mode != BT_LEAD_CHANNEL; }
-static const char *lead_mode(const view *v) { return is_channel(v) ? "channel" : "managed"; }
-static double mean_piece(const view *v) { return number_or_nan(lead(v)->pieces > 0, lead(v)->mean_piece); }
-
-static const bt_outline_counts *outlines(const view *v) { return &v->t->outlines; }
-static double origin_lon(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->lon * 180 / BT_PI); }
-static double origin_lat(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->lat * 180 / BT_PI); }
-static double origin_east(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->east); }
-static double origin_north(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->north); }
-static const char *crs(const view *v) { return outlines(v)->read ? outlines(v)->crs : ""; }
-
-static const char *verdict(const view *v) { return v->s->body ? bt_verdict_names[v->s->window.verdict] : NULL; }
-static const char *rule(const view *v) { return !v->s->body ? NULL : v->s->window.given ? "given" : "mser5"; }
-static double n_independent(const view *v) { return number_or_nan(v->s->window.n, v->s->ice.n_eff); }
-static double n_stretches(const view *v)
+static double rafted_share(const view *from)
 {
-    return number_or_nan(v->s->window.n && isfinite(v->s->window.stretches), v->s->window.stretches);
+    const double area = from->h->laws[bt_law_first_total(BT_LAW_RAFTING) + BT_RAFT_TOTAL_AREA].real;
+    return from->t->ice_area > 0 ? area / from->t->ice_area : 0;
 }
-static double unconverged_share(const view *v) { return number_or_nan(v->s->window.n, v->s->window.unconverged); }
-static double no_load_share(const view *v) { return number_or_nan(v->s->window.n, v->s->window.no_load); }
-static double window_residual(const view *v) { return number_or_nan(v->s->window.n, v->s->window.residual); }
-static double peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, false); }
-static double start_peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, true); }
-static bool has_body(const view *v) { return v->s->body; }
-static bool has_reference(const view *v) { return !isnan(v->c->reference.mean_force); }
 
-static bool has_impacts(const view *v) { return v->s->impacts; }
-static bool has_largest(const view *v) { return v->s->impacts->n > 0; }
-static const char *conversion(const view *v) { return v->s->impacts->conversion; }
-static double collisions_per_hour(const view *v)
+static const bt_lead_stats *lead(const view *from) { return &from->t->lead; }
+static bool has_lead(const view *from) { return lead(from)->mode != BT_LEAD_NONE; }
+static bool is_channel(const view *from) { return lead(from)->mode == BT_LEAD_CHANNEL; }
+static bool is_managed(const view *from) { return lead(from)->mode != BT_LEAD_CHANNEL; }
+static const char *lead_mode(const view *from) { return is_channel(from) ? "channel" : "managed"; }
+static double mean_piece(const view *from) { return number_or_nan(lead(from)->pieces > 0, lead(from)->mean_piece); }
+
+static const bt_outline_counts *outlines(const view *from) { return &from->t->outlines; }
+static double origin_lon(const view *from)
 {
-    return number_or_nan(v->s->impacts->hours > 0, (double)v->s->impacts->n / v->s->impacts->hours);
+    return number_or_nan(outlines(from)->read, outlines(from)->lon * 180 / BT_PI);
 }
-static double largest_floe(const view *v) { return v->s->impacts->largest.gid; }
-static double largest_panel(const view *v) { return v->s->impacts->largest.panel; }
+static double origin_lat(const view *from)
+{
+    return number_or_nan(outlines(from)->read, outlines(from)->lat * 180 / BT_PI);
+}
+static double origin_east(const view *from) { return number_or_nan(outlines(from)->read, outlines(from)->east); }
+static double origin_north(const view *from) { return number_or_nan(outlines(from)->read, outlines(from)->north); }
+static const char *crs(const view *from) { return outlines(from)->read ? outlines(from)->crs : ""; }
 
-static bool has_window(const view *v) { return v->t->window; }
-static double window_low(const view *v) { return bt_window_low(v->t->window, v->t->undisturbed); }
-static double window_laps(const view *v) { return bt_window_laps(v->t->window); }
+static const char *verdict(const view *from)
+{
+    return from->s->body ? bt_verdict_names[from->s->window.verdict] : NULL;
+}
+static const char *rule(const view *from) { return !from->s->body ? NULL : from->s->window.given ? "given" : "mser5"; }
+static double n_independent(const view *from) { return number_or_nan(from->s->window.n, from->s->ice.n_eff); }
+static double n_stretches(const view *from)
+{
+    return number_or_nan(from->s->window.n && isfinite(from->s->window.stretches), from->s->window.stretches);
+}
+static double unconverged_share(const view *from)
+{
+    return number_or_nan(from->s->window.n, from->s->window.unconverged);
+}
+static double no_load_share(const view *from) { return number_or_nan(from->s->window.n, from->s->window.no_load); }
+static double window_residual(const view *from) { return number_or_nan(from->s->window.n, from->s->window.residual); }
+static double peak_tension(const view *from) { return bt_steady_peak_tension(&from->s->window, false); }
+static double start_peak_tension(const view *from) { return bt_steady_peak_tension(&from->s->window, true); }
+static bool has_body(const view *from) { return from->s->body; }
+static bool has_reference(const view *from) { return !isnan(from->c->reference.mean_force); }
 
-static bool has_splitting(const view *v) { return v->t->splitting; }
-static double n_splits(const view *v) { return (double)v->t->splitting->n; }
+static bool has_impacts(const view *from) { return from->s->impacts; }
+static bool has_largest(const view *from) { return from->s->impacts->n > 0; }
+static const char *conversion(const view *from) { return from->s->impacts->conversion; }
+static double collisions_per_hour(const view *from)
+{
+    return number_or_nan(from->s->impacts->hours > 0, (double)from->s->impacts->n / from->s->impacts->hours);
+}
+static double largest_floe(const view *from) { return from->s->impacts->largest.gid; }
+static double largest_panel(const view *from) { return from->s->impacts->largest.panel; }
 
-static double n_events(const view *v) { return v->t->events ? (double)v->t->events->n : 0; }
+static bool has_window(const view *from) { return from->t->window; }
+static double window_low(const view *from) { return bt_window_low(from->t->window, from->t->undisturbed); }
+static double window_laps(const view *from) { return bt_window_laps(from->t->window); }
 
-static const char *state_hash(const view *v)
+static bool has_splitting(const view *from) { return from->t->splitting; }
+static double n_splits(const view *from) { return (double)from->t->splitting->n; }
+
+static double n_events(const view *from) { return from->t->events ? (double)from->t->events->n : 0; }
+
+static const char *state_hash(const view *from)
 {
     static char text[17];
-    snprintf(text, sizeof text, "%016" PRIx64, v->t->state_hash);
+    snprintf(text, sizeof text, "%016" PRIx64, from->t->state_hash);
     return text;
 }
 
 // --- arrays and objects whose members are counted -------------------------------------------------------------------
 
-static void write_quarters(bt_json *j, const char *key, const view *v, const void *reported)
+static void write_quarters(bt_json *json, const char *key, const view *from, const void *reported)
 {
-    (void)v;
-    bt_json_open(j, key, '[');
-    for (int q = 0; q < 4; q++) bt_json_number(j, NULL, ((const bt_reported *)reported)->quarter[q]);
-    bt_json_close(j, ']');
+    (void)from;
+    bt_json_open(json, key, '[');
+    for (int q = 0; q < 4; q++) bt_json_number(json, NULL, ((const bt_reported *)reported)->quarter[q]);
+    bt_json_close(json, ']');
 }
 
-static void write_reported(bt_json *j, const char *key, const view *v, const void *source)
+static void write_reported(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    if (!v->s->body) return;
-    bt_json_open(j, key, '{');
+    if (!from->s->body) return;
+    bt_json_open(json, key, '{');
     for (int k = 0; k < BT_N_REPORTED; k++) {
-        const bt_reported *r = &v->s->window.series[k];
+        const bt_reported *reported = &from->s->window.series[k];
         // Of a branch that has parted its peaks, without a mean.
-        if (v->s->window.n == 0 || (!r->present && isnan(r->peak) && isnan(r->start_peak))) continue;
-        bt_json_open(j, r->key, '{');
-        bt_json_keys_write(j, bt_reported_keys, bt_n_reported_keys, v, (const void *const[]){r});
-        bt_json_close(j, '}');
+        if (from->s->window.n == 0 || (!reported->present && isnan(reported->peak) && isnan(reported->start_peak)))
+            continue;
+        bt_json_open(json, reported->key, '{');
+        bt_json_keys_write(json, bt_reported_keys, bt_n_reported_keys, from, (const void *const[]){reported});
+        bt_json_close(json, '}');
     }
-    bt_json_close(j, '}');
+    bt_json_close(json, '}');
 }
 
-static void write_exceedance(bt_json *j, const char *key, const view *v, const void *source)
+static void write_exceedance(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    bt_impacts_exceedance(j, key, v->s->impacts);
+    bt_impacts_exceedance(json, key, from->s->impacts);
 }
 
-static void write_estimates(bt_json *j, const char *key, const view *v, const void *source)
+static void write_estimates(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    if (v->s->body) bt_estimates_json(j, key, &v->s->estimate, bt_summary_held_against(v->s));
-    else bt_json_string(j, key, NULL);
+    if (from->s->body) bt_estimates_json(json, key, &from->s->estimate, bt_summary_held_against(from->s));
+    else bt_json_string(json, key, NULL);
 }
 
-static void write_labels(bt_json *j, const char *key, const view *v, const void *source)
+static void write_labels(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    if (v->s->body) bt_estimate_labels_json(j, key, &v->s->estimate);
-    else bt_json_string(j, key, NULL);
+    if (from->s->body) bt_estimate_labels_json(json, key, &from->s->estimate);
+    else bt_json_string(json, key, NULL);
 }
 
-static void write_added(bt_json *j, const char *key, const view *v, const void *source)
+static void write_added(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)key, (void)source;
-    for (int k = 0; k < v->s->n_added; k++) bt_json_number(j, bt_added(k)->summary, v->s->added[k]);
+    for (int k = 0; k < from->s->n_added; k++) bt_json_number(json, bt_added(k)->summary, from->s->added[k]);
 }
 
-static void write_events(bt_json *j, const char *key, const view *v, const void *source)
+static void write_events(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    const bt_events *e = v->t->events;
-    bt_json_open(j, key, '[');
-    for (int64_t i = 0; e && i < e->n && i < BT_EVENTS_REPORTED; i++) {
-        bt_json_open(j, NULL, '{');
-        bt_json_number(j, "time_s", e->event[i].time);
-        bt_json_string(j, "kind", bt_event_names[e->event[i].kind]);
-        bt_json_int(j, "subject", e->event[i].subject);
-        bt_json_number(j, "value", e->event[i].value);
-        bt_json_close(j, '}');
+    const bt_events *events = from->t->events;
+    bt_json_open(json, key, '[');
+    for (int64_t i = 0; events && i < events->n && i < BT_EVENTS_REPORTED; i++) {
+        bt_json_open(json, NULL, '{');
+        bt_json_number(json, "time_s", events->event[i].time);
+        bt_json_string(json, "kind", bt_event_names[events->event[i].kind]);
+        bt_json_int(json, "subject", events->event[i].subject);
+        bt_json_number(json, "value", events->event[i].value);
+        bt_json_close(json, '}');
     }
-    bt_json_close(j, ']');
+    bt_json_close(json, ']');
 }
 
-static void write_warnings(bt_json *j, const char *key, const view *v, const void *source)
+static void write_warnings(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    bt_warnings_json(j, key, &v->s->warnings);
+    bt_warnings_json(json, key, &from->s->warnings);
 }
 
-static void write_reasons(bt_json *j, const char *key, const view *v, const void *source)
+static void write_reasons(bt_json *json, const char *key, const view *from, const void *source)
 {
     (void)source;
-    bt_warnings_json(j, key, &v->s->window.reasons);
+    bt_warnings_json(json, key, &from->s->window.reasons);
 }
 
 // --- the tables ------------------------------------------------------------------------------------------------------
@@ -486,18 +499,19 @@ const bt_json_key bt_reported_keys[] = {
 };
 const int bt_n_reported_keys = sizeof bt_reported_keys / sizeof *bt_reported_keys;
 
-char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n)
+char *bt_summary_json(const bt_summary *summary, const bt_history *history, const bt_case *input,
+                      const bt_run_totals *totals, bt_idx n)
 {
-    const view v = {s, h, c, t, n};
-    const void *const source[N_FROM] = {s, h, t, c, t->window, t->undisturbed, s->impacts,
-                                        t->splitting ? &t->splitting->total : NULL};
-    bt_json j = {0};
-    bt_json_open(&j, NULL, '{');
+    const view from = {summary, history, input, totals, n};
+    const void *const source[N_FROM] = {summary, history, totals, input, totals->window, totals->undisturbed,
+                                        summary->impacts, totals->splitting ? &totals->splitting->total : NULL};
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
     int n_keys;
     const bt_json_key *keys = bt_summary_keys(&n_keys);
-    bt_json_keys_write(&j, keys, n_keys, &v, source);
-    bt_json_close(&j, '}');
-    return j.text;
+    bt_json_keys_write(&json, keys, n_keys, &from, source);
+    bt_json_close(&json, '}');
+    return json.text;
 }
 
 static const bt_json_key *find(const char *key)
@@ -519,13 +533,13 @@ bt_status bt_summary_check_added(bt_errors *err)
 
 // --- what they mean --------------------------------------------------------------------------------------------------
 
-static bt_meaning meaning_of(const bt_json_key *k)
+static bt_meaning meaning_of(const bt_json_key *key)
 {
-    if (!k) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = "", .kind = ""};
+    if (!key) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = "", .kind = ""};
     return (bt_meaning){.known = true,
-                        .machine = k->machine,
-                        .units = k->units,
-                        .description = k->description,
+                        .machine = key->machine,
+                        .units = key->units,
+                        .description = key->description,
                         .estimate = "",
                         .label = "",
                         .kind = ""};
@@ -537,11 +551,11 @@ static bt_meaning meaning_of_estimate(const char *key)
     const char *dot = strchr(key, '.');
     if (!dot) return meaning_of(bt_json_keys_find(bt_condition_keys, bt_n_condition_keys, key));
     for (int k = 0; k < bt_n_estimates(); k++) {
-        const bt_estimate_def *d = bt_estimate_of(k);
-        if (strncmp(d->name, key, (size_t)(dot - key)) || d->name[dot - key]) continue;
-        bt_meaning m = meaning_of(bt_json_keys_find(bt_estimate_keys, bt_n_estimate_keys, dot + 1));
-        m.estimate = d->name, m.label = d->label, m.kind = bt_estimate_kind_name(d);
-        return m;
+        const bt_estimate_def *def = bt_estimate_of(k);
+        if (strncmp(def->name, key, (size_t)(dot - key)) || def->name[dot - key]) continue;
+        bt_meaning meaning = meaning_of(bt_json_keys_find(bt_estimate_keys, bt_n_estimate_keys, dot + 1));
+        meaning.estimate = def->name, meaning.label = def->label, meaning.kind = bt_estimate_kind_name(def);
+        return meaning;
     }
     return meaning_of(NULL);
 }

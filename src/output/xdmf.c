@@ -41,21 +41,21 @@ static double rounded(double middle, double extent)
     return trunc(middle / unit) * unit;
 }
 
-bt_map_axes bt_map_axes_of(const bt_case *c, const bt_outline_counts *o)
+bt_map_axes bt_map_axes_of(const bt_case *input, const bt_outline_counts *counts)
 {
-    const double extent = bt_max(c->domain.length, c->domain.width);
-    bt_map_axes a = {.swapped = c->domain.frame == BT_FRAME_GEOGRAPHIC,
-                     .origin = {rounded(c->domain.x0 + c->domain.length / 2, extent),
-                                rounded(c->domain.y0 + c->domain.width / 2, extent)}};
-    const bt_map_place p = bt_map_place_of(o, c);
+    const double extent = bt_max(input->domain.length, input->domain.width);
+    bt_map_axes axes = {.swapped = input->domain.frame == BT_FRAME_GEOGRAPHIC,
+                        .origin = {rounded(input->domain.x0 + input->domain.length / 2, extent),
+                                   rounded(input->domain.y0 + input->domain.width / 2, extent)}};
+    const bt_map_place place = bt_map_place_of(counts, input);
     const double degree = BT_PI / 180;
-    if (p.kind == BT_MAP_DEGREES)
-        snprintf(a.crs, sizeof a.crs, "+proj=aeqd +lat_0=%.12g +lon_0=%.12g +datum=WGS84 +units=m", p.second / degree,
-                 p.first / degree);
-    else if (p.kind == BT_MAP_PLANE) snprintf(a.crs, sizeof a.crs, "%s", p.crs);
-    bt_map_axes_point(&(bt_map_axes){.swapped = a.swapped}, a.origin[0], a.origin[1], a.crs_place);
-    if (p.kind == BT_MAP_PLANE) a.crs_place[0] += p.first, a.crs_place[1] += p.second;
-    return a;
+    if (place.kind == BT_MAP_DEGREES)
+        snprintf(axes.crs, sizeof axes.crs, "+proj=aeqd +lat_0=%.12g +lon_0=%.12g +datum=WGS84 +units=m",
+                 place.second / degree, place.first / degree);
+    else if (place.kind == BT_MAP_PLANE) snprintf(axes.crs, sizeof axes.crs, "%s", place.crs);
+    bt_map_axes_point(&(bt_map_axes){.swapped = axes.swapped}, axes.origin[0], axes.origin[1], axes.crs_place);
+    if (place.kind == BT_MAP_PLANE) axes.crs_place[0] += place.first, axes.crs_place[1] += place.second;
+    return axes;
 }
 
 // --- XDMF ------------------------------------------------------------------------------------------------------------
@@ -122,11 +122,11 @@ static void begin_block(FILE *f, const char *name, const char *kind, const char 
     of_frame(f, cells, "net_force", 3, frame, kind, "net_force");
 }
 
-static void floes(FILE *f, const bt_xdmf *x, int64_t frame)
+static void floes(FILE *f, const bt_xdmf *xdmf, int64_t frame)
 {
-    const int64_t n = x->n_floes;
+    const int64_t n = xdmf->n_floes;
     if (n == 0) return;
-    begin_block(f, "floes", "floe", "/xdmf/floes", n, x->floe_vertices, frame);
+    begin_block(f, "floes", "floe", "/xdmf/floes", n, xdmf->floe_vertices, frame);
     of_frame(f, n, "contact_force", 1, frame, "floe", "force");
     attribute(f, n, "thickness", "Float", 8, "/floes/thickness");
     attribute(f, n, "id", "Int", 4, "/xdmf/floe_id");
@@ -134,13 +134,13 @@ static void floes(FILE *f, const bt_xdmf *x, int64_t frame)
 }
 
 /// The pieces of floes that are there.
-static void pieces(FILE *f, const bt_xdmf *x, int64_t frame)
+static void pieces(FILE *f, const bt_xdmf *xdmf, int64_t frame)
 {
-    if (!x->pieces || x->pieces[frame].cells == 0) return;
-    const int64_t n = x->pieces[frame].cells;
+    if (!xdmf->pieces || xdmf->pieces[frame].cells == 0) return;
+    const int64_t n = xdmf->pieces[frame].cells;
     char path[64];
 #define OF_FRAME(name) (snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/" name, frame), path)
-    begin_block(f, "pieces", "piece", OF_FRAME("pieces"), n, x->pieces[frame].points, frame);
+    begin_block(f, "pieces", "piece", OF_FRAME("pieces"), n, xdmf->pieces[frame].points, frame);
     of_frame(f, n, "contact_force", 1, frame, "piece", "force");
     attribute(f, n, "thickness", "Float", 4, OF_FRAME("piece_thickness"));
     attribute(f, n, "id", "Int", 4, OF_FRAME("piece_id"));
@@ -149,32 +149,32 @@ static void pieces(FILE *f, const bt_xdmf *x, int64_t frame)
 }
 
 /// A number of each of the other bodies: their ids, or 1 for the one that is towed.
-static void in_xml(FILE *f, const bt_xdmf *x, const char *name, bool ids)
+static void in_xml(FILE *f, const bt_xdmf *xdmf, const char *name, bool ids)
 {
     begin_attribute(f, name, "Scalar");
-    begin_xml(f, x->n_bodies, 1, "Int", 4);
-    for (int64_t i = 0; i < x->n_bodies; i++)
-        fprintf(f, "%s%" PRId64, i ? " " : "", ids ? x->n_floes + i : i == x->towed);
+    begin_xml(f, xdmf->n_bodies, 1, "Int", 4);
+    for (int64_t i = 0; i < xdmf->n_bodies; i++)
+        fprintf(f, "%s%" PRId64, i ? " " : "", ids ? xdmf->n_floes + i : i == xdmf->towed);
     fputs("</DataItem>", f);
     end_attribute(f);
 }
 
-static void bodies(FILE *f, const bt_xdmf *x, int64_t frame)
+static void bodies(FILE *f, const bt_xdmf *xdmf, int64_t frame)
 {
-    if (x->n_bodies == 0) return;
-    begin_block(f, "bodies", "body", "/xdmf/bodies", x->n_bodies, x->body_vertices, frame);
-    attribute(f, x->n_bodies, "height", "Float", 8, "/bodies/height");
-    in_xml(f, x, "id", true);
-    in_xml(f, x, "towed", false);
+    if (xdmf->n_bodies == 0) return;
+    begin_block(f, "bodies", "body", "/xdmf/bodies", xdmf->n_bodies, xdmf->body_vertices, frame);
+    attribute(f, xdmf->n_bodies, "height", "Float", 8, "/bodies/height");
+    in_xml(f, xdmf, "id", true);
+    in_xml(f, xdmf, "towed", false);
     fputs("        </Grid>\n", f);
 }
 
 /// The branches of the tow line, each of two points.
-static void line(FILE *f, const bt_xdmf *x, int64_t frame)
+static void line(FILE *f, const bt_xdmf *xdmf, int64_t frame)
 {
-    const int k = x->branches;
+    const int k = xdmf->branches;
     if (k == 0) return;
-    const bt_frame_line *l = &x->line[frame];
+    const bt_frame_line *line = &xdmf->line[frame];
     fprintf(f,
             "        <Grid Name=\"line\" GridType=\"Uniform\">\n"
             "          <Topology TopologyType=\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"%d\">\n"
@@ -186,46 +186,46 @@ static void line(FILE *f, const bt_xdmf *x, int64_t frame)
     begin_xml(f, 2 * (int64_t)k, 2, "Float", 8);
     for (int i = 0; i < 2 * k; i++) {
         double drawn[2];
-        bt_map_axes_point(&x->axes, l->point[i / 2][i % 2][0], l->point[i / 2][i % 2][1], drawn);
+        bt_map_axes_point(&xdmf->axes, line->point[i / 2][i % 2][0], line->point[i / 2][i % 2][1], drawn);
         fprintf(f, "%s%.9g %.9g", i ? " " : "", drawn[0], drawn[1]);
     }
     fputs("</DataItem>\n          </Geometry>\n", f);
     begin_attribute(f, "tension", "Scalar");
     begin_xml(f, k, 1, "Float", 8);
-    for (int i = 0; i < k; i++) fprintf(f, "%s%.9g", i ? " " : "", l->tension[i]);
+    for (int i = 0; i < k; i++) fprintf(f, "%s%.9g", i ? " " : "", line->tension[i]);
     fputs("</DataItem>", f);
     end_attribute(f);
     fputs("        </Grid>\n", f);
 }
 
 /// What the coordinates are, for a reader of the file: ParaView passes over it.
-static void information(FILE *f, const bt_map_axes *a)
+static void information(FILE *f, const bt_map_axes *axes)
 {
     fprintf(f,
             "      <Information Name=\"axes\" Value=\"%s\"/>\n"
             "      <Information Name=\"origin\" Value=\"x = %.17g m, y = %.17g m\"/>\n",
-            bt_map_axes_names(a), a->origin[0], a->origin[1]);
-    if (*a->crs)
+            bt_map_axes_names(axes), axes->origin[0], axes->origin[1]);
+    if (*axes->crs)
         fprintf(f,
                 "      <Information Name=\"crs\" Value=\"%s\"/>\n"
                 "      <Information Name=\"origin in crs\" Value=\"%.17g m, %.17g m\"/>\n",
-                a->crs, a->crs_place[0], a->crs_place[1]);
+                axes->crs, axes->crs_place[0], axes->crs_place[1]);
 }
 
-char *bt_xdmf_text(const bt_xdmf *x)
+char *bt_xdmf_text(const bt_xdmf *xdmf)
 {
     bt_text text;
     bt_text_begin(&text);
     FILE *f = text.out;
     fputs(BT_XDMF_HEAD, f);
-    information(f, &x->axes);
-    for (int64_t i = 0; i < x->n_frames; i++) {
+    information(f, &xdmf->axes);
+    for (int64_t i = 0; i < xdmf->n_frames; i++) {
         fprintf(f, "      <Grid Name=\"frame %" PRId64 "\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
-                   "        <Time Value=\"%.17g\"/>\n", i, x->time[i]);
-        floes(f, x, i);
-        pieces(f, x, i);
-        bodies(f, x, i);
-        line(f, x, i);
+                   "        <Time Value=\"%.17g\"/>\n", i, xdmf->time[i]);
+        floes(f, xdmf, i);
+        pieces(f, xdmf, i);
+        bodies(f, xdmf, i);
+        line(f, xdmf, i);
         fputs("      </Grid>\n", f);
     }
     fputs("    </Grid>\n  </Domain>\n</Xdmf>\n", f);

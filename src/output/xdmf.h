@@ -20,27 +20,27 @@ typedef struct bt_map_axes {
     double crs_place[2]; ///< first and second coordinate of the origin there, m
 } bt_map_axes;
 
-/// Of a case and the map of its field; o: NULL without one.
-bt_map_axes bt_map_axes_of(const bt_case *c, const bt_outline_counts *o);
+/// Of a case and the map of its field; counts: NULL without one.
+bt_map_axes bt_map_axes_of(const bt_case *input, const bt_outline_counts *counts);
 
 /// Of the two axes, for a reader of the file.
-static inline const char *bt_map_axes_names(const bt_map_axes *a)
+static inline const char *bt_map_axes_names(const bt_map_axes *axes)
 {
-    return a->swapped ? "east (y), north (x)" : "x, y";
+    return axes->swapped ? "east (y), north (x)" : "x, y";
 }
 
 /// x, y of the case as drawn, m.
-static inline void bt_map_axes_point(const bt_map_axes *a, double x, double y, double drawn[2])
+static inline void bt_map_axes_point(const bt_map_axes *axes, double x, double y, double drawn[2])
 {
-    drawn[a->swapped] = x - a->origin[0];
-    drawn[!a->swapped] = y - a->origin[1];
+    drawn[axes->swapped] = x - axes->origin[0];
+    drawn[!axes->swapped] = y - axes->origin[1];
 }
 
 /// Components of a vector as drawn.
-static inline void bt_map_axes_vector(const bt_map_axes *a, double vx, double vy, double drawn[2])
+static inline void bt_map_axes_vector(const bt_map_axes *axes, double vx, double vy, double drawn[2])
 {
-    drawn[a->swapped] = vx;
-    drawn[!a->swapped] = vy;
+    drawn[axes->swapped] = vx;
+    drawn[!axes->swapped] = vy;
 }
 
 /// Pieces of floes in a frame.
@@ -69,6 +69,6 @@ typedef struct bt_xdmf {
     "    <Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n"
 
 /// frames.xdmf as text; the caller frees it.
-char *bt_xdmf_text(const bt_xdmf *x);
+char *bt_xdmf_text(const bt_xdmf *xdmf);
 
 #endif

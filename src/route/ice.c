@@ -121,9 +121,9 @@ static void average(const double *sums, const double *known, int nx, int ny, int
     free(total[1]);
 }
 
-static double weight_of(int field, const bt_route_task *t, int64_t floe)
+static double weight_of(int field, const bt_route_task *task, int64_t floe)
 {
-    const double h = t->thickness[floe], mass = t->density * h;
+    const double h = task->thickness[floe], mass = task->density * h;
     switch (field) {
     case BT_ICE_COVER: return 1;
     case BT_ICE_MASS:
@@ -134,7 +134,7 @@ static double weight_of(int field, const bt_route_task *t, int64_t floe)
 
 /// Adds to sums [ny][nx + 2], kg/m, what a floe adds to BT_ICE_FLOES: n points v [n][2] in cells, of `mass` kg/m²; w:
 /// width of the berg in cells.
-static void add_floe(const bt_route_ice *r, double w, double mass, int64_t n, const double *v, double *sums)
+static void add_floe(const bt_route_ice *ice, double w, double mass, int64_t n, const double *v, double *sums)
 {
     double area = 0, mx = 0, my = 0, xx = 0, xy = 0, yy = 0; // about the first point
     for (int64_t e = 0; e < n; e++) {
@@ -149,103 +149,105 @@ static void add_floe(const bt_route_ice *r, double w, double mass, int64_t n, co
     const double half = (xx - yy) / 2, root = bt_hypot(half, xy), angle = 0.5 * bt_atan2(xy, half);
     const double a = 2 * sqrt(bt_max(0, (xx + yy) / 2 + root)), b = 2 * sqrt(bt_max(0, (xx + yy) / 2 - root));
     const double wide = a + w / 2, high = b + w / 2, share = sqrt(a * b / (wide * high));
-    const double most = mass * fabs(area) * share * 2 / (BT_PI * sqrt(wide * high)) * r->cell;
+    const double most = mass * fabs(area) * share * 2 / (BT_PI * sqrt(wide * high)) * ice->cell;
     double sine, cosine;
     bt_sincos(angle, &sine, &cosine);
     mx += v[0], my += v[1];
-    const int i0 = (int)bt_max(0, mx - wide), i1 = (int)bt_min(r->nx, mx + wide + 1);
-    const int j0 = (int)bt_max(0, my - wide), j1 = (int)bt_min(r->ny, my + wide + 1);
+    const int i0 = (int)bt_max(0, mx - wide), i1 = (int)bt_min(ice->nx, mx + wide + 1);
+    const int j0 = (int)bt_max(0, my - wide), j1 = (int)bt_min(ice->ny, my + wide + 1);
     for (int j = j0; j < j1; j++)
         for (int i = i0; i < i1; i++) {
             const double x = i + 0.5 - mx, y = j + 0.5 - my;
             const double along = (x * cosine + y * sine) / wide, across = (y * cosine - x * sine) / high;
             const double inside = 1 - along * along - across * across;
-            if (inside > 0) sums[(int64_t)j * (r->nx + 2) + i] += most * sqrt(inside);
+            if (inside > 0) sums[(int64_t)j * (ice->nx + 2) + i] += most * sqrt(inside);
         }
 }
 
-static void into_cells(const bt_route_ice *r, int64_t n, const double *v, double *out)
+static void into_cells(const bt_route_ice *ice, int64_t n, const double *v, double *out)
 {
-    for (int64_t k = 0; k < n; k++) bt_route_ice_place(r, v[2 * k], v[2 * k + 1], out + 2 * k);
+    for (int64_t k = 0; k < n; k++) bt_route_ice_place(ice, v[2 * k], v[2 * k + 1], out + 2 * k);
 }
 
 /// Mean diameter of the floes by area, m.
-static double mean_size(const bt_route_task *t)
+static double mean_size(const bt_route_task *task)
 {
     double area = 0, sum = 0;
-    for (int64_t i = 0; i < t->n_floes; i++) {
-        const int64_t first = t->floe_first[i], n = t->floe_first[i + 1] - first;
-        const double a = 0.5 * fabs(bt_outline_area2((int)n, t->floe + 2 * first));
+    for (int64_t i = 0; i < task->n_floes; i++) {
+        const int64_t first = task->floe_first[i], n = task->floe_first[i + 1] - first;
+        const double a = 0.5 * fabs(bt_outline_area2((int)n, task->floe + 2 * first));
         area += a, sum += a * sqrt(4 * a / BT_PI);
     }
     return area > 0 ? sum / area : 0;
 }
 
-void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t)
+void bt_route_ice_make(bt_route_ice *ice, const bt_route_task *task)
 {
-    const int nx = r->nx, ny = r->ny, half = (int)((t->width + mean_size(t)) / r->cell + 0.5);
+    const int nx = ice->nx, ny = ice->ny, half = (int)((task->width + mean_size(task)) / ice->cell + 0.5);
     const size_t cells = (size_t)nx * (size_t)ny, padded = (size_t)(nx + 2) * (size_t)ny;
     double *sums = bt_alloc(padded, sizeof *sums), *known = bt_alloc(padded, sizeof *known), *v = NULL;
-    const double *e = t->extent, corners[8] = {e[0], e[1], e[2], e[1], e[2], e[3], e[0], e[3]};
+    const double *e = task->extent, corners[8] = {e[0], e[1], e[2], e[1], e[2], e[3], e[0], e[3]};
     double in_cells[8];
-    into_cells(r, 4, corners, in_cells);
+    into_cells(ice, 4, corners, in_cells);
     bt_route_ice_add(known, nx, ny, 4, in_cells, 1);
     bt_route_ice_sum(known, nx, ny);
     for (int f = 0; f < BT_ICE_FIELDS; f++) {
         for (size_t k = 0; k < padded; k++) sums[k] = 0;
-        for (int64_t i = 0; i < t->n_floes; i++) {
-            const int64_t first = t->floe_first[i], n = t->floe_first[i + 1] - first;
+        for (int64_t i = 0; i < task->n_floes; i++) {
+            const int64_t first = task->floe_first[i], n = task->floe_first[i + 1] - first;
             v = bt_realloc(v, (size_t)n, 2 * sizeof *v);
-            into_cells(r, n, t->floe + 2 * first, v);
-            if (f == BT_ICE_FLOES) add_floe(r, t->width / r->cell, weight_of(f, t, i), n, v, sums);
-            else bt_route_ice_add(sums, nx, ny, n, v, weight_of(f, t, i));
+            into_cells(ice, n, task->floe + 2 * first, v);
+            if (f == BT_ICE_FLOES) add_floe(ice, task->width / ice->cell, weight_of(f, task, i), n, v, sums);
+            else bt_route_ice_add(sums, nx, ny, n, v, weight_of(f, task, i));
         }
         if (f != BT_ICE_FLOES) bt_route_ice_sum(sums, nx, ny);
-        r->field[f] = bt_alloc(cells, sizeof(float));
-        r->mean[f] = bt_alloc(cells, sizeof(float));
+        ice->field[f] = bt_alloc(cells, sizeof(float));
+        ice->mean[f] = bt_alloc(cells, sizeof(float));
         for (int j = 0; j < ny; j++)
             for (int i = 0; i < nx; i++) { // rounding leaves 1e-13 where there is none
                 const double x = sums[(int64_t)j * (nx + 2) + i];
-                r->field[f][(int64_t)j * nx + i] = x > 1e-9 ? (float)x : 0;
+                ice->field[f][(int64_t)j * nx + i] = x > 1e-9 ? (float)x : 0;
             }
-        average(sums, known, nx, ny, half, r->mean[f]);
+        average(sums, known, nx, ny, half, ice->mean[f]);
     }
     free(v);
     free(sums);
     free(known);
-    r->n_speeds = t->n_speeds;
-    r->load = bt_alloc(cells * (size_t)t->n_speeds, sizeof(float));
-    r->line = bt_alloc(cells * (size_t)t->n_speeds, sizeof(float));
+    ice->n_speeds = task->n_speeds;
+    ice->load = bt_alloc(cells * (size_t)task->n_speeds, sizeof(float));
+    ice->line = bt_alloc(cells * (size_t)task->n_speeds, sizeof(float));
     for (size_t k = 0; k < cells; k++)
-        for (int s = 0; s < t->n_speeds; s++) {
+        for (int s = 0; s < task->n_speeds; s++) {
             double term[BT_ROUTE_TERMS], sum = 0;
-            bt_route_ice_terms(r, t, (int64_t)k, t->speed[s], term);
-            for (int a = 1; a < BT_ROUTE_TERMS; a++) sum += a == BT_ROUTE_LARGE ? 0 : t->weight[a] * term[a];
-            r->load[k * (size_t)t->n_speeds + (size_t)s] = (float)sum;
-            r->line[k * (size_t)t->n_speeds + (size_t)s] = (float)(t->weight[BT_ROUTE_LARGE] * term[BT_ROUTE_LARGE]);
+            bt_route_ice_terms(ice, task, (int64_t)k, task->speed[s], term);
+            for (int a = 1; a < BT_ROUTE_TERMS; a++) sum += a == BT_ROUTE_LARGE ? 0 : task->weight[a] * term[a];
+            ice->load[k * (size_t)task->n_speeds + (size_t)s] = (float)sum;
+            ice->line[k * (size_t)task->n_speeds + (size_t)s] =
+                (float)(task->weight[BT_ROUTE_LARGE] * term[BT_ROUTE_LARGE]);
         }
 }
 
-void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v, double term[BT_ROUTE_TERMS])
+void bt_route_ice_terms(const bt_route_ice *ice, const bt_route_task *task, int64_t k, double v,
+                        double term[BT_ROUTE_TERMS])
 {
     for (int a = 0; a < BT_ROUTE_TERMS; a++) term[a] = 0;
-    const double unit = (1 + t->added_mass) * v * v, cover = r->mean[BT_ICE_COVER][k];
-    const double near = unit * (r->mean[BT_ICE_MASS][k] + r->mean[BT_ICE_FLOES][k] / t->width);
-    const double packed = cover < t->jam_cover ? bt_min(MOST_COMPACTION, 1 / (1 - cover / t->jam_cover))
-                                               : MOST_COMPACTION;
-    double most = isfinite(t->rafting) && cover > 0 ? t->rafting * r->mean[BT_ICE_RAFT][k] / cover : INFINITY;
-    most -= term[1] = bt_min(unit * r->field[BT_ICE_MASS][k], most);
+    const double unit = (1 + task->added_mass) * v * v, cover = ice->mean[BT_ICE_COVER][k];
+    const double near = unit * (ice->mean[BT_ICE_MASS][k] + ice->mean[BT_ICE_FLOES][k] / task->width);
+    const double packed = cover < task->jam_cover ? bt_min(MOST_COMPACTION, 1 / (1 - cover / task->jam_cover))
+                                                  : MOST_COMPACTION;
+    double most = isfinite(task->rafting) && cover > 0 ? task->rafting * ice->mean[BT_ICE_RAFT][k] / cover : INFINITY;
+    most -= term[1] = bt_min(unit * ice->field[BT_ICE_MASS][k], most);
     most -= term[2] = bt_min(near * (packed - 1), most);
-    term[BT_ROUTE_LARGE] = bt_min(unit * r->field[BT_ICE_FLOES][k], t->width * most);
-    if (isfinite(t->rafting)) term[4] = t->rafting * r->field[BT_ICE_RAFT][k];
+    term[BT_ROUTE_LARGE] = bt_min(unit * ice->field[BT_ICE_FLOES][k], task->width * most);
+    if (isfinite(task->rafting)) term[4] = task->rafting * ice->field[BT_ICE_RAFT][k];
 }
 
-void bt_route_ice_free(bt_route_ice *r)
+void bt_route_ice_free(bt_route_ice *ice)
 {
     for (int f = 0; f < BT_ICE_FIELDS; f++) {
-        free(r->field[f]);
-        free(r->mean[f]);
+        free(ice->field[f]);
+        free(ice->mean[f]);
     }
-    free(r->load);
-    free(r->line);
+    free(ice->load);
+    free(ice->line);
 }

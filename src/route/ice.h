@@ -21,20 +21,20 @@ typedef struct bt_route_ice {
 } bt_route_ice;
 
 /// A place of the task in cells of the raster.
-static inline void bt_route_ice_place(const bt_route_ice *r, double x, double y, double at[2])
+static inline void bt_route_ice_place(const bt_route_ice *ice, double x, double y, double at[2])
 {
-    const double dx = x - r->ox, dy = y - r->oy;
-    at[0] = (dx * r->ax + dy * r->ay - r->x0) / r->cell;
-    at[1] = (dy * r->ax - dx * r->ay - r->y0) / r->cell;
+    const double dx = x - ice->ox, dy = y - ice->oy;
+    at[0] = (dx * ice->ax + dy * ice->ay - ice->x0) / ice->cell;
+    at[1] = (dy * ice->ax - dx * ice->ay - ice->y0) / ice->cell;
 }
 
 /// Rasters of a task in the frame at (ox, oy) with the x axis (ax, ay), of nx × ny cells from (x0, y0) on.
-void bt_route_ice_make(bt_route_ice *r, const bt_route_task *t);
-void bt_route_ice_free(bt_route_ice *r);
+void bt_route_ice_make(bt_route_ice *ice, const bt_route_task *task);
+void bt_route_ice_free(bt_route_ice *ice);
 
 /// Terms of the force at cell k and speed v, unweighted, each per metre of width but that of large floes, which is of
 /// the berg with its centre there; water stays 0.
-void bt_route_ice_terms(const bt_route_ice *r, const bt_route_task *t, int64_t k, double v,
+void bt_route_ice_terms(const bt_route_ice *ice, const bt_route_task *task, int64_t k, double v,
                         double term[BT_ROUTE_TERMS]);
 
 /// Adds weight × area of a polygon of n points [n][2], in cells, to sums [ny][nx + 2], which bt_route_ice_sum ends.

@@ -18,18 +18,18 @@ typedef struct bt_lattice_way {
     int *node_leg;      ///< [n_nodes] legs up to it
 } bt_lattice_way;
 
-/// A lattice of places `spacing` m apart over the extent of p->task, through its start, with the x axis along (ax, ay);
-/// and p->ice, in its frame, with cells of `cell` m, of which the spacing is a multiple.
-bt_lattice *bt_lattice_make(bt_planner *p, double ax, double ay, double spacing, double cell);
-void bt_lattice_free(bt_lattice *l);
+/// A lattice of places `spacing` m apart over the extent of planner->task, through its start, with the x axis along
+/// (ax, ay); and planner->ice, in its frame, with cells of `cell` m, of which the spacing is a multiple.
+bt_lattice *bt_lattice_make(bt_planner *planner, double ax, double ay, double spacing, double cell);
+void bt_lattice_free(bt_lattice *lattice);
 /// m
-double bt_lattice_spacing(const bt_lattice *l);
+double bt_lattice_spacing(const bt_lattice *lattice);
 
 /// The cheapest way from the start to a node within 0.75 of the spacing from the goal (both ends of a line of points,
 /// or twice the same), under a limit of the mean force; for BT_ROUTE_PEAK that of the least largest force, which comes
 /// back in *peak, N. False when there is none.
-bool bt_lattice_search(bt_lattice *l, const double goal[4], int objective, double limit, double *peak,
-                       bt_lattice_way *f);
-void bt_lattice_way_free(bt_lattice_way *f);
+bool bt_lattice_search(bt_lattice *lattice, const double goal[4], int objective, double limit, double *peak,
+                       bt_lattice_way *way);
+void bt_lattice_way_free(bt_lattice_way *way);
 
 #endif

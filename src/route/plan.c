@@ -18,26 +18,28 @@ enum { TRIES = 4, ARRIVALS = 40 };
 // --- routes ----------------------------------------------------------------------------------------------------------
 
 /// A route of legs, and the way-points that make them.
-static void keep(const bt_planner *p, bt_route *r, int n, const bt_leg *leg, int64_t n_corners, double (*corner)[2])
+static void keep(const bt_planner *planner, bt_route *route, int n, const bt_leg *leg, int64_t n_corners,
+                 double (*corner)[2])
 {
-    const int64_t cap = bt_swath_stretches(p, n, leg);
-    *r = (bt_route){.n_corners = n_corners, .radius = p->task.radius};
-    r->stretch = bt_alloc((size_t)cap + 1, sizeof *r->stretch);
-    r->corner = bt_alloc((size_t)n_corners + 1, sizeof *r->corner);
-    memcpy(r->corner, corner, (size_t)n_corners * sizeof *corner);
-    const bt_path_cost c = bt_swath_cost(p, n, leg, r->stretch);
-    r->n_stretches = cap;
-    r->length = c.length, r->duration = c.time, r->work = c.work, r->peak = c.peak, r->cost = c.plain;
-    r->force = c.length > 0 ? c.work / c.length : 0;
-    r->faults = c.faults;
-    bt_swath_report(p, r);
+    const int64_t cap = bt_swath_stretches(planner, n, leg);
+    *route = (bt_route){.n_corners = n_corners, .radius = planner->task.radius};
+    route->stretch = bt_alloc((size_t)cap + 1, sizeof *route->stretch);
+    route->corner = bt_alloc((size_t)n_corners + 1, sizeof *route->corner);
+    memcpy(route->corner, corner, (size_t)n_corners * sizeof *corner);
+    const bt_path_cost cost = bt_swath_cost(planner, n, leg, route->stretch);
+    route->n_stretches = cap;
+    route->length = cost.length, route->duration = cost.time, route->work = cost.work, route->peak = cost.peak,
+    route->cost = cost.plain;
+    route->force = cost.length > 0 ? cost.work / cost.length : 0;
+    route->faults = cost.faults;
+    bt_swath_report(planner, route);
 }
 
-static void keep_way(const bt_planner *p, bt_route *r, const bt_way *w)
+static void keep_way(const bt_planner *planner, bt_route *route, const bt_way *way)
 {
     bt_path path;
-    if (!bt_way_path(p, w, &path)) return; // not those that the planner makes
-    keep(p, r, path.n - 1, path.leg, w->n, w->point);
+    if (!bt_way_path(planner, way, &path)) return; // not those that the planner makes
+    keep(planner, route, path.n - 1, path.leg, way->n, way->point);
     bt_path_free(&path);
 }
 
@@ -70,10 +72,10 @@ static double apart(const bt_route *a, const bt_route *b)
     for (int64_t i = 0; i < a->n_stretches; i++) {
         double least = INFINITY;
         for (int64_t j = 0; j < b->n_stretches; j++) {
-            const bt_route_stretch *s = &b->stretch[j];
-            const double x = a->stretch[i].x - s->x, y = a->stretch[i].y - s->y;
-            const double f = bt_min(s->length, bt_max(0, x * s->tx + y * s->ty));
-            least = bt_min(least, bt_hypot(x - f * s->tx, y - f * s->ty));
+            const bt_route_stretch *stretch = &b->stretch[j];
+            const double x = a->stretch[i].x - stretch->x, y = a->stretch[i].y - stretch->y;
+            const double f = bt_min(stretch->length, bt_max(0, x * stretch->tx + y * stretch->ty));
+            least = bt_min(least, bt_hypot(x - f * stretch->tx, y - f * stretch->ty));
         }
         sum += least;
     }
@@ -81,22 +83,23 @@ static double apart(const bt_route *a, const bt_route *b)
 }
 
 /// Marks the cells within W of a route.
-static void repel(bt_planner *p, const bt_route *r)
+static void repel(bt_planner *planner, const bt_route *route)
 {
-    const bt_route_ice *g = &p->ice;
-    const double w = p->task.width / g->cell;
-    if (!p->near) p->near = bt_alloc((size_t)g->nx * (size_t)g->ny, 1);
-    for (int64_t k = 0; k < r->n_stretches; k++) {
-        const bt_route_stretch *s = &r->stretch[k];
-        const bt_leg leg = {.x = s->x, .y = s->y, .tx = s->tx, .ty = s->ty, .length = s->length, .turn = s->turn};
+    const bt_route_ice *ice = &planner->ice;
+    const double w = planner->task.width / ice->cell;
+    if (!planner->near) planner->near = bt_alloc((size_t)ice->nx * (size_t)ice->ny, 1);
+    for (int64_t k = 0; k < route->n_stretches; k++) {
+        const bt_route_stretch *stretch = &route->stretch[k];
+        const bt_leg leg = {.x = stretch->x, .y = stretch->y, .tx = stretch->tx, .ty = stretch->ty,
+                            .length = stretch->length, .turn = stretch->turn};
         for (int part = 0; part < 8; part++) {
             double at[2], t[2], c[2];
-            bt_leg_at(&leg, (part + 0.5) / 8 * s->length, at, t);
-            bt_route_ice_place(g, at[0], at[1], c);
-            for (int j = (int)bt_max(0, c[1] - w); j < g->ny && j <= c[1] + w; j++)
-                for (int i = (int)bt_max(0, c[0] - w); i < g->nx && i <= c[0] + w; i++) {
+            bt_leg_at(&leg, (part + 0.5) / 8 * stretch->length, at, t);
+            bt_route_ice_place(ice, at[0], at[1], c);
+            for (int j = (int)bt_max(0, c[1] - w); j < ice->ny && j <= c[1] + w; j++)
+                for (int i = (int)bt_max(0, c[0] - w); i < ice->nx && i <= c[0] + w; i++) {
                     const double x = i + 0.5 - c[0], y = j + 0.5 - c[1];
-                    if (x * x + y * y <= w * w) p->near[(int64_t)j * g->nx + i] = 1;
+                    if (x * x + y * y <= w * w) planner->near[(int64_t)j * ice->nx + i] = 1;
                 }
         }
     }
@@ -106,25 +109,25 @@ static void repel(bt_planner *p, const bt_route *r)
 
 /// Legs to a node of what was found and a Dubins path from there to the goal, with the heading that is asked for or
 /// any: the cheapest of all nodes. The goal is where it is at the time of arrival. False when none is allowed.
-static bool with_tail(const bt_planner *p, const bt_lattice_way *f, double arrival, int tries, bt_route *r)
+static bool with_tail(const bt_planner *planner, const bt_lattice_way *way, double arrival, int tries, bt_route *route)
 {
-    const bt_route_task *t = &p->task;
-    const double radius = t->radius > 0 ? t->radius : 1e-3 * t->width;
-    bt_leg *leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
-    bt_leg *best_leg = bt_alloc((size_t)f->n_legs + 3, sizeof *leg);
+    const bt_route_task *task = &planner->task;
+    const double radius = task->radius > 0 ? task->radius : 1e-3 * task->width;
+    bt_leg *leg = bt_alloc((size_t)way->n_legs + 3, sizeof *leg);
+    bt_leg *best_leg = bt_alloc((size_t)way->n_legs + 3, sizeof *leg);
     bt_path_cost best = {.faults = BT_ROUTE_TURNS, .cost = INFINITY};
     int best_n = 0;
-    const bool given = !isnan(t->goal_heading), any_start = isnan(t->start_heading);
-    for (int a = 0; a < f->n_nodes; a++)
-        for (int turn = 0; turn < (a || !any_start ? 1 : t->headings); turn++)
-            for (int k = 0; k < (given ? 1 : t->headings); k++) {
-                double from[3] = {f->node[a][0], f->node[a][1], f->node[a][2]}, part[3][2], to[3];
-                if (a == 0 && any_start) from[2] = 2 * BT_PI * turn / t->headings;
-                bt_way_goal(p, arrival, from[0], from[1], to);
-                to[2] = given ? t->goal_heading : 2 * BT_PI * k / t->headings;
+    const bool given = !isnan(task->goal_heading), any_start = isnan(task->start_heading);
+    for (int a = 0; a < way->n_nodes; a++)
+        for (int turn = 0; turn < (a || !any_start ? 1 : task->headings); turn++)
+            for (int k = 0; k < (given ? 1 : task->headings); k++) {
+                double from[3] = {way->node[a][0], way->node[a][1], way->node[a][2]}, part[3][2], to[3];
+                if (a == 0 && any_start) from[2] = 2 * BT_PI * turn / task->headings;
+                bt_way_goal(planner, arrival, from[0], from[1], to);
+                to[2] = given ? task->goal_heading : 2 * BT_PI * k / task->headings;
                 bt_route_dubins(from, to, radius, part);
-                int n = f->node_leg[a];
-                memcpy(leg, f->leg, (size_t)n * sizeof *leg);
+                int n = way->node_leg[a];
+                memcpy(leg, way->leg, (size_t)n * sizeof *leg);
                 bt_leg at = {.x = from[0], .y = from[1]};
                 bt_sincos(from[2], &at.ty, &at.tx);
                 for (int m = 0; m < 3; m++) {
@@ -135,22 +138,22 @@ static bool with_tail(const bt_planner *p, const bt_lattice_way *f, double arriv
                     bt_leg_at(&at, at.length, place, tangent);
                     at.x = place[0], at.y = place[1], at.tx = tangent[0], at.ty = tangent[1];
                 }
-                const bt_path_cost c = bt_swath_cost(p, n, leg, NULL);
-                if (!bt_swath_better(&c, &best)) continue;
-                best = c, best_n = n;
+                const bt_path_cost cost = bt_swath_cost(planner, n, leg, NULL);
+                if (!bt_swath_better(&cost, &best)) continue;
+                best = cost, best_n = n;
                 memcpy(best_leg, leg, (size_t)n * sizeof *leg);
             }
-    const double *u = t->drift;
-    if (best_n > 0 && bt_hypot(u[0], u[1]) * fabs(best.time - arrival) > 1e-6 * t->width && tries > 0) {
+    const double *u = task->drift;
+    if (best_n > 0 && bt_hypot(u[0], u[1]) * fabs(best.time - arrival) > 1e-6 * task->width && tries > 0) {
         free(leg);
         free(best_leg);
-        return with_tail(p, f, best.time, tries - 1, r);
+        return with_tail(planner, way, best.time, tries - 1, route);
     }
     const bool allowed = best_n > 0 && !(best.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
     if (allowed) {
         double(*corner)[2];
         const int64_t n_corners = corners_of(best_n, best_leg, &corner);
-        keep(p, r, best_n, best_leg, n_corners, corner);
+        keep(planner, route, best_n, best_leg, n_corners, corner);
         free(corner);
     }
     free(leg);
@@ -159,37 +162,38 @@ static bool with_tail(const bt_planner *p, const bt_lattice_way *f, double arriv
 }
 
 /// What was found, shortened; the straight line made cheaper, where that is better and direct is set.
-static bool into_route(const bt_planner *p, const bt_lattice_way *f, bool direct, bt_route *r)
+static bool into_route(const bt_planner *planner, const bt_lattice_way *way, bool direct, bt_route *route)
 {
-    const bt_route_task *t = &p->task;
-    if (!isnan(t->goal_heading)) return with_tail(p, f, bt_swath_cost(p, f->n_legs, f->leg, NULL).time, ARRIVALS, r);
+    const bt_route_task *task = &planner->task;
+    if (!isnan(task->goal_heading))
+        return with_tail(planner, way, bt_swath_cost(planner, way->n_legs, way->leg, NULL).time, ARRIVALS, route);
     bt_way w = {0}, straight = {0};
-    w.point = bt_alloc((size_t)(w.cap = f->n_points + 16), sizeof *w.point);
-    const double *last = t->start;
-    for (int k = 0; k < f->n_points; k++) { // no two on one place
-        if (!(bt_hypot(f->point[k][0] - last[0], f->point[k][1] - last[1]) > 1e-9 * t->width)) continue;
-        w.point[w.n][0] = f->point[k][0], w.point[w.n][1] = f->point[k][1];
+    w.point = bt_alloc((size_t)(w.cap = way->n_points + 16), sizeof *w.point);
+    const double *last = task->start;
+    for (int k = 0; k < way->n_points; k++) { // no two on one place
+        if (!(bt_hypot(way->point[k][0] - last[0], way->point[k][1] - last[1]) > 1e-9 * task->width)) continue;
+        w.point[w.n][0] = way->point[k][0], w.point[w.n][1] = way->point[k][1];
         last = w.point[w.n++];
     }
     if (w.n == 0) { // the search has ended where it began, less than a spacing from the goal
-        w.point[0][0] = t->start[0], w.point[0][1] = t->start[1];
+        w.point[0][0] = task->start[0], w.point[0][1] = task->start[1];
         w.n = 1;
     }
-    bt_way_price(p, &w);
-    bt_way_goal(p, w.cost.time, w.point[w.n - 1][0], w.point[w.n - 1][1], w.point[w.n - 1]);
-    bt_way_price(p, &w);
-    bt_way_shorten(p, &w);
-    if (direct && isnan(t->start_heading)) {
+    bt_way_price(planner, &w);
+    bt_way_goal(planner, w.cost.time, w.point[w.n - 1][0], w.point[w.n - 1][1], w.point[w.n - 1]);
+    bt_way_price(planner, &w);
+    bt_way_shorten(planner, &w);
+    if (direct && isnan(task->start_heading)) {
         straight.point = bt_alloc((size_t)(straight.cap = 16), sizeof *straight.point);
         straight.n = 1;
-        bt_way_goal(p, 0, t->start[0], t->start[1], straight.point[0]);
-        bt_way_price(p, &straight);
-        bt_way_shorten(p, &straight);
+        bt_way_goal(planner, 0, task->start[0], task->start[1], straight.point[0]);
+        bt_way_price(planner, &straight);
+        bt_way_shorten(planner, &straight);
         if (bt_swath_better(&straight.cost, &w.cost)) bt_way_copy(&w, &straight);
     }
     bool allowed = !(w.cost.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
-    if (allowed) keep_way(p, r, &w);
-    else allowed = with_tail(p, f, w.cost.time, ARRIVALS, r);
+    if (allowed) keep_way(planner, route, &w);
+    else allowed = with_tail(planner, way, w.cost.time, ARRIVALS, route);
     free(w.point);
     free(straight.point);
     return allowed;
@@ -198,64 +202,66 @@ static bool into_route(const bt_planner *p, const bt_lattice_way *f, bool direct
 // --- the task --------------------------------------------------------------------------------------------------------
 
 /// The straight line as a route; false when the goal drifts away from it.
-static bool straight_line(const bt_planner *p, bt_route *r)
+static bool straight_line(const bt_planner *planner, bt_route *route)
 {
-    const bt_route_task *t = &p->task;
+    const bt_route_task *task = &planner->task;
     enum { STEPS = 200 };
-    bt_way w = {.point = bt_alloc(1, sizeof *w.point), .n = 1, .cap = 1};
-    double *end = w.point[0];
-    const double wide = t->extent[2] - t->extent[0] + t->extent[3] - t->extent[1];
-    const bool still = t->drift[0] == 0 && t->drift[1] == 0;
+    bt_way way = {.point = bt_alloc(1, sizeof *way.point), .n = 1, .cap = 1};
+    double *end = way.point[0];
+    const double wide = task->extent[2] - task->extent[0] + task->extent[3] - task->extent[1];
+    const bool still = task->drift[0] == 0 && task->drift[1] == 0;
     bool there = false;
-    bt_way_goal(p, 0, t->start[0], t->start[1], end);
+    bt_way_goal(planner, 0, task->start[0], task->start[1], end);
     for (int k = 0; k < STEPS && !there; k++) {
-        bt_way_price(p, &w);
+        bt_way_price(planner, &way);
         const double was[2] = {end[0], end[1]};
-        bt_way_goal(p, w.cost.time, t->start[0], t->start[1], end);
+        bt_way_goal(planner, way.cost.time, task->start[0], task->start[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
-        there = still || moved < 1e-9 * t->width;
-        if (bt_hypot(end[0] - t->start[0], end[1] - t->start[1]) > 10 * wide) break;
+        there = still || moved < 1e-9 * task->width;
+        if (bt_hypot(end[0] - task->start[0], end[1] - task->start[1]) > 10 * wide) break;
     }
     if (there) {
-        keep_way(p, r, &w);
-        const double x = end[0] - t->start[0], y = end[1] - t->start[1];
-        const double given[2] = {t->start_heading, t->goal_heading};
+        keep_way(planner, route, &way);
+        const double x = end[0] - task->start[0], y = end[1] - task->start[1];
+        const double given[2] = {task->start_heading, task->goal_heading};
         for (int k = 0; k < 2; k++) {
             if (isnan(given[k])) continue;
             double sine, cosine;
             bt_sincos(given[k], &sine, &cosine);
             const double angle = bt_atan2(cosine * y - sine * x, cosine * x + sine * y);
-            if (fabs(angle) > 1e-6) r->faults |= BT_ROUTE_TURNS;
+            if (fabs(angle) > 1e-6) route->faults |= BT_ROUTE_TURNS;
         }
     }
-    free(w.point);
+    free(way.point);
     return there;
 }
 
 /// Least force over the speeds on a berg in a square of W about a place, N.
-static double force_at(const bt_planner *p, const double at[2])
+static double force_at(const bt_planner *planner, const double at[2])
 {
-    const double w = p->task.width;
-    const bt_leg leg = {.x = at[0] - 0.5 * w * p->ice.ax, .y = at[1] - 0.5 * w * p->ice.ay, .tx = p->ice.ax,
-                        .ty = p->ice.ay, .length = w};
+    const double w = planner->task.width;
+    const bt_leg leg = {.x = at[0] - 0.5 * w * planner->ice.ax, .y = at[1] - 0.5 * w * planner->ice.ay,
+                        .tx = planner->ice.ax, .ty = planner->ice.ay, .length = w};
     double load[BT_ROUTE_SPEEDS] = {0}, water[BT_ROUTE_SPEEDS], least = INFINITY;
-    bt_swath_load(p, &leg, w, load);
-    for (int s = 0; s < p->task.n_speeds; s++) {
-        water[s] = bt_swath_water(p, leg.tx, leg.ty, p->task.speed[s]);
-        least = bt_min(least, bt_max(1e-3, p->task.weight[0]) * water[s] + load[s] / w);
+    bt_swath_load(planner, &leg, w, load);
+    for (int s = 0; s < planner->task.n_speeds; s++) {
+        water[s] = bt_swath_water(planner, leg.tx, leg.ty, planner->task.speed[s]);
+        least = bt_min(least, bt_max(1e-3, planner->task.weight[0]) * water[s] + load[s] / w);
     }
     return least;
 }
 
 /// What is wrong with the start (end 0) or the goal (end 1) at this time.
-static int fault_of_end(const bt_planner *p, int end, const double at[2], double time, double *force)
+static int fault_of_end(const bt_planner *planner, int end, const double at[2], double time, double *force)
 {
-    const double *u = p->task.drift, x = at[0] + u[0] * time, y = at[1] + u[1] * time, fine = 1e-9 * p->no_go.need;
-    if (bt_no_go_margin(&p->no_go, at[0], at[1]) < -fine) return BT_ROUTE_START_OUTSIDE + end;
-    if (bt_no_go_inside(&p->no_go, x, y) || bt_no_go_distance(&p->no_go, x, y) < p->no_go.need - fine)
+    const double *u = planner->task.drift, x = at[0] + u[0] * time, y = at[1] + u[1] * time,
+                 fine = 1e-9 * planner->no_go.need;
+    if (bt_no_go_margin(&planner->no_go, at[0], at[1]) < -fine) return BT_ROUTE_START_OUTSIDE + end;
+    if (bt_no_go_inside(&planner->no_go, x, y) || bt_no_go_distance(&planner->no_go, x, y) < planner->no_go.need - fine)
         return BT_ROUTE_START_NO_GO + end;
-    *force = force_at(p, at);
-    return *force * p->task.force_factor > p->task.force_limit ? BT_ROUTE_START_TOO_THICK + end : BT_ROUTE_OK;
+    *force = force_at(planner, at);
+    return *force * planner->task.force_factor > planner->task.force_limit ? BT_ROUTE_START_TOO_THICK + end
+                                                                           : BT_ROUTE_OK;
 }
 
 static int descending(const void *a, const void *b)
@@ -264,109 +270,111 @@ static int descending(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-static void begin(bt_planner *p, const bt_route_task *task)
+static void begin(bt_planner *planner, const bt_route_task *task)
 {
-    *p = (bt_planner){.task = *task, .penalty = 1};
-    qsort(p->task.speed, (size_t)task->n_speeds, sizeof *task->speed, descending);
-    for (int a = 0; a < 2; a++) p->water[a] = task->water[a] - task->drift[a];
-    bt_no_go_make(&p->no_go, &p->task);
+    *planner = (bt_planner){.task = *task, .penalty = 1};
+    qsort(planner->task.speed, (size_t)task->n_speeds, sizeof *task->speed, descending);
+    for (int a = 0; a < 2; a++) planner->water[a] = task->water[a] - task->drift[a];
+    bt_no_go_make(&planner->no_go, &planner->task);
 }
 
-static void end(bt_planner *p)
+static void end(bt_planner *planner)
 {
-    bt_no_go_free(&p->no_go);
-    bt_route_ice_free(&p->ice);
-    free(p->near);
-    free(p->kept);
+    bt_no_go_free(&planner->no_go);
+    bt_route_ice_free(&planner->ice);
+    free(planner->near);
+    free(planner->kept);
 }
 
 /// The frame: along the heading at the start where that is given, or else towards the goal, of which a point is on the
 /// lattice; and spacing and cells.
-static bt_lattice *lattice_of(bt_planner *p)
+static bt_lattice *lattice_of(bt_planner *planner)
 {
-    const bt_route_task *t = &p->task;
-    const double area = (t->extent[2] - t->extent[0]) * (t->extent[3] - t->extent[1]);
-    double goal[2], ax = 1, ay = 0, h = t->spacing, cell = t->cell;
+    const bt_route_task *task = &planner->task;
+    const double area = (task->extent[2] - task->extent[0]) * (task->extent[3] - task->extent[1]);
+    double goal[2], ax = 1, ay = 0, h = task->spacing, cell = task->cell;
     double x = 0, y = 0, far = 0;
     for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice when the fastest speed has led there
-        bt_way_goal(p, far / t->speed[0], t->start[0], t->start[1], goal);
-        x = goal[0] - t->start[0], y = goal[1] - t->start[1], far = bt_hypot(x, y);
+        bt_way_goal(planner, far / task->speed[0], task->start[0], task->start[1], goal);
+        x = goal[0] - task->start[0], y = goal[1] - task->start[1], far = bt_hypot(x, y);
     }
-    if (!isnan(t->start_heading)) bt_sincos(t->start_heading, &ay, &ax);
+    if (!isnan(task->start_heading)) bt_sincos(task->start_heading, &ay, &ax);
     else if (far > 0) ax = x / far, ay = y / far;
-    if (!(h > 0)) h = bt_max(t->width / 4, sqrt(area * t->headings / MOST_STATES));
+    if (!(h > 0)) h = bt_max(task->width / 4, sqrt(area * task->headings / MOST_STATES));
     if (far > h) h = far / ceil(far / h - 1e-9);
-    if (!(cell > 0)) cell = bt_max(t->width / 8, sqrt(area * t->n_speeds / MOST_CELLS));
-    return bt_lattice_make(p, ax, ay, h, h / ceil(h / cell - 1e-9));
+    if (!(cell > 0)) cell = bt_max(task->width / 8, sqrt(area * task->n_speeds / MOST_CELLS));
+    return bt_lattice_make(planner, ax, ay, h, h / ceil(h / cell - 1e-9));
 }
 
 void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
 {
-    bt_planner p;
-    begin(&p, task);
+    bt_planner planner;
+    begin(&planner, task);
     *plan = (bt_route_plan){.n = 1};
-    bt_lattice *l = lattice_of(&p);
-    const bt_route_task *t = &p.task;
-    plan->cell = p.ice.cell;
-    plan->spacing = bt_lattice_spacing(l);
-    plan->status = fault_of_end(&p, 0, t->start, 0, &plan->force);
+    bt_lattice *lattice = lattice_of(&planner);
+    const bt_route_task *t = &planner.task;
+    plan->cell = planner.ice.cell;
+    plan->spacing = bt_lattice_spacing(lattice);
+    plan->status = fault_of_end(&planner, 0, t->start, 0, &plan->force);
     double there[2];
-    bt_way_goal(&p, 0, t->start[0], t->start[1], there);
+    bt_way_goal(&planner, 0, t->start[0], t->start[1], there);
     const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
-    if (at_goal || !straight_line(&p, &plan->route[0])) {
+    if (at_goal || !straight_line(&planner, &plan->route[0])) {
         plan->n = 0;
         if (!plan->status) plan->status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
     }
     const bt_route *straight = &plan->route[0];
     double goal[4] = {0};
     for (int a = 0; a < 4; a++) goal[a] = t->goal[t->goal_is_line ? a : a % 2] - t->drift[a % 2] * straight->duration;
-    if (!plan->status && !t->goal_is_line) plan->status = fault_of_end(&p, 1, goal, straight->duration, &plan->force);
+    if (!plan->status && !t->goal_is_line)
+        plan->status = fault_of_end(&planner, 1, goal, straight->duration, &plan->force);
     bool last = plan->status != BT_ROUTE_OK;
     int found_any = 0;
     for (int wanted = 0; plan->n < 1 + t->routes && !last; wanted++) {
         bool kept = false;
-        p.penalty = wanted ? REPELS : 1;
-        bt_swath_keep(&p);
-        for (int k = 0; k < TRIES && !kept && !last; k++, p.penalty *= p.penalty) {
-            bt_lattice_way f = {0};
+        planner.penalty = wanted ? REPELS : 1;
+        bt_swath_keep(&planner);
+        for (int k = 0; k < TRIES && !kept && !last; k++, planner.penalty *= planner.penalty) {
+            bt_lattice_way way = {0};
             double limit = t->force_limit, peak = 0;
             bool got = true;
             if (t->objective == BT_ROUTE_PEAK) {
-                got = bt_lattice_search(l, goal, BT_ROUTE_PEAK, limit, &peak, &f);
-                bt_lattice_way_free(&f);
+                got = bt_lattice_search(lattice, goal, BT_ROUTE_PEAK, limit, &peak, &way);
+                bt_lattice_way_free(&way);
                 limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
             }
             const int objective = t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective;
-            got = got && bt_lattice_search(l, goal, objective, limit, NULL, &f);
+            got = got && bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
             if (!got && !isnan(t->goal_heading)) { // a node of that heading may lie where no move ends: the tail turns
                 const double heading = t->goal_heading;
-                p.task.goal_heading = NAN;
-                got = bt_lattice_search(l, goal, objective, limit, NULL, &f);
-                p.task.goal_heading = heading;
+                planner.task.goal_heading = NAN;
+                got = bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
+                planner.task.goal_heading = heading;
             }
-            bt_route *r = &plan->route[plan->n];
-            if (!got || !into_route(&p, &f, wanted == 0, r)) {
+            bt_route *route = &plan->route[plan->n];
+            if (!got || !into_route(&planner, &way, wanted == 0, route)) {
                 last = true;
-                if (got) bt_lattice_way_free(&f);
+                if (got) bt_lattice_way_free(&way);
                 break;
             }
-            bt_lattice_way_free(&f);
+            bt_lattice_way_free(&way);
             found_any++;
-            kept = wanted == 0 ? apart(r, straight) > 1e-3 * t->width || fabs(r->cost - straight->cost) > 1e-6 * r->cost
+            kept = wanted == 0 ? apart(route, straight) > 1e-3 * t->width ||
+                   fabs(route->cost - straight->cost) > 1e-6 * route->cost
                                : true;
-            for (int a = 0; wanted > 0 && a < plan->n; a++) kept = kept && apart(r, &plan->route[a]) > t->width;
+            for (int a = 0; wanted > 0 && a < plan->n; a++) kept = kept && apart(route, &plan->route[a]) > t->width;
             if (kept) plan->n++;
             else {
-                free(r->corner);
-                free(r->stretch);
-                *r = (bt_route){0};
+                free(route->corner);
+                free(route->stretch);
+                *route = (bt_route){0};
             }
             if (wanted == 0) {
-                repel(&p, straight);
+                repel(&planner, straight);
                 break;
             }
         }
-        if (kept) repel(&p, &plan->route[plan->n - 1]);
+        if (kept) repel(&planner, &plan->route[plan->n - 1]);
         else last = last || wanted > 0;
     }
     if (!plan->status && !found_any) plan->status = BT_ROUTE_NONE;
@@ -376,21 +384,21 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
             const bt_route swap = plan->route[b];
             plan->route[b] = plan->route[b - 1], plan->route[b - 1] = swap;
         }
-    plan->states = p.states;
-    bt_lattice_free(l);
-    end(&p);
+    plan->states = planner.states;
+    bt_lattice_free(lattice);
+    end(&planner);
 }
 
 void bt_route_straight(const bt_route_task *task, bt_route_plan *plan)
 {
-    bt_planner p;
-    begin(&p, task);
+    bt_planner planner;
+    begin(&planner, task);
     *plan = (bt_route_plan){.n = 1};
-    bt_lattice *l = lattice_of(&p);
-    plan->cell = p.ice.cell;
-    if (!straight_line(&p, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
-    bt_lattice_free(l);
-    end(&p);
+    bt_lattice *lattice = lattice_of(&planner);
+    plan->cell = planner.ice.cell;
+    if (!straight_line(&planner, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
+    bt_lattice_free(lattice);
+    end(&planner);
 }
 
 void bt_route_cover(const bt_route_task *task, int64_t nx, int64_t ny, double *cover)

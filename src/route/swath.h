@@ -37,27 +37,27 @@ typedef struct bt_path_cost {
 
 /// Water drag against the tow along (tx, ty) at speed v, N. Not below a thousandth of that in still water: a current
 /// from behind does not make a way free.
-double bt_swath_water(const bt_planner *p, double tx, double ty, double v);
+double bt_swath_water(const bt_planner *planner, double tx, double ty, double v);
 
 /// Adds the integral of the load over the first `length` m of a leg, for each speed: N m. Slices between normals of
 /// the path, so that pieces that follow each other share nothing.
-void bt_swath_load(const bt_planner *p, const bt_leg *leg, double length, double *sums);
+void bt_swath_load(const bt_planner *planner, const bt_leg *leg, double length, double *sums);
 
 /// Best speed of a stretch by the objective: load [n_speeds], N m, and mean water drag, N; limit: of the mean force.
-bt_stretch_cost bt_swath_choose(const bt_planner *p, double length, const double *load, const double *water,
+bt_stretch_cost bt_swath_choose(const bt_planner *planner, double length, const double *load, const double *water,
                                 double limit);
 
 /// Cost of n legs. Stretches are of 2 W at most; out, or NULL, takes them: bt_swath_stretches.
-bt_path_cost bt_swath_cost(const bt_planner *p, int n, const bt_leg *leg, bt_route_stretch *out);
+bt_path_cost bt_swath_cost(const bt_planner *planner, int n, const bt_leg *leg, bt_route_stretch *out);
 /// From here on bt_swath_cost keeps what legs cost; called again when the penalty's cells have changed.
-void bt_swath_keep(bt_planner *p);
+void bt_swath_keep(bt_planner *planner);
 /// Stretches that bt_swath_cost makes of these legs.
-int64_t bt_swath_stretches(const bt_planner *p, int n, const bt_leg *leg);
+int64_t bt_swath_stretches(const bt_planner *planner, int n, const bt_leg *leg);
 
 /// Is a cheaper than b?
 bool bt_swath_better(const bt_path_cost *a, const bt_path_cost *b);
 
 /// Fill in the numbers of a route whose stretches are there: terms, areas by exact clipping, clearance.
-void bt_swath_report(const bt_planner *p, bt_route *r);
+void bt_swath_report(const bt_planner *planner, bt_route *route);
 
 #endif

@@ -35,18 +35,18 @@ static void on_signal(int number) { stop_signal = number; }
 
 /// A process that is killed between the end of a member and the line for it leaves that line out: here it is added. By
 /// one process at a time, with the lock of the folder.
-static void complete_journal(const bt_ensemble *e)
+static void complete_journal(const bt_ensemble *ensemble)
 {
     // Whoever works on a member holds its lock until the line is written, so the locks are looked at first.
-    bool *lacking = bt_alloc((size_t)e->n, sizeof *lacking);
-    for (int64_t i = 0; i < e->n; i++) {
-        const bt_entry *x = &e->list[i];
-        lacking[x->index] =
-            bt_ensemble_state(x->folder, NULL, NULL) == BT_MEMBER_FINISHED && !bt_member_held(x->folder);
+    bool *lacking = bt_alloc((size_t)ensemble->n, sizeof *lacking);
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        const bt_entry *entry = &ensemble->list[i];
+        lacking[entry->index] =
+            bt_ensemble_state(entry->folder, NULL, NULL) == BT_MEMBER_FINISHED && !bt_member_held(entry->folder);
     }
-    bt_journal_strike_ended(e->o->dir, e->s->repeats, e->n, lacking);
-    for (int64_t i = 0; i < e->n; i++)
-        if (lacking[e->list[i].index]) bt_ensemble_journal(e, "finished", &e->list[i].m, NAN, 0);
+    bt_journal_strike_ended(ensemble->o->dir, ensemble->s->repeats, ensemble->n, lacking);
+    for (int64_t i = 0; i < ensemble->n; i++)
+        if (lacking[ensemble->list[i].index]) bt_ensemble_journal(ensemble, "finished", &ensemble->list[i].m, NAN, 0);
     free(lacking);
 }
 
@@ -54,218 +54,224 @@ static void complete_journal(const bt_ensemble *e)
 
 /// A member that has failed; where not even that can be recorded (a full disk) it stays open, is reported at the end,
 /// and is tried again by the next call.
-static void settle_failed(bt_ensemble *e, bt_entry *x, bt_status status, const bt_errors *why)
+static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status status, const bt_errors *why)
 {
     bt_errors unrecorded = {0};
-    x->settled = true;
-    if (bt_member_record_failure(x->folder, status, why, &unrecorded) != BT_OK && e->lost++ < BT_MOST_REPORTED)
-        bt_errors_add(e->err, "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again",
-                      x->m.name, (int)status, why->n ? why->text[0] : "no reason given");
+    entry->settled = true;
+    if (bt_member_record_failure(entry->folder, status, why, &unrecorded) != BT_OK &&
+        ensemble->lost++ < BT_MOST_REPORTED)
+        bt_errors_add(ensemble->err,
+                      "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again",
+                      entry->m.name, (int)status, why->n ? why->text[0] : "no reason given");
     bt_errors_free(&unrecorded);
 }
 
 /// A suspect that is run beside another member takes that with it when it ends the program, and again at every call,
 /// until both are given up. So one at a time is run, once nothing else is left to begin.
-static bool may_take_suspects(bt_ensemble *e)
+static bool may_take_suspects(bt_ensemble *ensemble)
 {
-    if (e->alone >= 0) return true;
-    const int fd = bt_member_open(e->o->dir, "suspects.lock", O_RDWR | O_CREAT);
+    if (ensemble->alone >= 0) return true;
+    const int fd = bt_member_open(ensemble->o->dir, "suspects.lock", O_RDWR | O_CREAT);
     if (fd < 0) return true; // better than never
-    if (bt_member_take_lock(fd, false)) e->alone = fd;
+    if (bt_member_take_lock(fd, false)) ensemble->alone = fd;
     else close(fd);
-    return e->alone >= 0;
+    return ensemble->alone >= 0;
 }
 
-static void drop_member(bt_ensemble *e, const bt_entry *x)
+static void drop_member(bt_ensemble *ensemble, const bt_entry *entry)
 {
-    bt_lock_drop(x->folder, e->run_lock);
-    if (e->lock >= 0) close(e->lock);
-    e->lock = e->run_lock = -1;
+    bt_lock_drop(entry->folder, ensemble->run_lock);
+    if (ensemble->lock >= 0) close(ensemble->lock);
+    ensemble->lock = ensemble->run_lock = -1;
 }
 
 /// Make the folder of a member and take its locks; false: somebody is at it, an ensemble or a `bergtow resume`, or it
 /// has failed by that.
-static bool lock_member(bt_ensemble *e, bt_entry *x)
+static bool lock_member(bt_ensemble *ensemble, bt_entry *entry)
 {
     bt_errors why = {0};
-    bt_status status = bt_file_make_dir(x->folder, &why);
-    x->busy = false;
-    e->run_lock = -1;
-    e->lock = status == BT_OK ? bt_member_open(x->folder, "lock", O_RDWR | O_CREAT) : -1;
-    if (status == BT_OK && e->lock < 0) status = bt_file_fail(x->folder, "make a lock in the folder", errno, &why);
-    if (status == BT_OK && bt_member_take_lock(e->lock, false) &&
-        (e->run_lock = bt_lock_take(x->folder, &x->busy, &why)) < 0 && !x->busy)
+    bt_status status = bt_file_make_dir(entry->folder, &why);
+    entry->busy = false;
+    ensemble->run_lock = -1;
+    ensemble->lock = status == BT_OK ? bt_member_open(entry->folder, "lock", O_RDWR | O_CREAT) : -1;
+    if (status == BT_OK && ensemble->lock < 0)
+        status = bt_file_fail(entry->folder, "make a lock in the folder", errno, &why);
+    if (status == BT_OK && bt_member_take_lock(ensemble->lock, false) &&
+        (ensemble->run_lock = bt_lock_take(entry->folder, &entry->busy, &why)) < 0 && !entry->busy)
         status = BT_ERR_IO;
     if (status != BT_OK) {
-        settle_failed(e, x, status, &why);
-        bt_ensemble_journal(e, "failed", &x->m, 0, (int)status);
-        bt_ensemble_say(e, x, status, 0);
+        settle_failed(ensemble, entry, status, &why);
+        bt_ensemble_journal(ensemble, "failed", &entry->m, 0, (int)status);
+        bt_ensemble_say(ensemble, entry, status, 0);
     }
     bt_errors_free(&why);
-    if (e->run_lock >= 0) return true;
-    drop_member(e, x);
+    if (ensemble->run_lock >= 0) return true;
+    drop_member(ensemble, entry);
     return false;
 }
 
 /// With a limit of steps each group has members of its own: one that has paused looks like one that waits.
-static bool is_for_another(const bt_ensemble *e, const bt_entry *x)
+static bool is_for_another(const bt_ensemble *ensemble, const bt_entry *entry)
 {
-    return e->o->max_steps > 0 && (x->paused || x->index % e->n_groups != e->of_group);
+    return ensemble->o->max_steps > 0 && (entry->paused || entry->index % ensemble->n_groups != ensemble->of_group);
 }
 
 enum { NONE = -1, CHANGED = -2 };
 
 /// Take the lock of the next member that is free; NONE, or CHANGED: what it would be made with is not what others were
 /// made with. On the first rank of a group.
-static int64_t claim(bt_ensemble *e)
+static int64_t claim(bt_ensemble *ensemble)
 {
-    if (bt_study_files_same(&e->files, e->err) != BT_OK) return CHANGED;
-    for (int64_t i = 0; i < e->n; i++) {
-        bt_entry *x = &e->list[i];
-        bt_entry_look(x);
-        if (x->settled || is_for_another(e, x) || (bt_entry_is_suspect(x) && !may_take_suspects(e))) continue;
-        if (!lock_member(e, x)) continue;
-        bt_entry_look(x); // it may have been finished between the look and the lock
-        if (!x->settled) return i;
-        drop_member(e, x);
+    if (bt_study_files_same(&ensemble->files, ensemble->err) != BT_OK) return CHANGED;
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        bt_entry *entry = &ensemble->list[i];
+        bt_entry_look(entry);
+        if (entry->settled || is_for_another(ensemble, entry) ||
+            (bt_entry_is_suspect(entry) && !may_take_suspects(ensemble))) continue;
+        if (!lock_member(ensemble, entry)) continue;
+        bt_entry_look(entry); // it may have been finished between the look and the lock
+        if (!entry->settled) return i;
+        drop_member(ensemble, entry);
     }
     return NONE;
 }
 
 /// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts
 /// anew.
-static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_run_options *o, bt_errors *why)
+static bt_status run_or_go_on(const bt_comm *group, const bt_case *input, const bt_run_options *options, bt_errors *why)
 {
-    int kept = group->rank == 0 && bt_checkpoint_there(o->dir);
+    int kept = group->rank == 0 && bt_checkpoint_there(options->dir);
     bt_comm_bcast(group, &kept, sizeof kept);
     if (kept) {
-        const bt_status status = bt_run_resume(group, o, why);
+        const bt_status status = bt_run_resume(group, options, why);
         if (status != BT_ERR_CASE) return status;
         bt_errors_free(why);
     }
-    return bt_run(group, c, o, why);
+    return bt_run(group, input, options, why);
 }
 
 /// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as
 /// errors, which are reported at the end.
-static bt_status gather(bt_ensemble *e, bool wait)
+static bt_status gather(bt_ensemble *ensemble, bool wait)
 {
     bt_status status = BT_OK;
     bt_errors unheard = {0};
     const double t0 = bt_clock();
-    const int fd = bt_member_open(e->o->dir, "lock", O_RDWR | O_CREAT);
-    if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
+    const int fd = bt_member_open(ensemble->o->dir, "lock", O_RDWR | O_CREAT);
+    if (fd < 0 && wait) status = bt_file_fail(ensemble->o->dir, "open the lock in the folder", errno, ensemble->err);
     else if (fd >= 0 && bt_member_take_lock(fd, wait))
-        status = bt_ensemble_gather(e->s, e->o->dir, &e->records, &e->warnings,
-                                    wait ? e->err : &unheard);
-    if (fd >= 0 && wait) complete_journal(e);
+        status = bt_ensemble_gather(ensemble->s, ensemble->o->dir, &ensemble->records, &ensemble->warnings,
+                                    wait ? ensemble->err : &unheard);
+    if (fd >= 0 && wait) complete_journal(ensemble);
     if (fd >= 0) close(fd);
     bt_errors_free(&unheard);
-    e->gathered = bt_clock();
-    e->gathering = e->gathered - t0;
+    ensemble->gathered = bt_clock();
+    ensemble->gathering = ensemble->gathered - t0;
     return status;
 }
 
-static bt_status run_member(bt_ensemble *e, bt_entry *x)
+static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
 {
-    const bool first = e->group->rank == 0;
+    const bool first = ensemble->group->rank == 0;
     const double t0 = bt_clock();
     bt_errors why = {0};
     bt_status status = BT_OK;
     int64_t n_steps = 0;
-    if (first && x->attempts >= BT_MAX_ATTEMPTS) {
-        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", x->m.name,
-                      x->attempts);
+    if (first && entry->attempts >= BT_MAX_ATTEMPTS) {
+        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", entry->m.name,
+                      entry->attempts);
         status = BT_ERR_NUMERIC;
     }
     if (first) {
-        if (x->attempts == 0) bt_member_forget_attempts(x->folder);
-        if (x->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(x->folder);
-        if (x->attempts > 0) gather(e, false); // its process may die again, and the file should say so
-        bt_ensemble_journal(e, "start", &x->m, 0, 0);
+        if (entry->attempts == 0) bt_member_forget_attempts(entry->folder);
+        if (entry->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(entry->folder);
+        if (entry->attempts > 0) gather(ensemble, false); // its process may die again, and the file should say so
+        bt_ensemble_journal(ensemble, "start", &entry->m, 0, 0);
     }
-    status = bt_comm_agree(e->group, status);
+    status = bt_comm_agree(ensemble->group, status);
     if (status == BT_OK) {
-        bt_case c;
-        status = bt_member_case(e->s, &x->m, &c, &why);
-        status = bt_comm_agree(e->group, status);
-        if (status == BT_OK) n_steps = bt_case_steps(&c);
-        const bt_run_options o = {.dir = x->folder,
-                                  .threads = e->threads,
-                                  .quiet = true,
-                                  .dump_step = -1,
-                                  .max_steps = e->o->max_steps,
-                                  .max_wall = e->o->max_wall > 0 ? bt_max(1e-3, bt_ensemble_wall_left(e)) : 0,
-                                  .stop_signal = &stop_signal,
-                                  .command_line = e->o->command_line,
-                                  .held = true,
-                                  .fields = x->shares ? e->fields : NULL};
-        if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
-        bt_case_free(&c);
+        bt_case input;
+        status = bt_member_case(ensemble->s, &entry->m, &input, &why);
+        status = bt_comm_agree(ensemble->group, status);
+        if (status == BT_OK) n_steps = bt_case_steps(&input);
+        const bt_run_options options = {.dir = entry->folder,
+                                        .threads = ensemble->threads,
+                                        .quiet = true,
+                                        .dump_step = -1,
+                                        .max_steps = ensemble->o->max_steps,
+                                        .max_wall = ensemble->o->max_wall > 0
+                                                    ? bt_max(1e-3, bt_ensemble_wall_left(ensemble)) : 0,
+                                        .stop_signal = &stop_signal,
+                                        .command_line = ensemble->o->command_line,
+                                        .held = true,
+                                        .fields = entry->shares ? ensemble->fields : NULL};
+        if (status == BT_OK) status = run_or_go_on(ensemble->group, &input, &options, &why);
+        bt_case_free(&input);
     }
-    bt_comm_errors(e->group, &why);
+    bt_comm_errors(ensemble->group, &why);
     if (first) {
         const double wall = bt_clock() - t0;
-        bt_member_forget_attempts(x->folder);
-        x->paused = status == BT_OK && e->o->max_steps > 0 && !bt_member_is_whole(x->folder, n_steps);
-        if (status == BT_OK && !x->paused) {
-            status = bt_member_record_write(&e->records, x->index, x->m.name, x->folder, &why);
-            if (status == BT_OK) bt_checkpoint_remove(x->folder);
+        bt_member_forget_attempts(entry->folder);
+        entry->paused = status == BT_OK && ensemble->o->max_steps > 0 && !bt_member_is_whole(entry->folder, n_steps);
+        if (status == BT_OK && !entry->paused) {
+            status = bt_member_record_write(&ensemble->records, entry->index, entry->m.name, entry->folder, &why);
+            if (status == BT_OK) bt_checkpoint_remove(entry->folder);
         }
-        if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(e, x, status, &why);
-        bt_ensemble_journal(e,
-                x->paused                 ? "stopped"
+        if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(ensemble, entry, status, &why);
+        bt_ensemble_journal(ensemble,
+                entry->paused                 ? "stopped"
                 : status == BT_OK         ? "finished"
                 : status == BT_ERR_SIGNAL ? "stopped"
                                           : "failed",
-                &x->m, wall, (int)status);
-        if (status != BT_ERR_SIGNAL && !x->paused) bt_ensemble_say(e, x, status, wall);
+                &entry->m, wall, (int)status);
+        if (status != BT_ERR_SIGNAL && !entry->paused) bt_ensemble_say(ensemble, entry, status, wall);
     }
     bt_errors_free(&why);
     return status;
 }
 
-static bt_status work(bt_ensemble *e)
+static bt_status work(bt_ensemble *ensemble)
 {
     for (;;) {
-        const bool stop = bt_comm_any(e->group, stop_signal != 0 || bt_ensemble_wall_left(e) <= 0);
+        const bool stop = bt_comm_any(ensemble->group, stop_signal != 0 || bt_ensemble_wall_left(ensemble) <= 0);
         if (stop) return BT_ERR_SIGNAL;
-        int64_t i = e->group->rank == 0 ? claim(e) : 0;
-        bt_comm_bcast(e->group, &i, sizeof i);
+        int64_t i = ensemble->group->rank == 0 ? claim(ensemble) : 0;
+        bt_comm_bcast(ensemble->group, &i, sizeof i);
         if (i == CHANGED) return BT_ERR_CASE;
-        if (i == NONE) return e->lost > 0 ? BT_ERR_IO : BT_OK;
-        const bt_status status = run_member(e, &e->list[i]);
-        if (e->group->rank == 0) {
-            drop_member(e, &e->list[i]);
+        if (i == NONE) return ensemble->lost > 0 ? BT_ERR_IO : BT_OK;
+        const bt_status status = run_member(ensemble, &ensemble->list[i]);
+        if (ensemble->group->rank == 0) {
+            drop_member(ensemble, &ensemble->list[i]);
             if (status != BT_ERR_SIGNAL &&
-                bt_clock() - e->gathered > e->n_groups * bt_max(GATHER_SECONDS, e->gathering / GATHER_SHARE))
-                gather(e, false);
+                bt_clock() - ensemble->gathered >
+                ensemble->n_groups * bt_max(GATHER_SECONDS, ensemble->gathering / GATHER_SHARE))
+                gather(ensemble, false);
         }
         if (status == BT_ERR_SIGNAL) return status;
     }
 }
 
 /// Failed members that are to be tried again.
-static void forget_failures(const bt_ensemble *e)
+static void forget_failures(const bt_ensemble *ensemble)
 {
-    for (int64_t i = 0; i < e->n; i++) {
-        bt_member_forget_failure(e->list[i].folder);
-        e->list[i].settled = false;
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        bt_member_forget_failure(ensemble->list[i].folder);
+        ensemble->list[i].settled = false;
     }
 }
 
 /// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or
 /// die. reported: that has been said.
-static bool wait_for_others(bt_ensemble *e, bool reported)
+static bool wait_for_others(bt_ensemble *ensemble, bool reported)
 {
     int64_t n = 0;
-    for (int64_t i = 0; e->world->rank == 0 && i < e->n; i++) {
-        bt_entry_look(&e->list[i]);
-        n += !e->list[i].settled;
+    for (int64_t i = 0; ensemble->world->rank == 0 && i < ensemble->n; i++) {
+        bt_entry_look(&ensemble->list[i]);
+        n += !ensemble->list[i].settled;
     }
-    bt_comm_bcast(e->world, &n, sizeof n);
+    bt_comm_bcast(ensemble->world, &n, sizeof n);
     if (n == 0) return false;
-    if (!reported && !e->o->quiet && e->jobs == 1 && e->world->rank == 0) {
+    if (!reported && !ensemble->o->quiet && ensemble->jobs == 1 && ensemble->world->rank == 0) {
         printf("waiting for %" PRId64 " members that other processes are at work on (--no-wait does not)\n", n);
         fflush(stdout);
     }
@@ -274,130 +280,133 @@ static bool wait_for_others(bt_ensemble *e, bool reported)
 }
 
 /// Collective. As for a run of the base case. *open: nobody has asked for a number.
-static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads,
-                                bool *open, bt_errors *err)
+static bt_status choose_threads(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
+                                int *threads, bool *open, bt_errors *err)
 {
-    bt_case c;
-    const bt_status status = bt_comm_agree(comm, bt_study_base_case(s, &c, err));
+    bt_case input;
+    const bt_status status = bt_comm_agree(comm, bt_study_base_case(study, &input, err));
     if (status == BT_OK) {
-        *threads = bt_run_threads(comm, &c, o->threads);
-        *open = o->threads == 0 && c.run.threads == 0 && !getenv("OMP_NUM_THREADS");
+        *threads = bt_run_threads(comm, &input, options->threads);
+        *open = options->threads == 0 && input.run.threads == 0 && !getenv("OMP_NUM_THREADS");
     }
-    bt_case_free(&c);
+    bt_case_free(&input);
     return status;
 }
 
 /// Members have as many threads as their floes keep busy, and the other cores go to other members. open: the number of
 /// threads is.
-static void share_cores(bt_ensemble *e, bool open)
+static void share_cores(bt_ensemble *ensemble, bool open)
 {
-    const bt_ensemble_options *o = e->o;
-    e->jobs = 1;
-    if (!o->helpers || o->job || o->max_steps > 0 || bt_launcher_find().found) return;
-    const double busy = bt_max(1, ceil(e->most_floes / FLOES_OF_A_THREAD));
-    const double left = bt_max(1, (double)(e->n - e->before)),
-                 most = o->jobs ? o->jobs : open ? floor(e->threads / busy) : 1;
-    e->jobs = (int)bt_max(1, bt_min(most, left));
-    if (open) e->threads = bt_max(1, e->threads / e->jobs);
+    const bt_ensemble_options *options = ensemble->o;
+    ensemble->jobs = 1;
+    if (!options->helpers || options->job || options->max_steps > 0 || bt_launcher_find().found) return;
+    const double busy = bt_max(1, ceil(ensemble->most_floes / FLOES_OF_A_THREAD));
+    const double left = bt_max(1, (double)(ensemble->n - ensemble->before)),
+                 most = options->jobs ? options->jobs : open ? floor(ensemble->threads / busy) : 1;
+    ensemble->jobs = (int)bt_max(1, bt_min(most, left));
+    if (open) ensemble->threads = bt_max(1, ensemble->threads / ensemble->jobs);
 }
 
-static bt_status check_ice(const bt_study *s, bt_errors *err)
+static bt_status check_ice(const bt_study *study, bt_errors *err)
 {
     const size_t before = err->n;
-    bt_study_check_ice(s, err);
+    bt_study_check_ice(study, err);
     return err->n == before ? BT_OK : BT_ERR_CASE;
 }
 
-static void warn_fixed(const bt_ensemble *e)
+static void warn_fixed(const bt_ensemble *ensemble)
 {
-    if (e->fixed == 0 || e->s->repeats == 1) return;
+    if (ensemble->fixed == 0 || ensemble->s->repeats == 1) return;
     bt_errors warnings = {0};
     bt_errors_add(&warnings,
                   "warning: in %" PRId64 " of %" PRId64 " conditions the ice does not depend on the seed, as it is "
                   "read from a file, or there is none: the fields of each are one run",
-                  e->fixed, e->s->n_conditions);
+                  ensemble->fixed, ensemble->s->n_conditions);
     bt_errors_print(&warnings);
     bt_errors_free(&warnings);
 }
 
-bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
+bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
+                          bt_errors *err)
 {
-    bt_status status = bt_study_fits(s, comm->size, err);
+    bt_status status = bt_study_fits(study, comm->size, err);
     bt_member_records records;
     char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;
-    if (status == BT_OK) status = choose_threads(comm, s, o, &threads, &open, err);
-    if (status == BT_OK && comm->rank == 0) status = check_ice(s, err);
-    if (status == BT_OK && comm->rank == 0) status = bt_ensemble_prepare_folder(s, o, digest, err);
+    if (status == BT_OK) status = choose_threads(comm, study, options, &threads, &open, err);
+    if (status == BT_OK && comm->rank == 0) status = check_ice(study, err);
+    if (status == BT_OK && comm->rank == 0) status = bt_ensemble_prepare_folder(study, options, digest, err);
     status = bt_comm_agree(comm, status);
     if (status != BT_OK) return status;
     bt_comm_bcast(comm, digest, sizeof digest);
-    bt_member_records_begin(&records, s, digest);
+    bt_member_records_begin(&records, study, digest);
 
     bt_comm group;
-    bt_comm_split(comm, comm->rank / (int)s->ranks, &group);
-    const bool idle = comm->rank / (int)s->ranks >= comm->size / (int)s->ranks; // ranks that make no whole group
-    bt_ensemble e = {.world = comm,
-                  .group = &group,
-                  .s = s,
-                  .o = o,
-                  .began = bt_clock(),
-                  .gathered = bt_clock(),
-                  .err = err,
-                  .n_groups = comm->size / (int)s->ranks,
-                  .of_group = comm->rank / (int)s->ranks,
-                  .alone = -1};
-    e.threads = threads;
-    e.records = records;
-    if (group.rank == 0) bt_study_files_find(&e.files, s);
-    bt_ensemble_list(&e);
-    if (o->retry && comm->rank == 0) forget_failures(&e);
-    if (o->retry) bt_comm_rest(comm);
-    if (o->retry)
-        for (int64_t i = 0; i < e.n; i++)
-            e.list[i].settled = bt_ensemble_state(e.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
-    bt_ensemble_count_settled(&e);
-    share_cores(&e, open);
-    if (comm->rank == 0 && !o->quiet && !o->job) {
+    bt_comm_split(comm, comm->rank / (int)study->ranks, &group);
+    // ranks that make no whole group
+    const bool idle = comm->rank / (int)study->ranks >= comm->size / (int)study->ranks;
+    bt_ensemble ensemble = {.world = comm,
+                         .group = &group,
+                         .s = study,
+                         .o = options,
+                         .began = bt_clock(),
+                         .gathered = bt_clock(),
+                         .err = err,
+                         .n_groups = comm->size / (int)study->ranks,
+                         .of_group = comm->rank / (int)study->ranks,
+                         .alone = -1};
+    ensemble.threads = threads;
+    ensemble.records = records;
+    if (group.rank == 0) bt_study_files_find(&ensemble.files, study);
+    bt_ensemble_list(&ensemble);
+    if (options->retry && comm->rank == 0) forget_failures(&ensemble);
+    if (options->retry) bt_comm_rest(comm);
+    if (options->retry)
+        for (int64_t i = 0; i < ensemble.n; i++)
+            ensemble.list[i].settled = bt_ensemble_state(ensemble.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
+    bt_ensemble_count_settled(&ensemble);
+    share_cores(&ensemble, open);
+    if (comm->rank == 0 && !options->quiet && !options->job) {
         printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64
                " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
-               e.n, s->n_conditions, s->repeats, e.before, e.n_groups * e.jobs, s->ranks, e.threads);
+               ensemble.n, study->n_conditions, study->repeats, ensemble.before, ensemble.n_groups * ensemble.jobs,
+               study->ranks, ensemble.threads);
         fflush(stdout);
     }
-    if (comm->rank == 0 && !o->job) warn_fixed(&e);
-    if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
+    if (comm->rank == 0 && !options->job) warn_fixed(&ensemble);
+    if (comm->rank == 0) gather(&ensemble, false); // after a kill the file may be behind
     struct sigaction before[BT_N_CAUGHT];
     stop_signal = 0;
     bt_halt_catch(on_signal, NULL, before);
-    const bool helped = e.jobs > 1;
-    if (helped) o->helpers->start(o->helpers->of, e.jobs - 1, e.threads);
+    const bool helped = ensemble.jobs > 1;
+    if (helped) options->helpers->start(options->helpers->of, ensemble.jobs - 1, ensemble.threads);
     bool others = false;
     do {
-        if (!idle) status = work(&e);
+        if (!idle) status = work(&ensemble);
         bt_comm_rest(comm);
         status = bt_comm_agree(comm, status);
-        others = status == BT_OK && !o->leave && o->max_steps == 0 && wait_for_others(&e, others);
+        others = status == BT_OK && !options->leave && options->max_steps == 0 && wait_for_others(&ensemble, others);
     } while (others);
-    if (helped) o->helpers->end(o->helpers->of, status == BT_ERR_SIGNAL);
+    if (helped) options->helpers->end(options->helpers->of, status == BT_ERR_SIGNAL);
     bt_halt_let_go(before);
-    if (e.alone >= 0) close(e.alone);
-    bt_ensemble_share_records(&e);
+    if (ensemble.alone >= 0) close(ensemble.alone);
+    bt_ensemble_share_records(&ensemble);
     if (comm->rank == 0) {
-        const bt_status gathered = gather(&e, true);
-        if (!o->job) status = bt_ensemble_tell_end(&e, status, err);
-        if (!o->job && status == BT_OK) bt_field_forget_kept(e.fields);
+        const bt_status gathered = gather(&ensemble, true);
+        if (!options->job) status = bt_ensemble_tell_end(&ensemble, status, err);
+        if (!options->job && status == BT_OK) bt_field_forget_kept(ensemble.fields);
         if (status == BT_OK) status = gathered;
     }
     bt_comm_split_end(&group);
-    for (int64_t i = 0; i < e.n; i++) {
-        bt_member_free(&e.list[i].m);
-        free(e.list[i].folder);
+    for (int64_t i = 0; i < ensemble.n; i++) {
+        bt_member_free(&ensemble.list[i].m);
+        free(ensemble.list[i].folder);
     }
-    free(e.list);
-    free(e.fields);
-    bt_study_files_free(&e.files);
-    bt_member_records_end(&e.records);
-    bt_member_notes_free(&e.warnings);
+    free(ensemble.list);
+    free(ensemble.fields);
+    bt_study_files_free(&ensemble.files);
+    bt_member_records_end(&ensemble.records);
+    bt_member_notes_free(&ensemble.warnings);
     return bt_comm_agree(comm, status);
 }

@@ -120,9 +120,9 @@ static bt_status take_summary(table *t, int64_t m, const char *folder, bt_errors
     return BT_OK;
 }
 
-/// A column of a member's result.h5; returns its length, 0 when there is none. A read that fails is kept in h: the
+/// A column of a member's result.h5; returns its length, 0 when there is none. A read that fails is kept in `h5`: the
 /// numbers of a member that has finished are there, and a row without them would be taken for one that has not.
-static hsize_t read_column(bt_h5 *h, const char *folder, const char *group, const char *column_name, double **out)
+static hsize_t read_column(bt_h5 *h5, const char *folder, const char *group, const char *column_name, double **out)
 {
     *out = NULL;
     char *path = bt_file_join(folder, "result.h5"), name[64];
@@ -141,50 +141,50 @@ static hsize_t read_column(bt_h5 *h, const char *folder, const char *group, cons
         H5Dclose(set);
     }
     if (file >= 0) H5Fclose(file);
-    if (errnum && h->status == BT_OK) bt_h5_give_up(h, bt_file_fail(path, "read the file", errnum, h->err));
+    if (errnum && h5->status == BT_OK) bt_h5_give_up(h5, bt_file_fail(path, "read the file", errnum, h5->err));
     free(path);
     return n;
 }
 
-static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char *dir)
+static void write_series(bt_h5 *h5, const table *t, const bt_study *study, const char *dir)
 {
     hsize_t most = 0;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
         char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
         double *x;
-        const hsize_t n = read_column(h, folder, "/series", series[0], &x);
+        const hsize_t n = read_column(h5, folder, "/series", series[0], &x);
         if (n > most) most = n;
         free(x);
         free(folder);
     }
-    (void)s;
-    bt_h5_group(h, "/series");
+    (void)study;
+    bt_h5_group(h5, "/series");
     for (int k = 0; k < N_SERIES; k++) {
         char *name = bt_file_join("/series", series[k]);
         hid_t set =
-            bt_h5_growing(h, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
+            bt_h5_growing(h5, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
         double *row = bt_alloc(most, sizeof *row);
         for (int64_t m = 0; m < t->n; m++) {
             char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
             double *x;
-            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_column(h, folder, "/series", series[k], &x)
+            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_column(h5, folder, "/series", series[k], &x)
                                                                     : (x = NULL, 0);
             for (hsize_t i = 0; i < most; i++) row[i] = i < n ? x[i] : (double)NAN;
-            bt_h5_append(h, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
+            bt_h5_append(h5, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
             free(x);
             free(folder);
         }
         free(row);
         if (set >= 0) H5Dclose(set);
-        bt_h5_describe(h, name, "member sample", bt_series_find(series[k])->units,
+        bt_h5_describe(h5, name, "member sample", bt_series_find(series[k])->units,
                        bt_series_find(series[k])->description);
         free(name);
     }
 }
 
 /// Events of all members: of a line that parted the statistics ask when, and which.
-static void write_events(bt_h5 *h, const table *t, const char *dir)
+static void write_events(bt_h5 *h5, const table *t, const char *dir)
 {
     static const struct {
         const char *name, *units, *meaning;
@@ -200,10 +200,10 @@ static void write_events(bt_h5 *h, const table *t, const char *dir)
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
         char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
         double *x[N_COLUMNS];
-        hsize_t n = read_column(h, folder, "/events", columns[TIME].name, &x[TIME]);
+        hsize_t n = read_column(h5, folder, "/events", columns[TIME].name, &x[TIME]);
         for (int k = KIND; k < N_COLUMNS; k++) {
             x[k] = NULL;
-            const hsize_t others = n ? read_column(h, folder, "/events", columns[k].name, &x[k]) : 0;
+            const hsize_t others = n ? read_column(h5, folder, "/events", columns[k].name, &x[k]) : 0;
             n = others < n ? others : n;
         }
         member = bt_realloc(member, (size_t)all.n + n + 1, sizeof *member);
@@ -219,21 +219,21 @@ static void write_events(bt_h5 *h, const table *t, const char *dir)
     int64_t *subject = bt_alloc(n, sizeof *subject);
     const char **kind = bt_alloc(n, sizeof *kind);
     for (hsize_t i = 0; i < n; i++) {
-        const bt_event *e = &all.event[i];
-        time[i] = e->time, subject[i] = e->subject, value[i] = e->value;
-        kind[i] = e->kind >= 0 && e->kind < BT_EVENT_KINDS ? bt_event_names[e->kind] : "unknown";
+        const bt_event *event = &all.event[i];
+        time[i] = event->time, subject[i] = event->subject, value[i] = event->value;
+        kind[i] = event->kind >= 0 && event->kind < BT_EVENT_KINDS ? bt_event_names[event->kind] : "unknown";
     }
     if (n > 0) {
-        bt_h5_group(h, "/events");
-        bt_h5_write(h, "/events/member", H5T_NATIVE_INT64, n, 0, member);
-        bt_h5_describe(h, "/events/member", "event", "1", "number of the member in the study, from 1");
-        bt_h5_write(h, "/events/time", H5T_NATIVE_DOUBLE, n, 0, time);
-        bt_h5_write_names(h, "/events/kind", n, kind);
-        bt_h5_write(h, "/events/subject", H5T_NATIVE_INT64, n, 0, subject);
-        bt_h5_write(h, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value);
+        bt_h5_group(h5, "/events");
+        bt_h5_write(h5, "/events/member", H5T_NATIVE_INT64, n, 0, member);
+        bt_h5_describe(h5, "/events/member", "event", "1", "number of the member in the study, from 1");
+        bt_h5_write(h5, "/events/time", H5T_NATIVE_DOUBLE, n, 0, time);
+        bt_h5_write_names(h5, "/events/kind", n, kind);
+        bt_h5_write(h5, "/events/subject", H5T_NATIVE_INT64, n, 0, subject);
+        bt_h5_write(h5, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value);
         for (int k = 0; k < N_COLUMNS; k++) {
             char *path = bt_file_join("/events", columns[k].name);
-            bt_h5_describe(h, path, "event", columns[k].units, columns[k].meaning);
+            bt_h5_describe(h5, path, "event", columns[k].units, columns[k].meaning);
             free(path);
         }
     }
@@ -243,42 +243,42 @@ static void write_events(bt_h5 *h, const table *t, const char *dir)
 }
 
 /// A parameter as numbers, or as texts where it is a choice or a name.
-static void write_parameter(bt_h5 *h, const bt_study *s, int p, int64_t n)
+static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
 {
-    const bt_study_parameter *q = &s->parameter[p];
-    const bt_key *key = q->key >= 0 ? &bt_case_keys[q->key] : NULL;
+    const bt_study_parameter *parameter = &study->parameter[p];
+    const bt_key *key = parameter->key >= 0 ? &bt_case_keys[parameter->key] : NULL;
     const bool number = key && (key->type == BT_KEY_REAL || key->type == BT_KEY_INT || key->type == BT_KEY_BOOL);
     char **text = bt_alloc((size_t)n, sizeof *text);
     double *value = bt_alloc((size_t)n, sizeof *value);
     bt_member member;
     for (int64_t m = 0; m < n; m++) {
-        bt_study_member(s, m, &member);
+        bt_study_member(study, m, &member);
         text[m] = bt_text_copy(member.value[p]);
-        bt_case c;
-        bt_case_defaults(&c);
+        bt_case input;
+        bt_case_defaults(&input);
         char why[BT_WHY];
         value[m] = NAN;
-        if (number && bt_value_read(key, &c, text[m], true, why)) {
-            const char *at = (const char *)&c + key->offset;
+        if (number && bt_value_read(key, &input, text[m], true, why)) {
+            const char *at = (const char *)&input + key->offset;
             int64_t whole;
             bool yes;
             if (key->type == BT_KEY_REAL) memcpy(&value[m], at, sizeof value[m]);
             else if (key->type == BT_KEY_INT) memcpy(&whole, at, sizeof whole), value[m] = (double)whole;
             else memcpy(&yes, at, sizeof yes), value[m] = yes;
         }
-        bt_case_free(&c);
+        bt_case_free(&input);
         bt_member_free(&member);
     }
-    char *name = bt_file_join("/parameters", q->name);
-    if (number) bt_h5_write(h, name, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, value);
-    else bt_h5_write_names(h, name, (hsize_t)n, (const char *const *)text);
+    char *name = bt_file_join("/parameters", parameter->name);
+    if (number) bt_h5_write(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, value);
+    else bt_h5_write_names(h5, name, (hsize_t)n, (const char *const *)text);
     const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
-    bt_h5_describe(h, name, "member", number ? *unit ? unit : "1" : NULL,
+    bt_h5_describe(h5, name, "member", number ? *unit ? unit : "1" : NULL,
                    key ? key->doc : "which variant of the study");
-    bt_h5_attr_text(h, name, "key", q->name);
-    char *distribution = bt_study_distribution(q);
-    bt_h5_attr_text(h, name, "distribution", distribution);
-    bt_h5_attr_text(h, name, "source", q->source ? q->source : "");
+    bt_h5_attr_text(h5, name, "key", parameter->name);
+    char *distribution = bt_study_distribution(parameter);
+    bt_h5_attr_text(h5, name, "distribution", distribution);
+    bt_h5_attr_text(h5, name, "source", parameter->source ? parameter->source : "");
     free(distribution);
     free(name);
     for (int64_t m = 0; m < n; m++) free(text[m]);
@@ -304,16 +304,16 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
     return status == BT_OK ? BT_MEMBER_FINISHED : BT_MEMBER_WAITING;
 }
 
-static void fill(table *t, const bt_study *s, const char *dir, bt_member_records *records)
+static void fill(table *t, const bt_study *study, const char *dir, bt_member_records *records)
 {
-    t->n = bt_study_n_members(s);
+    t->n = bt_study_n_members(study);
     int64_t **numbers[] = {&t->id, &t->condition, &t->repeat, &t->seed, &t->status};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) *numbers[k] = bt_alloc((size_t)t->n, sizeof(int64_t));
     char ***texts[] = {&t->name, &t->hash, &t->reason, &t->hole};
     for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) *texts[k] = bt_alloc((size_t)t->n, sizeof(char *));
     for (int64_t m = 0; m < t->n; m++) {
         bt_member member;
-        bt_study_member(s, m, &member);
+        bt_study_member(study, m, &member);
         char *folder = bt_text_of("%s/members/%s", dir, member.name);
         t->id[m] = m + 1;
         t->condition[m] = member.condition;
@@ -352,24 +352,25 @@ static void release(table *t)
 }
 
 /// What is registered of a number, as attributes.
-static void describe(bt_h5 *h, const char *name, const char *key, int order)
+static void describe(bt_h5 *h5, const char *name, const char *key, int order)
 {
-    const bt_meaning m = bt_summary_meaning(key);
-    bt_h5_attr_text(h, name, "key", key);
-    bt_h5_attr_int(h, name, "order", order);
-    bt_h5_describe(h, name, "member", m.known && *m.units ? m.units : "1", m.known ? m.description : key);
-    if (!strcmp(key, VERDICT)) bt_h5_attr_text(h, name, "meaning", "0 steady, 1 not steady, 2 too short");
-    if (!m.known) return;
+    const bt_meaning meaning = bt_summary_meaning(key);
+    bt_h5_attr_text(h5, name, "key", key);
+    bt_h5_attr_int(h5, name, "order", order);
+    bt_h5_describe(h5, name, "member", meaning.known && *meaning.units ? meaning.units : "1",
+                   meaning.known ? meaning.description : key);
+    if (!strcmp(key, VERDICT)) bt_h5_attr_text(h5, name, "meaning", "0 steady, 1 not steady, 2 too short");
+    if (!meaning.known) return;
     const struct {
         const char *name, *text;
-    } texts[] = {{"estimate", m.estimate},
-                 {"label", m.label},
-                 {"kind", m.kind}};
+    } texts[] = {{"estimate", meaning.estimate},
+                 {"label", meaning.label},
+                 {"kind", meaning.kind}};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
-        if (*texts[i].text) bt_h5_attr_text(h, name, texts[i].name, texts[i].text);
+        if (*texts[i].text) bt_h5_attr_text(h5, name, texts[i].name, texts[i].text);
 }
 
-static void describe_members(bt_h5 *h)
+static void describe_members(bt_h5 *h5)
 {
     static const struct {
         const char *name, *units, *meaning;
@@ -383,11 +384,11 @@ static void describe_members(bt_h5 *h)
                   {"/members/reason", NULL, "why it failed, died or is not sound"},
                   {"/members/hole", NULL, "failed, died, unsound or unreadable"}};
     for (size_t k = 0; k < sizeof columns / sizeof *columns; k++)
-        bt_h5_describe(h, columns[k].name, "member", columns[k].units, columns[k].meaning);
-    bt_h5_attr_text(h, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
+        bt_h5_describe(h5, columns[k].name, "member", columns[k].units, columns[k].meaning);
+    bt_h5_attr_text(h5, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
 }
 
-static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *dir)
+static void write_all(bt_h5 *h5, const table *t, const bt_study *study, const char *dir)
 {
     const hsize_t n = (hsize_t)t->n;
     int64_t finished = 0, failed = 0;
@@ -395,63 +396,63 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
         finished += t->status[m] == BT_MEMBER_FINISHED;
         failed += t->status[m] == BT_MEMBER_FAILED;
     }
-    bt_h5_write(h, "/member", H5T_NATIVE_INT64, n, 0, t->id);
-    bt_h5_describe(h, "/member", "member", "1", "number of the member in the study, from 1");
-    bt_h5_group(h, "/members");
-    bt_h5_write(h, "/members/id", H5T_NATIVE_INT64, n, 0, t->id);
-    bt_h5_write(h, "/members/condition", H5T_NATIVE_INT64, n, 0, t->condition);
-    bt_h5_write(h, "/members/repeat", H5T_NATIVE_INT64, n, 0, t->repeat);
-    bt_h5_write(h, "/members/seed", H5T_NATIVE_INT64, n, 0, t->seed);
-    bt_h5_write(h, "/members/status", H5T_NATIVE_INT64, n, 0, t->status);
-    bt_h5_write_names(h, "/members/name", n, (const char *const *)t->name);
-    bt_h5_write_names(h, "/members/state_hash", n, (const char *const *)t->hash);
-    bt_h5_write_names(h, "/members/reason", n, (const char *const *)t->reason);
-    bt_h5_write_names(h, "/members/hole", n, (const char *const *)t->hole);
-    describe_members(h);
-    bt_h5_group(h, "/parameters");
-    for (int p = 0; p < s->n_parameters; p++) write_parameter(h, s, p, t->n);
-    bt_h5_group(h, "/summary");
+    bt_h5_write(h5, "/member", H5T_NATIVE_INT64, n, 0, t->id);
+    bt_h5_describe(h5, "/member", "member", "1", "number of the member in the study, from 1");
+    bt_h5_group(h5, "/members");
+    bt_h5_write(h5, "/members/id", H5T_NATIVE_INT64, n, 0, t->id);
+    bt_h5_write(h5, "/members/condition", H5T_NATIVE_INT64, n, 0, t->condition);
+    bt_h5_write(h5, "/members/repeat", H5T_NATIVE_INT64, n, 0, t->repeat);
+    bt_h5_write(h5, "/members/seed", H5T_NATIVE_INT64, n, 0, t->seed);
+    bt_h5_write(h5, "/members/status", H5T_NATIVE_INT64, n, 0, t->status);
+    bt_h5_write_names(h5, "/members/name", n, (const char *const *)t->name);
+    bt_h5_write_names(h5, "/members/state_hash", n, (const char *const *)t->hash);
+    bt_h5_write_names(h5, "/members/reason", n, (const char *const *)t->reason);
+    bt_h5_write_names(h5, "/members/hole", n, (const char *const *)t->hole);
+    describe_members(h5);
+    bt_h5_group(h5, "/parameters");
+    for (int p = 0; p < study->n_parameters; p++) write_parameter(h5, study, p, t->n);
+    bt_h5_group(h5, "/summary");
     for (int k = 0; k < t->n_columns; k++) {
         char *name = bt_file_join("/summary", t->column[k].name);
-        bt_h5_write(h, name, H5T_NATIVE_DOUBLE, n, 0, t->column[k].value);
-        describe(h, name, t->column[k].key, k);
+        bt_h5_write(h5, name, H5T_NATIVE_DOUBLE, n, 0, t->column[k].value);
+        describe(h5, name, t->column[k].key, k);
         free(name);
     }
-    write_series(h, t, s, dir);
-    write_events(h, t, dir);
-    bt_member_notes_write(h, &t->warnings, "/warnings", "warning", "code of the warning");
-    bt_member_notes_write(h, &t->reasons, "/reasons", "reason", "code of a reason of the verdict");
-    bt_warning_codes_write(h);
-    bt_h5_write_text(h, "/study", s->text);
-    bt_h5_describe(h, "/study", NULL, NULL, "the study file as it was given");
-    bt_h5_describe_file(h, s->title);
+    write_series(h5, t, study, dir);
+    write_events(h5, t, dir);
+    bt_member_notes_write(h5, &t->warnings, "/warnings", "warning", "code of the warning");
+    bt_member_notes_write(h5, &t->reasons, "/reasons", "reason", "code of a reason of the verdict");
+    bt_warning_codes_write(h5);
+    bt_h5_write_text(h5, "/study", study->text);
+    bt_h5_describe(h5, "/study", NULL, NULL, "the study file as it was given");
+    bt_h5_describe_file(h5, study->title);
     char *path = bt_file_join(dir, "study.resolved.yml"), *resolved;
     size_t size;
     bt_errors unheard = {0};
     if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK)
-        bt_h5_write_text(h, "/study_resolved", resolved),
-            bt_h5_describe(h, "/study_resolved", NULL, NULL, "what the members are, and the base case with every key");
+        bt_h5_write_text(h5, "/study_resolved", resolved),
+            bt_h5_describe(h5, "/study_resolved", NULL, NULL, "what the members are, and the base case with every key");
     bt_errors_free(&unheard);
     free(resolved);
     free(path);
-    bt_h5_attr_text(h, "/", "program", "bergtow " BT_VERSION);
-    bt_h5_attr_int(h, "/", "n_members", t->n);
-    bt_h5_attr_int(h, "/", "n_finished", finished);
-    bt_h5_attr_int(h, "/", "n_failed", failed);
-    bt_h5_attr_int(h, "/", "complete", finished + failed == t->n);
+    bt_h5_attr_text(h5, "/", "program", "bergtow " BT_VERSION);
+    bt_h5_attr_int(h5, "/", "n_members", t->n);
+    bt_h5_attr_int(h5, "/", "n_finished", finished);
+    bt_h5_attr_int(h5, "/", "n_failed", failed);
+    bt_h5_attr_int(h5, "/", "complete", finished + failed == t->n);
 }
 
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_member_notes *warnings,
-                             bt_errors *err)
+bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_records *records,
+                             bt_member_notes *warnings, bt_errors *err)
 {
     table t = {0};
-    fill(&t, s, dir, records);
+    fill(&t, study, dir, records);
     char *path = bt_file_join(dir, "ensemble.h5"), *part = bt_text_of("%s.tmp", path);
-    bt_h5 h;
-    bt_status status = bt_h5_create(&h, part, err);
+    bt_h5 h5;
+    bt_status status = bt_h5_create(&h5, part, err);
     if (status == BT_OK) {
-        write_all(&h, &t, s, dir);
-        status = bt_h5_close(&h);
+        write_all(&h5, &t, study, dir);
+        status = bt_h5_close(&h5);
         if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_ENSEMBLE, err);
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);

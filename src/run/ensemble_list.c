@@ -92,22 +92,22 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
     return status;
 }
 
-bt_status bt_ensemble_prepare_folder(const bt_study *s, const bt_ensemble_options *o, char digest[BT_DIGEST_TEXT],
-                                     bt_errors *err)
+bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_options *options,
+                                     char digest[BT_DIGEST_TEXT], bt_errors *err)
 {
-    char *text = bt_study_resolved(s, err);
+    char *text = bt_study_resolved(study, err);
     if (!text) return BT_ERR_CASE;
-    char *members = bt_file_join(o->dir, "members"), *copy = bt_file_join(o->dir, "study.yml");
+    char *members = bt_file_join(options->dir, "members"), *copy = bt_file_join(options->dir, "study.yml");
     bt_study_files files;
     bt_errors warnings = {0};
     bool old = false;
-    bt_study_files_find(&files, s);
+    bt_study_files_find(&files, study);
     bt_status status = bt_file_make_dir(members, err);
-    const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
+    const int fd = status == BT_OK ? bt_member_open(options->dir, "lock", O_RDWR | O_CREAT) : -1;
     if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
-    if (status == BT_OK) status = keep_resolved(o->dir, text, &old, digest, err);
-    if (status == BT_OK) status = bt_study_files_keep(&files, o->dir, old, &warnings, err);
-    if (status == BT_OK) status = bt_file_write(copy, s->text, err);
+    if (status == BT_OK) status = keep_resolved(options->dir, text, &old, digest, err);
+    if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, &warnings, err);
+    if (status == BT_OK) status = bt_file_write(copy, study->text, err);
     if (fd >= 0) close(fd);
     bt_errors_print(&warnings);
     bt_errors_free(&warnings);
@@ -120,12 +120,12 @@ bt_status bt_ensemble_prepare_folder(const bt_study *s, const bt_ensemble_option
 
 // --- the list --------------------------------------------------------------------------------------------------------
 
-void bt_ensemble_journal(const bt_ensemble *e, const char *event, const bt_member *m, double wall, int code)
+void bt_ensemble_journal(const bt_ensemble *ensemble, const char *event, const bt_member *member, double wall, int code)
 {
-    journal_add(e->o->dir, event, m->name, wall, code);
+    journal_add(ensemble->o->dir, event, member->name, wall, code);
 }
 
-bool bt_entry_is_suspect(const bt_entry *x) { return x->attempts >= BT_SUSPECT_ATTEMPTS; }
+bool bt_entry_is_suspect(const bt_entry *entry) { return entry->attempts >= BT_SUSPECT_ATTEMPTS; }
 
 static int by_turn(const void *a, const void *b)
 {
@@ -137,9 +137,9 @@ static int by_turn(const void *a, const void *b)
     return p->index < q->index ? -1 : 1;
 }
 
-void bt_entry_look(bt_entry *x)
+void bt_entry_look(bt_entry *entry)
 {
-    if (!x->settled) x->settled = bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_WAITING;
+    if (!entry->settled) entry->settled = bt_ensemble_state(entry->folder, NULL, NULL) != BT_MEMBER_WAITING;
 }
 
 // --- soundness -------------------------------------------------------------------------------------------------------
@@ -147,32 +147,33 @@ void bt_entry_look(bt_entry *x)
 enum { SOUND, DAMAGED, UNREADABLE };
 
 /// Check a member that says it has finished. What is damaged is taken away, unless somebody is at it already.
-static int check_member(bt_ensemble *e, bt_entry *x, bt_errors *warnings)
+static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warnings)
 {
     bt_errors why = {0};
-    bt_status status = bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &why);
+    bt_status status = bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &why);
     if (status == BT_ERR_CASE) {
-        const int fd = bt_member_open(x->folder, "lock", O_RDWR | O_CREAT);
+        const int fd = bt_member_open(entry->folder, "lock", O_RDWR | O_CREAT);
         bt_errors again = {0};
         bool busy = false; // with a run of its own, as of `bergtow resume`
         const int run =
-            fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(x->folder, &busy, &again) : -1;
+            fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(entry->folder, &busy, &again) : -1;
         bt_errors_free(&again);
-        if (run < 0 || bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+        if (run < 0 || bt_ensemble_state(entry->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
             bt_errors_free(&why); // another process has found it out, too, or is at it
-        } else if (bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) == BT_OK) {
+        } else if (bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &again) ==
+                   BT_OK) {
             bt_errors_free(&why); // and made it good meanwhile
             status = BT_OK;
         } else {
-            status = bt_member_record_forget(x->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
-            bt_ensemble_journal(e, "unsound", &x->m, 0, (int)status);
+            status = bt_member_record_forget(entry->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
+            bt_ensemble_journal(ensemble, "unsound", &entry->m, 0, (int)status);
         }
         bt_errors_free(&again);
-        bt_lock_drop(x->folder, run);
+        bt_lock_drop(entry->folder, run);
         if (fd >= 0) close(fd);
     }
     for (size_t k = 0; k < why.n && k < 1; k++)
-        bt_errors_add(warnings, "warning: member %s is not sound%s: %s%s", x->m.name,
+        bt_errors_add(warnings, "warning: member %s is not sound%s: %s%s", entry->m.name,
                       status == BT_ERR_CASE ? " and is run again" : ", and stays so", why.text[k],
                       why.n > 1 ? ", ..." : "");
     bt_errors_free(&why);
@@ -186,33 +187,33 @@ static void print_warnings(bt_errors *list)
     if (more) fprintf(stderr, "bergtow: warning: and %zu more members that are not sound; see journal.jsonl\n", more);
 }
 
-void bt_ensemble_share_records(bt_ensemble *e)
+void bt_ensemble_share_records(bt_ensemble *ensemble)
 {
-    bt_comm_reduce(e->world, NULL, 0, NULL, 0, e->records.seen, (int)e->records.n);
+    bt_comm_reduce(ensemble->world, NULL, 0, NULL, 0, ensemble->records.seen, (int)ensemble->records.n);
 }
 
 /// Collective. Every finished member is read once, by one of the ranks; the list is still in the order of the study.
-static void check_members(bt_ensemble *e)
+static void check_members(bt_ensemble *ensemble)
 {
     enum { PER_WORD = 32 }; // two bits each
-    const int n = (int)(e->n / PER_WORD + 1);
+    const int n = (int)(ensemble->n / PER_WORD + 1);
     uint64_t *found = bt_alloc((size_t)n, sizeof *found);
     memset(found, 0, (size_t)n * sizeof *found);
     bt_errors warnings = {0};
-    for (int64_t i = e->world->rank; i < e->n; i += e->world->size) {
-        bt_entry *x = &e->list[i];
-        if (bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) continue;
-        found[i / PER_WORD] |= (uint64_t)check_member(e, x, &warnings) << 2 * (i % PER_WORD);
+    for (int64_t i = ensemble->world->rank; i < ensemble->n; i += ensemble->world->size) {
+        bt_entry *entry = &ensemble->list[i];
+        if (bt_ensemble_state(entry->folder, NULL, NULL) != BT_MEMBER_FINISHED) continue;
+        found[i / PER_WORD] |= (uint64_t)check_member(ensemble, entry, &warnings) << 2 * (i % PER_WORD);
     }
-    bt_comm_reduce(e->world, NULL, 0, NULL, 0, found, n);
-    bt_ensemble_share_records(e);
-    for (int64_t i = 0; i < e->n; i++) {
+    bt_comm_reduce(ensemble->world, NULL, 0, NULL, 0, found, n);
+    bt_ensemble_share_records(ensemble);
+    for (int64_t i = 0; i < ensemble->n; i++) {
         const int how = (int)(found[i / PER_WORD] >> 2 * (i % PER_WORD) & 3);
-        if (how == DAMAGED) e->list[i].settled = false;
-        if (how == UNREADABLE) e->list[i].settled = true; // nothing can be done about it here
+        if (how == DAMAGED) ensemble->list[i].settled = false;
+        if (how == UNREADABLE) ensemble->list[i].settled = true; // nothing can be done about it here
     }
-    bt_comm_errors(e->world, &warnings);
-    if (e->world->rank == 0) print_warnings(&warnings);
+    bt_comm_errors(ensemble->world, &warnings);
+    if (ensemble->world->rank == 0) print_warnings(&warnings);
     bt_errors_free(&warnings);
     free(found);
 }
@@ -226,67 +227,67 @@ static int by_digest(const void *a, const void *b)
 }
 
 /// Which conditions have their ice in common, by that of the first field of each; in the order of the study.
-static void find_shared(bt_ensemble *e, ice_of *ice, int64_t n)
+static void find_shared(bt_ensemble *ensemble, ice_of *ice, int64_t n)
 {
     qsort(ice, (size_t)n, sizeof *ice, by_digest);
     for (int64_t k = 1; k < n; k++) {
         if (by_digest(&ice[k - 1], &ice[k])) continue;
-        for (int64_t r = 0; r < e->s->repeats; r++)
-            e->list[ice[k - 1].member + r].shares = e->list[ice[k].member + r].shares = true;
+        for (int64_t r = 0; r < ensemble->s->repeats; r++)
+            ensemble->list[ice[k - 1].member + r].shares = ensemble->list[ice[k].member + r].shares = true;
     }
-    e->fields = bt_text_of("%s/fields", e->o->dir);
+    ensemble->fields = bt_text_of("%s/fields", ensemble->o->dir);
 }
 
-void bt_ensemble_list(bt_ensemble *e)
+void bt_ensemble_list(bt_ensemble *ensemble)
 {
-    e->n = bt_study_n_members(e->s);
-    e->list = bt_alloc((size_t)e->n, sizeof *e->list);
-    const bool limited = e->o->max_wall > 0;
+    ensemble->n = bt_study_n_members(ensemble->s);
+    ensemble->list = bt_alloc((size_t)ensemble->n, sizeof *ensemble->list);
+    const bool limited = ensemble->o->max_wall > 0;
     double cost = 0;
     bool alike = false;
     int64_t priced = -1, n_ice = 0;
-    ice_of *ice = bt_alloc((size_t)e->s->n_conditions, sizeof *ice);
-    for (int64_t i = 0; i < e->n; i++) {
-        bt_entry *x = &e->list[i];
-        x->index = i;
-        bt_study_member(e->s, i, &x->m);
-        x->folder = bt_text_of("%s/members/%s", e->o->dir, x->m.name);
+    ice_of *ice = bt_alloc((size_t)ensemble->s->n_conditions, sizeof *ice);
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        bt_entry *entry = &ensemble->list[i];
+        entry->index = i;
+        bt_study_member(ensemble->s, i, &entry->m);
+        entry->folder = bt_text_of("%s/members/%s", ensemble->o->dir, entry->m.name);
         // fields of one condition cost the same; a case that cannot be read fails when its turn comes
-        if (x->m.condition != priced) {
-            bt_case c;
+        if (entry->m.condition != priced) {
+            bt_case input;
             bt_errors unheard = {0};
-            priced = x->m.condition;
-            const bool read = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK;
-            cost = read ? bt_cost_seconds(&c) : 0;
-            alike = read && !bt_case_ice_is_random(&c);
-            e->fixed += alike;
+            priced = entry->m.condition;
+            const bool read = bt_member_case(ensemble->s, &entry->m, &input, &unheard) == BT_OK;
+            cost = read ? bt_cost_seconds(&input) : 0;
+            alike = read && !bt_case_ice_is_random(&input);
+            ensemble->fixed += alike;
             if (read) {
-                e->most_floes = bt_max(e->most_floes, bt_case_floes_made(&c) + (double)c.n_floes);
-                bt_field_digest(&c, ice[n_ice].digest);
+                ensemble->most_floes = bt_max(ensemble->most_floes, bt_case_floes_made(&input) + (double)input.n_floes);
+                bt_field_digest(&input, ice[n_ice].digest);
                 ice[n_ice++].member = i;
             }
-            bt_case_free(&c);
+            bt_case_free(&input);
             bt_errors_free(&unheard);
         }
-        x->cost = cost;
-        x->shares = alike && e->s->repeats > 1;
-        x->turn = limited ? x->m.repeat : 0;
-        x->first = limited && e->s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? 0 : cost;
-        x->attempts = bt_member_attempts(x->folder);
-        bt_entry_look(x);
+        entry->cost = cost;
+        entry->shares = alike && ensemble->s->repeats > 1;
+        entry->turn = limited ? entry->m.repeat : 0;
+        entry->first = limited && ensemble->s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? 0 : cost;
+        entry->attempts = bt_member_attempts(entry->folder);
+        bt_entry_look(entry);
     }
-    find_shared(e, ice, n_ice);
+    find_shared(ensemble, ice, n_ice);
     free(ice);
-    check_members(e);
-    qsort(e->list, (size_t)e->n, sizeof *e->list, by_turn);
+    check_members(ensemble);
+    qsort(ensemble->list, (size_t)ensemble->n, sizeof *ensemble->list, by_turn);
 }
 
-void bt_ensemble_count_settled(bt_ensemble *e)
+void bt_ensemble_count_settled(bt_ensemble *ensemble)
 {
-    for (int64_t i = 0; i < e->n; i++) {
-        if (!e->list[i].settled) continue;
-        e->before++;
-        e->cost_before += e->list[i].cost;
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        if (!ensemble->list[i].settled) continue;
+        ensemble->before++;
+        ensemble->cost_before += ensemble->list[i].cost;
     }
 }
 
@@ -295,31 +296,32 @@ void bt_ensemble_count_settled(bt_ensemble *e)
 // What an ensemble prints while it works and at its end.
 
 /// The wall time that is left, s; infinite where none was given.
-double bt_ensemble_wall_left(const bt_ensemble *e)
+double bt_ensemble_wall_left(const bt_ensemble *ensemble)
 {
-    return e->o->max_wall > 0 ? e->o->max_wall - (bt_clock() - e->began) : INFINITY;
+    return ensemble->o->max_wall > 0 ? ensemble->o->max_wall - (bt_clock() - ensemble->began) : INFINITY;
 }
 
-void bt_ensemble_say(const bt_ensemble *e, const bt_entry *x, bt_status status, double wall)
+void bt_ensemble_say(const bt_ensemble *ensemble, const bt_entry *entry, bt_status status, double wall)
 {
-    if (e->o->quiet) return;
+    if (ensemble->o->quiet) return;
     int64_t done = 0;
     double cost = 0, all = 0;
-    for (int64_t i = 0; i < e->n; i++) {
-        bt_entry_look(&e->list[i]);
-        all += e->list[i].cost;
-        if (!e->list[i].settled) continue;
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        bt_entry_look(&ensemble->list[i]);
+        all += ensemble->list[i].cost;
+        if (!ensemble->list[i].settled) continue;
         done++;
-        cost += e->list[i].cost;
+        cost += ensemble->list[i].cost;
     }
-    const double passed = bt_clock() - e->began, spent = cost - e->cost_before,
+    const double passed = bt_clock() - ensemble->began, spent = cost - ensemble->cost_before,
                  left = spent > 0 ? passed * (all - cost) / spent : NAN;
     char line[512];
-    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, e->n, x->m.name,
+    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, ensemble->n, entry->m.name,
                      status == BT_OK ? "finished" : "FAILED", wall);
-    for (int p = 0; p < e->s->n_parameters && n < 400; p++)
-        n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", e->s->parameter[p].name, x->m.value[p]);
-    if (isfinite(left) && done < e->n)
+    for (int p = 0; p < ensemble->s->n_parameters && n < 400; p++)
+        n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", ensemble->s->parameter[p].name,
+                      entry->m.value[p]);
+    if (isfinite(left) && done < ensemble->n)
         snprintf(line + n, sizeof line - (size_t)n, left < 120 ? "; about %.0f s left" : "; about %.0f min left",
                  left < 120 ? left : left / 60);
     printf("%s\n", line);
@@ -331,32 +333,33 @@ typedef struct {
 } counts;
 
 /// One member's part in the end: counted, and reported where it is a hole.
-static bt_status tell_member(bt_ensemble *e, const bt_entry *x, counts *n, bt_errors *err)
+static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, counts *n, bt_errors *err)
 {
     int code;
     char *why;
     bt_errors damage = {0};
     bt_status status = BT_OK;
-    const bt_member_state state = bt_ensemble_state(x->folder, &code, &why);
+    const bt_member_state state = bt_ensemble_state(entry->folder, &code, &why);
     const bt_status sound = state == BT_MEMBER_FINISHED
-                                ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage)
+                                ? bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder,
+                                                         &damage)
                                 : BT_OK;
     if (sound != BT_OK) {
         if (n->unsound++ < BT_MOST_REPORTED)
-            bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0],
+            bt_errors_add(err, "member %s is not sound: %s; %s", entry->m.name, damage.text[0],
                           sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
         status = BT_ERR_IO;
     } else if (state == BT_MEMBER_FINISHED) {
         n->finished++;
-        if (bt_checkpoint_there(x->folder)) bt_checkpoint_remove(x->folder); // killed between the two
+        if (bt_checkpoint_there(entry->folder)) bt_checkpoint_remove(entry->folder); // killed between the two
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
         if (n->failed++ < BT_MOST_REPORTED)
-            bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
+            bt_errors_add(err, "member %s failed (%d): %s", entry->m.name, code, why ? why : "no reason recorded");
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
     } else {
         n->left++;
-        n->at_work += x->busy || bt_member_held(x->folder);
+        n->at_work += entry->busy || bt_member_held(entry->folder);
     }
     free(why);
     bt_errors_free(&damage);
@@ -369,39 +372,39 @@ static int by_index(const void *a, const void *b)
 }
 
 /// What members warn of: of each code the text of the first, and how many others there are.
-static void report_warnings(const bt_ensemble *e)
+static void report_warnings(const bt_ensemble *ensemble)
 {
-    const bt_member_notes *w = &e->warnings;
-    for (int64_t i = 0; i < w->n; i++) {
-        int64_t others = 0, last = w->member[i];
+    const bt_member_notes *notes = &ensemble->warnings;
+    for (int64_t i = 0; i < notes->n; i++) {
+        int64_t others = 0, last = notes->member[i];
         bool first = true;
-        for (int64_t k = 0; k < i && first; k++) first = strcmp(w->code[k], w->code[i]) != 0;
-        for (int64_t k = i + 1; k < w->n && first; k++)
-            if (w->member[k] != last && !strcmp(w->code[k], w->code[i])) others++, last = w->member[k];
+        for (int64_t k = 0; k < i && first; k++) first = strcmp(notes->code[k], notes->code[i]) != 0;
+        for (int64_t k = i + 1; k < notes->n && first; k++)
+            if (notes->member[k] != last && !strcmp(notes->code[k], notes->code[i])) others++, last = notes->member[k];
         if (!first) continue;
-        printf("  warning: %s (%s", w->text[i], e->list[w->member[i] - 1].m.name);
+        printf("  warning: %s (%s", notes->text[i], ensemble->list[notes->member[i] - 1].m.name);
         if (others) printf("; and %" PRId64 " more", others);
         printf(")\n");
     }
 }
 
-bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err)
+bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_errors *err)
 {
     counts n = {0};
     bt_status worst = status;
-    qsort(e->list, (size_t)e->n, sizeof *e->list, by_index);
-    for (int64_t i = 0; i < e->n; i++) {
-        const bt_status of = tell_member(e, &e->list[i], &n, err);
+    qsort(ensemble->list, (size_t)ensemble->n, sizeof *ensemble->list, by_index);
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        const bt_status of = tell_member(ensemble, &ensemble->list[i], &n, err);
         if (worst == BT_OK) worst = of;
     }
     if (n.failed > BT_MOST_REPORTED)
         bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt",
-                      n.failed - BT_MOST_REPORTED, e->o->dir);
+                      n.failed - BT_MOST_REPORTED, ensemble->o->dir);
     if (n.unsound > BT_MOST_REPORTED)
         bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - BT_MOST_REPORTED);
     if (status == BT_ERR_SIGNAL)
         bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " members that are left",
-                      bt_ensemble_wall_left(e) <= 0 ? "the limit of wall time" : "a signal", n.left);
+                      bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left);
     else if (n.at_work)
         bt_errors_add(err,
                       "%" PRId64 " members are being worked on by other processes; the same call takes them in when "
@@ -410,11 +413,11 @@ bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err)
     else if (n.left && worst == BT_OK)
         bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
     if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
-    if (!e->o->quiet) {
+    if (!ensemble->o->quiet) {
         printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
         if (n.unsound) printf(", %" PRId64 " not sound", n.unsound);
-        printf("; %s/ensemble.h5\n", e->o->dir);
-        report_warnings(e);
+        printf("; %s/ensemble.h5\n", ensemble->o->dir);
+        report_warnings(ensemble);
     }
     return worst;
 }

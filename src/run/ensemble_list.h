@@ -73,32 +73,33 @@ typedef struct bt_ensemble {
 } bt_ensemble;
 
 /// A line of journal.jsonl. wall: s, NAN = unknown.
-void bt_ensemble_journal(const bt_ensemble *e, const char *event, const bt_member *m, double wall, int code);
+void bt_ensemble_journal(const bt_ensemble *ensemble, const char *event, const bt_member *member, double wall,
+                         int code);
 
 /// The wall time that is left, s; infinite where none was given.
-double bt_ensemble_wall_left(const bt_ensemble *e);
+double bt_ensemble_wall_left(const bt_ensemble *ensemble);
 
 /// Has its process died so often that it is run alone?
-bool bt_entry_is_suspect(const bt_entry *x);
+bool bt_entry_is_suspect(const bt_entry *entry);
 
 /// Look at the folder of a member whether it has been settled meanwhile.
-void bt_entry_look(bt_entry *x);
+void bt_entry_look(bt_entry *entry);
 
 /// Collective. The members in the order in which they are taken; each that has finished is checked.
-void bt_ensemble_list(bt_ensemble *e);
+void bt_ensemble_list(bt_ensemble *ensemble);
 
 /// What is settled when the work begins.
-void bt_ensemble_count_settled(bt_ensemble *e);
+void bt_ensemble_count_settled(bt_ensemble *ensemble);
 
 /// Collective. Each rank makes what it knows of sound files known to the others, so that none reads them again.
-void bt_ensemble_share_records(bt_ensemble *e);
+void bt_ensemble_share_records(bt_ensemble *ensemble);
 
 /// Print that a member has ended, after `wall` s, and what is left.
-void bt_ensemble_say(const bt_ensemble *e, const bt_entry *x, bt_status status, double wall);
+void bt_ensemble_say(const bt_ensemble *ensemble, const bt_entry *entry, bt_status status, double wall);
 
 /// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no
 /// hole.
-bt_status bt_ensemble_tell_end(bt_ensemble *e, bt_status status, bt_errors *err);
+bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_errors *err);
 
 // --- the journal -----------------------------------------------------------------------------------------------------
 
@@ -114,7 +115,7 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
 
 /// Make the folder with its resolved study and the files that the study names. BT_ERR_CASE: it is of another study, or
 /// a file has changed. digest: of the resolved study that the folder keeps. By one process of a call.
-bt_status bt_ensemble_prepare_folder(const bt_study *s, const bt_ensemble_options *o, char digest[BT_DIGEST_TEXT],
-                                     bt_errors *err);
+bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_options *options,
+                                     char digest[BT_DIGEST_TEXT], bt_errors *err);
 
 #endif

@@ -51,27 +51,27 @@ void bt_member_notes_take(bt_member_notes *notes, int64_t member, const json_t *
     }
 }
 
-static void write_texts(bt_h5 *h, const char *group, const char *name, const char *axis, int64_t n,
+static void write_texts(bt_h5 *h5, const char *group, const char *name, const char *axis, int64_t n,
                         const char *const *texts, const char *meaning)
 {
     char *path = bt_file_join(group, name);
-    bt_h5_write_names(h, path, (hsize_t)n, texts);
-    bt_h5_describe(h, path, axis, NULL, meaning);
+    bt_h5_write_names(h5, path, (hsize_t)n, texts);
+    bt_h5_describe(h5, path, axis, NULL, meaning);
     free(path);
 }
 
-void bt_member_notes_write(bt_h5 *h, const bt_member_notes *notes, const char *group, const char *axis,
+void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *group, const char *axis,
                            const char *what)
 {
     if (notes->n == 0) return;
-    bt_h5_group(h, group);
+    bt_h5_group(h5, group);
     char *path = bt_file_join(group, "member");
-    bt_h5_write(h, path, H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member);
-    bt_h5_describe(h, path, axis, "1", "number of the member in the study, from 1");
+    bt_h5_write(h5, path, H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member);
+    bt_h5_describe(h5, path, axis, "1", "number of the member in the study, from 1");
     free(path);
-    write_texts(h, group, "code", axis, notes->n, (const char *const *)notes->code, what);
-    write_texts(h, group, "text", axis, notes->n, (const char *const *)notes->text, "the same for readers");
-    write_texts(h, group, "values", axis, notes->n, (const char *const *)notes->values, "values in it, as JSON");
+    write_texts(h5, group, "code", axis, notes->n, (const char *const *)notes->code, what);
+    write_texts(h5, group, "text", axis, notes->n, (const char *const *)notes->text, "the same for readers");
+    write_texts(h5, group, "values", axis, notes->n, (const char *const *)notes->values, "values in it, as JSON");
 }
 
 void bt_member_notes_free(bt_member_notes *notes)
@@ -88,16 +88,16 @@ void bt_member_notes_free(bt_member_notes *notes)
     *notes = (bt_member_notes){0};
 }
 
-void bt_warning_codes_write(bt_h5 *h)
+void bt_warning_codes_write(bt_h5 *h5)
 {
     const char *column[2][BT_N_WARNINGS];
     for (int k = 0; k < BT_N_WARNINGS; k++) {
         column[0][k] = bt_warning_rows[k].code;
         column[1][k] = bt_warning_rows[k].meaning;
     }
-    bt_h5_group(h, "/codes");
-    write_texts(h, "/codes", "code", "warning_code", BT_N_WARNINGS, column[0], "codes of warnings and reasons");
-    write_texts(h, "/codes", "meaning", "warning_code", BT_N_WARNINGS, column[1], "what each stands for");
+    bt_h5_group(h5, "/codes");
+    write_texts(h5, "/codes", "code", "warning_code", BT_N_WARNINGS, column[0], "codes of warnings and reasons");
+    write_texts(h5, "/codes", "meaning", "warning_code", BT_N_WARNINGS, column[1], "what each stands for");
 }
 
 // --- its record ------------------------------------------------------------------------------------------------------
@@ -107,17 +107,17 @@ static const char *const files[] = {"summary.json", "result.h5", "case.resolved.
 enum { N_FILES = sizeof files / sizeof *files, MOST_TEXT = 1024 };
 _Static_assert((int)BT_DIGEST_TEXT == (int)BT_CHECKSUM_DIGEST, "the same digest");
 
-void bt_member_records_begin(bt_member_records *r, const bt_study *s, const char study[BT_DIGEST_TEXT])
+void bt_member_records_begin(bt_member_records *records, const bt_study *s, const char study[BT_DIGEST_TEXT])
 {
-    *r = (bt_member_records){.n = bt_study_n_members(s)};
-    memcpy(r->study, study, sizeof r->study);
-    r->seen = bt_alloc((size_t)r->n, sizeof *r->seen);
+    *records = (bt_member_records){.n = bt_study_n_members(s)};
+    memcpy(records->study, study, sizeof records->study);
+    records->seen = bt_alloc((size_t)records->n, sizeof *records->seen);
 }
 
-void bt_member_records_end(bt_member_records *r)
+void bt_member_records_end(bt_member_records *records)
 {
-    free(r->seen);
-    *r = (bt_member_records){0};
+    free(records->seen);
+    *records = (bt_member_records){0};
 }
 
 /// What tells that no file has changed since it was looked at: 0 where one is missing.
@@ -141,10 +141,10 @@ static uint64_t stamp(const char *folder)
 }
 
 /// The record that the files ask for. Errors: BT_ERR_CASE, one is missing; BT_ERR_IO.
-static bt_status make(const bt_member_records *r, const char *name, const char *folder, char text[MOST_TEXT],
+static bt_status make(const bt_member_records *records, const char *name, const char *folder, char text[MOST_TEXT],
                       bt_errors *err)
 {
-    int n = snprintf(text, MOST_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, r->study);
+    int n = snprintf(text, MOST_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, records->study);
     for (int k = 0; k < N_FILES; k++) {
         char *path = bt_file_join(folder, files[k]), digest[BT_CHECKSUM_DIGEST];
         int64_t bytes;
@@ -205,14 +205,15 @@ bool bt_member_is_whole(const char *folder, int64_t n_steps)
     return whole;
 }
 
-bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err)
+bt_status bt_member_record_write(bt_member_records *records, int64_t m, const char *name, const char *folder,
+                                 bt_errors *err)
 {
     char text[MOST_TEXT], *result = bt_file_join(folder, "result.h5"), *path = bt_file_join(folder, RECORD);
     bt_status status = bt_checksum_check(result, BT_CHECKSUM_RESULT, NULL, err);
     if (status == BT_OK) status = check_summary(folder, err);
-    if (status == BT_OK) status = make(r, name, folder, text, err);
+    if (status == BT_OK) status = make(records, name, folder, text, err);
     if (status == BT_OK) status = bt_file_write(path, text, err);
-    if (status == BT_OK) r->seen[m] = stamp(folder);
+    if (status == BT_OK) records->seen[m] = stamp(folder);
     free(path);
     free(result);
     return status == BT_OK ? BT_OK : BT_ERR_IO;
@@ -251,22 +252,23 @@ static void report(const char *folder, const char *kept, const char *wanted, bt_
     if (err->n == 0) bt_errors_add(err, "%s/%s: is damaged", folder, RECORD);
 }
 
-bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err)
+bt_status bt_member_record_check(bt_member_records *records, int64_t m, const char *name, const char *folder,
+                                 bt_errors *err)
 {
     const uint64_t now = stamp(folder);
-    if (now && r->seen[m] == now) return BT_OK;
+    if (now && records->seen[m] == now) return BT_OK;
     char text[MOST_TEXT], digest[BT_CHECKSUM_DIGEST], *path = bt_file_join(folder, RECORD), *kept = NULL;
     size_t size = 0;
     int64_t bytes;
     bt_errors why = {0};
     bt_status status = bt_checksum_digest_file(path, digest, &bytes, &why); // is there one that can be read at all?
     if (status == BT_OK) status = bt_file_read_to(path, "a record", MOST_TEXT, &kept, &size, &why);
-    if (status == BT_OK) status = make(r, name, folder, text, &why);
+    if (status == BT_OK) status = make(records, name, folder, text, &why);
     if (status == BT_OK && (size != strlen(text) || memcmp(kept, text, size))) {
         report(folder, kept, text, &why);
         status = BT_ERR_CASE;
     }
-    r->seen[m] = status == BT_OK ? now : 0;
+    records->seen[m] = status == BT_OK ? now : 0;
     bt_errors_move(err, &why);
     free(kept);
     free(path);

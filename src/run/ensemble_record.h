@@ -41,12 +41,12 @@ typedef struct bt_member_notes {
 /// Take an array of {"code", "text", "values"} of a summary; what is no such array, or entry, is left out.
 void bt_member_notes_take(bt_member_notes *notes, int64_t member, const json_t *array);
 /// group: "/warnings"; axis: name of a row. what: of a member, in words.
-void bt_member_notes_write(bt_h5 *h, const bt_member_notes *notes, const char *group, const char *axis,
+void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *group, const char *axis,
                            const char *what);
 void bt_member_notes_free(bt_member_notes *notes);
 
 /// The meanings of all codes.
-void bt_warning_codes_write(bt_h5 *h);
+void bt_warning_codes_write(bt_h5 *h5);
 
 enum { BT_DIGEST_TEXT = 33 };
 
@@ -58,12 +58,13 @@ typedef struct bt_member_records {
 } bt_member_records;
 
 /// study: digest of DIR/study.resolved.yml.
-void bt_member_records_begin(bt_member_records *r, const bt_study *s, const char study[BT_DIGEST_TEXT]);
-void bt_member_records_end(bt_member_records *r);
+void bt_member_records_begin(bt_member_records *records, const bt_study *s, const char study[BT_DIGEST_TEXT]);
+void bt_member_records_end(bt_member_records *records);
 
 /// Write the record of member m, which has just finished in this folder. Errors: BT_ERR_IO, when its files are not what
 /// a run leaves, or it cannot be written.
-bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err);
+bt_status bt_member_record_write(bt_member_records *records, int64_t m, const char *name, const char *folder,
+                                 bt_errors *err);
 
 /// Summary of the result in a folder; the caller releases it. Errors: BT_ERR_CASE, no JSON; BT_ERR_IO.
 bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err);
@@ -74,14 +75,15 @@ bool bt_member_is_whole(const char *folder, int64_t n_steps);
 /// Do the files fit the record? They are read whole, once: later only when their stamp has changed. Errors:
 /// BT_ERR_CASE, they are missing or damaged; BT_ERR_IO, the system does not let them be read, which says nothing of
 /// them.
-bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err);
+bt_status bt_member_record_check(bt_member_records *records, int64_t m, const char *name, const char *folder,
+                                 bt_errors *err);
 
 /// Take record and files of a member away, so that it is run anew; the caller holds its lock. Errors: BT_ERR_IO.
 bt_status bt_member_record_forget(const char *folder, bt_errors *err);
 
 /// Make DIR/ensemble.h5 from the files of the members that are sound by these records; the caller holds DIR/lock.
 /// warnings: what these members warn of, in place of what it holds. Errors: BT_ERR_IO.
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_member_notes *warnings,
-                             bt_errors *err);
+bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_records *records,
+                             bt_member_notes *warnings, bt_errors *err);
 
 #endif

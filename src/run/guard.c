@@ -29,19 +29,21 @@ typedef struct {
     double dt, duration;            ///< s
 } drivers;
 
-static drivers drivers_of(const bt_case *c)
+static drivers drivers_of(const bt_case *input)
 {
-    const double water = bt_case_fastest_flow(c, true), air = bt_case_fastest_flow(c, false);
-    const bool circles = c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC;
-    double prescribed = bt_max(bt_case_reference_speed(c), bt_max(c->domain.ends_closing, c->domain.sides_closing));
-    if (c->tow.mode != BT_TOW_NONE) prescribed = bt_max(prescribed, c->tow.speed);
+    const double water = bt_case_fastest_flow(input, true), air = bt_case_fastest_flow(input, false);
+    const bool circles = input->water.tilt == BT_TILT_GEOSTROPHIC || input->water.tilt == BT_TILT_DYNAMIC;
+    double prescribed =
+        bt_max(bt_case_reference_speed(input), bt_max(input->domain.ends_closing, input->domain.sides_closing));
+    if (input->tow.mode != BT_TOW_NONE) prescribed = bt_max(prescribed, input->tow.speed);
     return (drivers){
         .prescribed = prescribed,
         .water = circles ? 2 * water : water,
         .wind = air + water,
-        .slope = c->water.tilt == BT_TILT_SLOPE ? BT_GRAVITY * bt_hypot(c->water.slope_x, c->water.slope_y) : 0,
-        .dt = c->run.dt,
-        .duration = c->run.duration,
+        .slope = input->water.tilt == BT_TILT_SLOPE ? BT_GRAVITY * bt_hypot(input->water.slope_x, input->water.slope_y)
+                                                    : 0,
+        .dt = input->run.dt,
+        .duration = input->run.duration,
     };
 }
 
@@ -49,23 +51,25 @@ static drivers drivers_of(const bt_case *c)
 static double ratio(double a, double b) { return a > 0 ? a / b : 0; }
 
 /// v of body i, m/s.
-static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
+static double driven_speed(const drivers *d, const bt_world *world, bt_idx i)
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_drag *k = &b->drag[i];
+    const bt_bodies *bodies = &world->bodies;
+    const bt_drag *drag = &bodies->drag[i];
     bt_load load;
-    bt_forces_load(w, i, &b->vel[i], &load);
-    const double pushed = d->slope + bt_hypot(load.fx, load.fy) / b->mass[i],
+    bt_forces_load(world, i, &bodies->vel[i], &load);
+    const double pushed = d->slope + bt_hypot(load.fx, load.fy) / bodies->mass[i],
                  drawn = ratio(bt_hypot(load.jx, load.jy), load.g);
-    const double mass = b->mass[i], width = 2 * b->radius[i];
+    const double mass = bodies->mass[i], width = 2 * bodies->radius[i];
     // at worst the lee of others takes all form drag of the water, and none of the wind
-    const double form = w->par.lee > 0 && k->water_skin > 0 && b->gid[i] != w->towed ? 0 : k->water_form;
-    const double alpha = form > 0 || k->water_form == 0
-                             ? sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)))
-                             : sqrt(ratio(k->air_skin + k->air_form * width, k->water_skin));
-    const double share = bt_max(alpha, d->dt * (k->air_skin + k->air_form * width) * d->wind / mass);
+    const double form = world->par.lee > 0 && drag->water_skin > 0 && bodies->gid[i] != world->towed
+                        ? 0 : drag->water_form;
+    const double alpha = form > 0 || drag->water_form == 0
+                             ? sqrt(bt_max(ratio(drag->air_skin, drag->water_skin),
+                                           ratio(drag->air_form, drag->water_form)))
+                             : sqrt(ratio(drag->air_skin + drag->air_form * width, drag->water_skin));
+    const double share = bt_max(alpha, d->dt * (drag->air_skin + drag->air_form * width) * d->wind / mass);
     const double wind = share <= 1 ? d->wind * share / (1 + share) : d->wind;
-    const double terminal = sqrt(ratio(mass * pushed, k->water_skin + form * b->area[i] / width));
+    const double terminal = sqrt(ratio(mass * pushed, drag->water_skin + form * bodies->area[i] / width));
     const double push = bt_min(pushed * d->duration, bt_max(pushed * d->dt, terminal));
     return bt_max(d->prescribed, d->water + wind + push + drawn);
 }
@@ -76,46 +80,47 @@ static double energy_of(double mass, double inertia, double vx, double vy, doubl
 }
 
 /// E_0 + Σ ½ M v². Of a run that goes on, too, E_0 is that of time zero.
-static double driven_energy(const bt_case *c, const bt_world *w, const bt_roster *r)
+static double driven_energy(const bt_case *input, const bt_world *world, const bt_roster *roster)
 {
-    const drivers d = drivers_of(c);
-    const bt_bodies *b = &w->bodies;
-    bt_totals t = {.n_sums = 1};
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] != BT_DYNAMIC || !bt_domain_owns(w, i)) continue;
+    const drivers d = drivers_of(input);
+    const bt_bodies *bodies = &world->bodies;
+    bt_totals totals = {.n_sums = 1};
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (bodies->motion[i] != BT_DYNAMIC || !bt_domain_owns(world, i)) continue;
         double start = 0;
-        const bt_gid by_hand = bt_roster_row(r, b->gid[i]) - r->n_free;
+        const bt_gid by_hand = bt_roster_row(roster, bodies->gid[i]) - roster->n_free;
         // A velocity that is not given is that of free drift, below the driven speed.
-        if (b->gid[i] == w->towed)
-            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy),
-                              c->body.yaw_rate);
-        else if (by_hand >= 0 && by_hand < c->n_floes)
-            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx),
-                              bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
-        bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, w, i), 0, 0)) / UNIT);
+        if (bodies->gid[i] == world->towed)
+            start = energy_of(bodies->mass[i], bodies->inertia[i], bt_case_start(input->body.vx),
+                              bt_case_start(input->body.vy), input->body.yaw_rate);
+        else if (by_hand >= 0 && by_hand < input->n_floes)
+            start = energy_of(bodies->mass[i], bodies->inertia[i], bt_case_start(input->floes[by_hand].vx),
+                              bt_case_start(input->floes[by_hand].vy), input->floes[by_hand].yaw_rate);
+        bt_sum_add(&totals.sum[0], (start + energy_of(bodies->mass[i], 0, driven_speed(&d, world, i), 0, 0)) / UNIT);
     }
-    bt_domain_reduce(w, &t);
-    return UNIT * bt_sum_value(&t.sum[0]);
+    bt_domain_reduce(world, &totals);
+    return UNIT * bt_sum_value(&totals.sum[0]);
 }
 
-void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, const bt_roster *r)
+void bt_guard_begin(bt_guard *guard, const bt_case *input, const bt_world *world, const bt_roster *roster)
 {
-    *g = (bt_guard){
-        .overlap = c->guard.overlap * r->mean_size,
-        .energy = c->guard.energy * driven_energy(c, w, r),
-        .unconverged = c->guard.unconverged,
-        .most_locked = c->guard.no_solution > 0 ? (int64_t)(c->guard.no_solution * (double)bt_case_steps(c)) : -1,
-        .escape_x = c->guard.escape && c->domain.ends == BT_BOUND_WALL,
-        .escape_y = c->guard.escape && c->domain.sides == BT_BOUND_WALL,
-        .open_x = c->domain.ends == BT_BOUND_OPEN,
-        .open_y = c->domain.sides == BT_BOUND_OPEN,
-        .low = {c->domain.x0, c->domain.y0},
-        .high = {c->domain.x0 + c->domain.length, c->domain.y0 + c->domain.width},
-        .closing = {c->domain.ends_closing, c->domain.sides_closing},
-        .n_floes = r->n_floes + r->n_kept,
-        .size = r->mean_size,
-        .in_a_row = g->in_a_row,
-        .locked = g->locked,
+    *guard = (bt_guard){
+        .overlap = input->guard.overlap * roster->mean_size,
+        .energy = input->guard.energy * driven_energy(input, world, roster),
+        .unconverged = input->guard.unconverged,
+        .most_locked = input->guard.no_solution > 0 ? (int64_t)(input->guard.no_solution * (double)bt_case_steps(input))
+                                                    : -1,
+        .escape_x = input->guard.escape && input->domain.ends == BT_BOUND_WALL,
+        .escape_y = input->guard.escape && input->domain.sides == BT_BOUND_WALL,
+        .open_x = input->domain.ends == BT_BOUND_OPEN,
+        .open_y = input->domain.sides == BT_BOUND_OPEN,
+        .low = {input->domain.x0, input->domain.y0},
+        .high = {input->domain.x0 + input->domain.length, input->domain.y0 + input->domain.width},
+        .closing = {input->domain.ends_closing, input->domain.sides_closing},
+        .n_floes = roster->n_floes + roster->n_kept,
+        .size = roster->mean_size,
+        .in_a_row = guard->in_a_row,
+        .locked = guard->locked,
         .broken = -1,
         .gone = -1,
     };
@@ -126,171 +131,178 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, const bt_r
 /// The domain of now, m.
 typedef struct { double low[2], high[2]; bool wall[2], open[2]; double depth; } range;
 
-static range range_of(const bt_guard *g, const bt_world *w)
+static range range_of(const bt_guard *guard, const bt_world *world)
 {
-    const double time = (double)w->step * w->par.dt;
-    range r = {.wall = {g->escape_x, g->escape_y}, .open = {g->open_x, g->open_y}, .depth = WALL_SIZES * w->par.size};
+    const double time = (double)world->step * world->par.dt;
+    range limits = {.wall = {guard->escape_x, guard->escape_y}, .open = {guard->open_x, guard->open_y},
+                    .depth = WALL_SIZES * world->par.size};
     for (int k = 0; k < 2; k++) {
-        r.low[k] = g->low[k] + g->closing[k] * time;
-        r.high[k] = g->high[k] - g->closing[k] * time;
+        limits.low[k] = guard->low[k] + guard->closing[k] * time;
+        limits.high[k] = guard->high[k] - guard->closing[k] * time;
     }
-    return r;
+    return limits;
 }
 
 /// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them
 /// only where they stand.
-static bool beyond(const range *r, double x, double y)
+static bool beyond(const range *limits, double x, double y)
 {
-    if (x >= r->low[0] && x <= r->high[0] && y >= r->low[1] && y <= r->high[1]) return false;
-    const double out[2] = {bt_max(r->low[0] - x, x - r->high[0]), bt_max(r->low[1] - y, y - r->high[1])};
+    if (x >= limits->low[0] && x <= limits->high[0] && y >= limits->low[1] && y <= limits->high[1]) return false;
+    const double out[2] =
+        {bt_max(limits->low[0] - x, x - limits->high[0]), bt_max(limits->low[1] - y, y - limits->high[1])};
     for (int k = 0; k < 2; k++)
-        if (r->wall[k] && out[k] > 0 && (!r->open[1 - k] || (out[1 - k] <= 0 && out[k] <= r->depth))) return true;
+        if (limits->wall[k] && out[k] > 0 && (!limits->open[1 - k] || (out[1 - k] <= 0 && out[k] <= limits->depth)))
+            return true;
     return false;
 }
 
 /// The highest ids among the bodies of cell k into the maxima: what is broken, what is gone.
-static void look_at(const bt_world *w, bt_idx k, const range *r, bt_totals *t)
+static void look_at(const bt_world *world, bt_idx k, const range *limits, bt_totals *totals)
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_cell *cell = &w->cells->cell[k];
+    const bt_bodies *bodies = &world->bodies;
+    const bt_cell *cell = &world->cells->cell[k];
     if (!cell->own) return;
     for (bt_idx i = 0; i < cell->laws.n_memory; i++) {
-        const bt_memory *m = &cell->laws.memory[i];
-        if (!isfinite(m->value[0] + m->value[1] + m->value[2] + m->value[3])) t->most = bt_max(t->most, (double)m->a);
+        const bt_memory *memory = &cell->laws.memory[i];
+        if (!isfinite(memory->value[0] + memory->value[1] + memory->value[2] + memory->value[3]))
+            totals->most = bt_max(totals->most, (double)memory->a);
     }
     for (bt_idx i = cell->first; i < cell->end; i++) {
-        const bt_pose *p = &b->pose[i];
-        const bt_vel *v = &b->vel[i];
-        if (!isfinite(p->x + p->y + p->yaw + v->x + v->y + v->w)) t->most = bt_max(t->most, (double)b->gid[i]);
-        else if (b->motion[i] == BT_DYNAMIC && beyond(r, p->x, p->y)) t->most2 = bt_max(t->most2, (double)b->gid[i]);
+        const bt_pose *pose = &bodies->pose[i];
+        const bt_vel *v = &bodies->vel[i];
+        if (!isfinite(pose->x + pose->y + pose->yaw + v->x + v->y + v->w))
+            totals->most = bt_max(totals->most, (double)bodies->gid[i]);
+        else if (bodies->motion[i] == BT_DYNAMIC && beyond(limits, pose->x, pose->y))
+            totals->most2 = bt_max(totals->most2, (double)bodies->gid[i]);
     }
 }
 
 /// As in the step: what drifts with water at rest has not moved. BT_ASLEEP_NEW has, and has come to rest in it.
-static void look_at_moved(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void look_at_moved(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    const bt_cells *ts = w->cells;
-    if (k == ts->n - 1 || ts->asleep[k] != BT_ASLEEP || ts->awake[k] || !ts->still) look_at(w, k, context, t);
+    const bt_cells *ts = world->cells;
+    if (k == ts->n - 1 || ts->asleep[k] != BT_ASLEEP || ts->awake[k] || !ts->still) look_at(world, k, context, totals);
 }
 
-static bool look_at_bodies(bt_guard *g, bt_world *w, bool all)
+static bool look_at_bodies(bt_guard *guard, bt_world *world, bool all)
 {
-    const range r = range_of(g, w);
-    bt_totals t = {.most = -1, .most2 = -1};
-    if (!all) bt_phases_busy(w, look_at_moved, &r, &t);
-    for (bt_idx k = 0; all && k < w->cells->n; k++) look_at(w, k, &r, &t);
-    g->broken = t.most;
-    g->gone = t.most2;
-    return t.most < 0 && t.most2 < 0;
+    const range limits = range_of(guard, world);
+    bt_totals totals = {.most = -1, .most2 = -1};
+    if (!all) bt_phases_busy(world, look_at_moved, &limits, &totals);
+    for (bt_idx k = 0; all && k < world->cells->n; k++) look_at(world, k, &limits, &totals);
+    guard->broken = totals.most;
+    guard->gone = totals.most2;
+    return totals.most < 0 && totals.most2 < 0;
 }
 
-static void body_name(const bt_guard *g, const bt_world *w, bt_gid gid, char out[40])
+static void body_name(const bt_guard *guard, const bt_world *world, bt_gid gid, char out[40])
 {
-    if (gid < g->n_floes) snprintf(out, 40, "floe %" PRId64, gid);
-    else snprintf(out, 40, gid == w->towed ? "the towed body" : "body %" PRId64, gid);
+    if (gid < guard->n_floes) snprintf(out, 40, "floe %" PRId64, gid);
+    else snprintf(out, 40, gid == world->towed ? "the towed body" : "body %" PRId64, gid);
 }
 
-void bt_guard_name(const bt_guard *g, const bt_world *w, bt_errors *err)
+void bt_guard_name(const bt_guard *guard, const bt_world *world, bt_errors *err)
 {
     char name[40];
-    double found[2] = {g->broken, g->gone};
-    bt_domain_maxima(w, found, 2);
+    double found[2] = {guard->broken, guard->gone};
+    bt_domain_maxima(world, found, 2);
     if (found[0] >= 0) {
-        body_name(g, w, (bt_gid)found[0], name);
+        body_name(guard, world, (bt_gid)found[0], name);
         bt_errors_add(err,
                       "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law remembers "
                       "one of it; take a smaller run.dt, and check the law, and masses, stiffness and speeds of the "
                       "case",
-                      w->step, name);
+                      world->step, name);
     }
     if (found[1] >= 0) {
-        body_name(g, w, (bt_gid)found[1], name);
+        body_name(guard, world, (bt_gid)found[1], name);
         bt_errors_add(err,
                       "step %" PRId64 ": %s is beyond a wall (guard.escape); "
                       "take a smaller run.dt, or more solver.max_sweeps",
-                      w->step, name);
+                      world->step, name);
     }
 }
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
 
-static bool numbers_of_state(const bt_world *w, bt_errors *err)
+static bool numbers_of_state(const bt_world *world, bt_errors *err)
 {
     char buffer[64];
-    const char *name = bt_state_not_finite(w, buffer);
+    const char *name = bt_state_not_finite(world, buffer);
     if (name) bt_errors_add(err,
                             "step %" PRId64 ": %s of the state is not a number; "
                             "take a smaller run.dt, and check masses, stiffness and speeds of the case",
-                            w->step, name);
+                            world->step, name);
     return !name;
 }
 
-static bool numbers_of_sample(const bt_world *w, const bt_sample *s, bt_errors *err)
+static bool numbers_of_sample(const bt_world *world, const bt_sample *sample, bt_errors *err)
 {
-    const bt_quantity *f = bt_sample_fault(s, bt_observe_applies(w));
-    if (!f) return true;
-    const double x = bt_sample_value(s, f);
+    const bt_quantity *quantity = bt_sample_fault(sample, bt_observe_applies(world));
+    if (!quantity) return true;
+    const double x = bt_sample_value(sample, quantity);
     bt_errors_add(err,
                   "step %" PRId64 ": %s (%s) is %s; "
                   "take a smaller run.dt, and check masses, stiffness and speeds of the case",
-                  w->step, f->name, f->description,
+                  world->step, quantity->name, quantity->description,
                   isnan(x)                   ? "not a number, or came from some too large to be summed up"
                   : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure"
                                              : "beyond all numbers of a run");
     return false;
 }
 
-static bool overlap_within(const bt_guard *g, const bt_world *w, double overlap, bt_errors *err)
+static bool overlap_within(const bt_guard *guard, const bt_world *world, double overlap, bt_errors *err)
 {
-    if (!(g->overlap > 0) || overlap <= g->overlap) return true;
+    if (!(guard->overlap > 0) || overlap <= guard->overlap) return true;
     bt_errors_add(err,
                   "step %" PRId64 ": two bodies overlap by %.4g m, %.3g of the mean floe size (guard.overlap %.3g); "
                   "take a smaller run.dt, or more solver.max_sweeps and solver.position_sweeps",
-                  w->step, overlap, overlap / g->size, g->overlap / g->size);
+                  world->step, overlap, overlap / guard->size, guard->overlap / guard->size);
     return false;
 }
 
-bt_status bt_guard_check(bt_guard *g, bt_world *w, const bt_sample *s, bt_errors *err)
+bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *sample, bt_errors *err)
 {
-    bool sound = look_at_bodies(g, w, false);
-    sound = numbers_of_state(w, err) && sound;
-    sound = numbers_of_sample(w, s, err) && sound;
-    sound = overlap_within(g, w, s->overlap, err) && sound;
-    g->in_a_row = s->unconverged == 0 ? 0 : g->in_a_row + 1;
-    if (g->energy > 0 && s->kinetic_energy > g->energy) {
+    bool sound = look_at_bodies(guard, world, false);
+    sound = numbers_of_state(world, err) && sound;
+    sound = numbers_of_sample(world, sample, err) && sound;
+    sound = overlap_within(guard, world, sample->overlap, err) && sound;
+    guard->in_a_row = sample->unconverged == 0 ? 0 : guard->in_a_row + 1;
+    if (guard->energy > 0 && sample->kinetic_energy > guard->energy) {
         sound = false;
         bt_errors_add(err,
                       "step %" PRId64
                       ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
                       "take a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
-                      w->step, s->kinetic_energy, g->energy);
+                      world->step, sample->kinetic_energy, guard->energy);
     }
-    if (g->unconverged > 0 && g->in_a_row >= g->unconverged) {
+    if (guard->unconverged > 0 && guard->in_a_row >= guard->unconverged) {
         sound = false;
         bt_errors_add(
             err,
             "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
             "%s",
-            w->step, g->in_a_row,
-            s->locked != 0 ? "in the last, bodies are locked between others that give way to nothing: " BT_LOCKED_REMEDY
-                           : "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
-                             "where ice jams");
+            world->step, guard->in_a_row,
+            sample->locked != 0
+            ? "in the last, bodies are locked between others that give way to nothing: " BT_LOCKED_REMEDY
+                                : "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
+                                  "where ice jams");
     }
-    g->locked += s->locked != 0;
-    if (g->most_locked >= 0 && g->locked > g->most_locked) {
+    guard->locked += sample->locked != 0;
+    if (guard->most_locked >= 0 && guard->locked > guard->most_locked) {
         sound = false;
         bt_errors_add(err,
                       "step %" PRId64 ": %" PRId64 " steps have no solution, since bodies are locked between others "
                       "that give way to nothing, and guard.no_solution allows %" PRId64 ": " BT_LOCKED_REMEDY,
-                      w->step, g->locked, g->most_locked);
+                      world->step, guard->locked, guard->most_locked);
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }
 
-bt_status bt_guard_check_end(bt_guard *g, bt_world *w, double overlap, bt_errors *err)
+bt_status bt_guard_check_end(bt_guard *guard, bt_world *world, double overlap, bt_errors *err)
 {
-    bool sound = look_at_bodies(g, w, true);
-    sound = numbers_of_state(w, err) && sound;
-    sound = overlap_within(g, w, overlap, err) && sound;
+    bool sound = look_at_bodies(guard, world, true);
+    sound = numbers_of_state(world, err) && sound;
+    sound = overlap_within(guard, world, overlap, err) && sound;
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }

@@ -62,16 +62,16 @@ typedef struct bt_guard {
 } bt_guard;
 
 /// Collective. Limits for the world of a case, all of whose bodies have been distributed.
-void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, const bt_roster *r);
+void bt_guard_begin(bt_guard *guard, const bt_case *input, const bt_world *world, const bt_roster *roster);
 
-/// After a step, whose sample is s. Not collective: ranks agree on the status, and then call bt_guard_name. Errors:
-/// BT_ERR_NUMERIC.
-bt_status bt_guard_check(bt_guard *g, bt_world *w, const bt_sample *s, bt_errors *err);
+/// After a step, whose sample is `sample`. Not collective: ranks agree on the status, and then call bt_guard_name.
+/// Errors: BT_ERR_NUMERIC.
+bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *sample, bt_errors *err);
 
 /// The same for the state after the last step: every body, and the deepest overlap there, m.
-bt_status bt_guard_check_end(bt_guard *g, bt_world *w, double overlap, bt_errors *err);
+bt_status bt_guard_check_end(bt_guard *guard, bt_world *world, double overlap, bt_errors *err);
 
 /// Collective, where some rank has found a fault: name the body, if it was one, on all ranks.
-void bt_guard_name(const bt_guard *g, const bt_world *w, bt_errors *err);
+void bt_guard_name(const bt_guard *guard, const bt_world *world, bt_errors *err);
 
 #endif

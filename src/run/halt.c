@@ -47,55 +47,55 @@ void bt_halt_let_go(const struct sigaction before[BT_N_CAUGHT])
     for (int k = 0; k < BT_N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
 }
 
-void bt_halt_begin(bt_halt *h)
+void bt_halt_begin(bt_halt *halt)
 {
-    h->last = bt_clock();
-    h->looked = 0;
-    if (!h->deaf && users++ == 0) {
+    halt->last = bt_clock();
+    halt->looked = 0;
+    if (!halt->deaf && users++ == 0) {
         stop_signal = 0;
         bt_halt_catch(on_stop, on_save, before_all);
     }
-    h->saves_seen = saves_asked;
+    halt->saves_seen = saves_asked;
 }
 
-void bt_halt_end(bt_halt *h)
+void bt_halt_end(bt_halt *halt)
 {
-    if (h->deaf) return;
-    if (h->stop_signal && stop_signal) *h->stop_signal = stop_signal;
+    if (halt->deaf) return;
+    if (halt->stop_signal && stop_signal) *halt->stop_signal = stop_signal;
     if (--users == 0) bt_halt_let_go(before_all);
 }
 
-uint64_t bt_halt_look(bt_halt *h, int64_t step)
+uint64_t bt_halt_look(bt_halt *halt, int64_t step)
 {
     uint64_t bits = 0;
-    if (!h->deaf && stop_signal) bits |= UINT64_C(1) << stop_signal;
-    else if (h->stop_signal && *h->stop_signal) bits |= UINT64_C(1) << *h->stop_signal;
-    if (!h->deaf && h->saves_seen != saves_asked) {
-        h->saves_seen = saves_asked;
+    if (!halt->deaf && stop_signal) bits |= UINT64_C(1) << stop_signal;
+    else if (halt->stop_signal && *halt->stop_signal) bits |= UINT64_C(1) << *halt->stop_signal;
+    if (!halt->deaf && halt->saves_seen != saves_asked) {
+        halt->saves_seen = saves_asked;
         bits |= save;
     }
-    if (!h->first) return bits;
+    if (!halt->first) return bits;
     const double now = bt_clock();
-    if (h->steps > 0 && step % h->steps == 0) bits |= save;
-    if (h->wall > 0 && now - h->last >= h->wall) bits |= save;
-    if (h->max_wall > 0 && now - h->started >= h->max_wall) bits |= by_clock;
-    if (h->dir && now - h->looked >= LOOK_SECONDS) {
-        h->looked = now;
-        if (bt_file_there(h->dir, STOP_FILE)) bits |= by_file;
+    if (halt->steps > 0 && step % halt->steps == 0) bits |= save;
+    if (halt->wall > 0 && now - halt->last >= halt->wall) bits |= save;
+    if (halt->max_wall > 0 && now - halt->started >= halt->max_wall) bits |= by_clock;
+    if (halt->dir && now - halt->looked >= LOOK_SECONDS) {
+        halt->looked = now;
+        if (bt_file_there(halt->dir, STOP_FILE)) bits |= by_file;
     }
     return bits;
 }
 
-void bt_halt_saved(bt_halt *h) { h->last = bt_clock(); }
+void bt_halt_saved(bt_halt *halt) { halt->last = bt_clock(); }
 
-void bt_halt_describe(const bt_halt *h, uint64_t bits, int64_t step, char out[96])
+void bt_halt_describe(const bt_halt *halt, uint64_t bits, int64_t step, char out[96])
 {
     const uint64_t signals = bits & (by_file - 2);
     if (signals) snprintf(out, 96, "signal %d after step %" PRId64, __builtin_ctzll(signals), step);
     else if (bits & by_file) snprintf(out, 96, "the file %s after step %" PRId64, STOP_FILE, step);
-    else snprintf(out, 96, "the limit of %g s of wall time after step %" PRId64, h->max_wall, step);
-    if (!(bits & by_file) || !h->first) return;
-    char *path = bt_file_join(h->dir, STOP_FILE);
+    else snprintf(out, 96, "the limit of %g s of wall time after step %" PRId64, halt->max_wall, step);
+    if (!(bits & by_file) || !halt->first) return;
+    char *path = bt_file_join(halt->dir, STOP_FILE);
     unlink(path);
     free(path);
 }

@@ -35,20 +35,20 @@ typedef struct bt_halt {
 
 /// From here on signals are kept for the next look; bt_halt_end of the last of several brings back the handlers of
 /// before the first.
-void bt_halt_begin(bt_halt *h);
-void bt_halt_end(bt_halt *h);
+void bt_halt_begin(bt_halt *halt);
+void bt_halt_end(bt_halt *halt);
 
 /// What this rank knows after a step, as bits. Bit 0 is never set.
-uint64_t bt_halt_look(bt_halt *h, int64_t step);
+uint64_t bt_halt_look(bt_halt *halt, int64_t step);
 
 static inline bool bt_halt_stops(uint64_t bits) { return (bits & ((UINT64_C(1) << 50) - 2)) != 0; }
 static inline bool bt_halt_saves(uint64_t bits) { return bits >> 50 != 0; }
 
 /// A checkpoint has been written.
-void bt_halt_saved(bt_halt *h);
+void bt_halt_saved(bt_halt *halt);
 
 /// Why the run stops after this step, in words; removes the stop file (rank 0).
-void bt_halt_describe(const bt_halt *h, uint64_t bits, int64_t step, char out[96]);
+void bt_halt_describe(const bt_halt *halt, uint64_t bits, int64_t step, char out[96]);
 
 /// Catch the signals that ask for a stop, and the one that asks for a checkpoint (NULL: not that one); before: for
 /// bt_halt_let_go.

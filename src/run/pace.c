@@ -18,57 +18,57 @@ static const double gain = 1.1;    // more threads are to do this much more, and
 static const double less = 0.97;
 static const double shortest = 1, longest = 16; // s between trials
 
-void bt_pace_begin(bt_pace *p, int threads, bool varies)
+void bt_pace_begin(bt_pace *pace, int threads, bool varies)
 {
-    *p = (bt_pace){.most = threads, .now = threads, .fewer = true, .due = window, .pause = shortest};
-    if (!varies) p->most = 1;
+    *pace = (bt_pace){.most = threads, .now = threads, .fewer = true, .due = window, .pause = shortest};
+    if (!varies) pace->most = 1;
 }
 
 /// Threads of a trial in the direction that is next; as many as now where there is none.
-static int trial(const bt_pace *p, double use)
+static int trial(const bt_pace *pace, double use)
 {
-    if (p->fewer) return use < busy ? (p->now + 1) / 2 : p->now;
-    return 2 * p->now < p->most ? 2 * p->now : p->most;
+    if (pace->fewer) return use < busy ? (pace->now + 1) / 2 : pace->now;
+    return 2 * pace->now < pace->most ? 2 * pace->now : pace->most;
 }
 
-static void end_trial(bt_pace *p, double rate)
+static void end_trial(bt_pace *pace, double rate)
 {
-    if (rate > (p->fewer ? less : gain) * p->rate) {
-        p->pause = shortest;
+    if (rate > (pace->fewer ? less : gain) * pace->rate) {
+        pace->pause = shortest;
     } else {
-        p->now = p->from;
-        p->fewer = !p->fewer;
-        if (p->pause < longest) p->pause *= 2;
+        pace->now = pace->from;
+        pace->fewer = !pace->fewer;
+        if (pace->pause < longest) pace->pause *= 2;
     }
-    p->from = 0;
-    p->due = p->pause;
+    pace->from = 0;
+    pace->due = pace->pause;
 }
 
-static void begin_trial(bt_pace *p, double rate, double use)
+static void begin_trial(bt_pace *pace, double rate, double use)
 {
-    int n = trial(p, use);
-    if (n == p->now) {
-        p->fewer = !p->fewer;
-        n = trial(p, use);
+    int n = trial(pace, use);
+    if (n == pace->now) {
+        pace->fewer = !pace->fewer;
+        n = trial(pace, use);
     }
-    p->due = p->pause;
-    if (n == p->now) return;
-    p->from = p->now;
-    p->rate = rate;
-    p->now = n;
+    pace->due = pace->pause;
+    if (n == pace->now) return;
+    pace->from = pace->now;
+    pace->rate = rate;
+    pace->now = n;
 }
 
-int bt_pace_step(bt_pace *p, double wall, double cpu, double work)
+int bt_pace_step(bt_pace *pace, double wall, double cpu, double work)
 {
-    if (p->most < 2) return p->now;
-    p->wall += wall;
-    p->cpu += cpu;
-    p->work += work;
-    if (p->wall < window || p->work == 0) return p->now;
-    const double rate = p->work / p->wall, use = p->cpu / (p->wall * p->now);
-    p->due -= p->wall;
-    p->wall = p->cpu = p->work = 0;
-    if (p->from) end_trial(p, rate);
-    else if (p->due <= 0) begin_trial(p, rate, use);
-    return p->now;
+    if (pace->most < 2) return pace->now;
+    pace->wall += wall;
+    pace->cpu += cpu;
+    pace->work += work;
+    if (pace->wall < window || pace->work == 0) return pace->now;
+    const double rate = pace->work / pace->wall, use = pace->cpu / (pace->wall * pace->now);
+    pace->due -= pace->wall;
+    pace->wall = pace->cpu = pace->work = 0;
+    if (pace->from) end_trial(pace, rate);
+    else if (pace->due <= 0) begin_trial(pace, rate, use);
+    return pace->now;
 }

@@ -15,10 +15,10 @@ typedef struct bt_pace {
 } bt_pace;
 
 /// varies: false keeps to `threads`.
-void bt_pace_begin(bt_pace *p, int threads, bool varies);
+void bt_pace_begin(bt_pace *pace, int threads, bool varies);
 
 /// After a step: its wall time and the processor time of all threads in it, s, and its work in any unit. Returns the
 /// threads of the next step.
-int bt_pace_step(bt_pace *p, double wall, double cpu, double work);
+int bt_pace_step(bt_pace *pace, double wall, double cpu, double work);
 
 #endif

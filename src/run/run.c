@@ -21,36 +21,37 @@
 // killed before its first.
 
 /// What the user should know of the checkpoint that is taken.
-static void report(const bt_snapshot *s, const char *said)
+static void report(const bt_snapshot *snap, const char *said)
 {
     bt_errors warnings = {0};
     if (said) bt_errors_add(&warnings, "warning: %s", said);
-    const bt_item *i = bt_snapshot_find(s, "about/revision");
-    if (i && i->type == BT_ITEM_TEXT && strcmp(i->data, BT_REVISION))
+    const bt_item *item = bt_snapshot_find(snap, "about/revision");
+    if (item && item->type == BT_ITEM_TEXT && strcmp(item->data, BT_REVISION))
         bt_errors_add(&warnings,
                       "warning: %s was written by revision %s of the program, and this is %s: the run may go on "
                       "otherwise than it would have",
-                      s->path, (const char *)i->data, BT_REVISION);
+                      snap->path, (const char *)item->data, BT_REVISION);
     bt_errors_print(&warnings);
     bt_errors_free(&warnings);
 }
 
 /// Rank 0. The folder is ours, and what it holds is read; but for the case.
-static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *err)
+static bt_status open_folder(bt_resume *resume, const bt_run_options *options, bt_errors *err)
 {
-    if (!bt_file_there(o->dir, ".")) {
-        bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", o->dir);
+    if (!bt_file_there(options->dir, ".")) {
+        bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", options->dir);
         return BT_ERR_IO;
     }
-    if (!o->held && (k->lock = bt_lock_take(o->dir, NULL, err)) < 0) return BT_ERR_IO;
-    bt_folder_recover(o->dir);
-    k->fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") &&
-               !bt_file_there(o->dir, "summary.json");
-    if (k->fresh) return bt_folder_check(o->dir, err);
+    if (!options->held && (resume->lock = bt_lock_take(options->dir, NULL, err)) < 0) return BT_ERR_IO;
+    bt_folder_recover(options->dir);
+    resume->fresh = !options->from && !bt_checkpoint_there(options->dir) &&
+                    bt_file_there(options->dir, "case.resolved.yml") && !bt_file_there(options->dir, "summary.json");
+    if (resume->fresh) return bt_folder_check(options->dir, err);
     char *said = NULL;
     const bt_status status =
-        o->from ? bt_snapshot_read(&k->s, o->from, err) : bt_checkpoint_read(&k->s, o->dir, &k->path, &said, err);
-    if (status == BT_OK) report(&k->s, said);
+        options->from ? bt_snapshot_read(&resume->s, options->from, err)
+                      : bt_checkpoint_read(&resume->s, options->dir, &resume->path, &said, err);
+    if (status == BT_OK) report(&resume->s, said);
     free(said);
     return status;
 }
@@ -67,150 +68,151 @@ static bt_status check_itself(const char *path, const char *dir, bt_errors *err)
 }
 
 /// Collective. The case that the run began with, at time zero, and the files that it names.
-static bt_status start_again(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err)
+static bt_status start_again(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
-    char *path = bt_file_join(o->dir, "case.resolved.yml");
-    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? check_itself(path, o->dir, err) : BT_OK);
-    if (status == BT_OK) status = bt_comm_agree(comm, bt_case_read(&k->c, path, NULL, 0, err));
-    if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&k->c, o->dir, err);
+    char *path = bt_file_join(options->dir, "case.resolved.yml");
+    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? check_itself(path, options->dir, err) : BT_OK);
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_case_read(&resume->c, path, NULL, 0, err));
+    if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&resume->c, options->dir, err);
     status = bt_comm_agree(comm, status);
-    if (status == BT_OK && comm->rank == 0 && !o->quiet)
-        printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
+    if (status == BT_OK && comm->rank == 0 && !options->quiet)
+        printf("%s holds no checkpoint: the run starts at time zero\n", options->dir);
     free(path);
     return status;
 }
 
 /// Collective. The case of the checkpoint, and whether any step of it is left.
-static bt_status go_on(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err)
+static bt_status go_on(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
-    bt_snapshot_share(comm, &k->s);
-    k->s.err = err;
-    const bt_status status = bt_comm_agree(comm, bt_running_load_case(&k->c, &k->s, err));
+    bt_snapshot_share(comm, &resume->s);
+    resume->s.err = err;
+    const bt_status status = bt_comm_agree(comm, bt_running_load_case(&resume->c, &resume->s, err));
     // without its summary it was stopped between its last checkpoint and that: no step is left, but the end is
-    int ended = comm->rank == 0 && bt_file_there(o->dir, "summary.json");
+    int ended = comm->rank == 0 && bt_file_there(options->dir, "summary.json");
     bt_comm_bcast(comm, &ended, sizeof ended);
-    k->finished = status == BT_OK && ended && bt_snapshot_int(&k->s, "world/step") >= bt_case_steps(&k->c);
+    resume->finished = status == BT_OK && ended &&
+                       bt_snapshot_int(&resume->s, "world/step") >= bt_case_steps(&resume->c);
     return status;
 }
 
-bt_status bt_resume_begin(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err)
+bt_status bt_resume_begin(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
-    *k = (bt_resume){.s = {.path = o->dir}, .lock = -1};
-    bt_status status = comm->rank == 0 ? open_folder(k, o, err) : BT_OK;
+    *resume = (bt_resume){.s = {.path = options->dir}, .lock = -1};
+    bt_status status = comm->rank == 0 ? open_folder(resume, options, err) : BT_OK;
     status = bt_comm_agree(comm, status);
-    bt_comm_bcast(comm, &k->fresh, sizeof k->fresh);
+    bt_comm_bcast(comm, &resume->fresh, sizeof resume->fresh);
     if (status != BT_OK) return status;
-    return k->fresh ? start_again(k, comm, o, err) : go_on(k, comm, o, err);
+    return resume->fresh ? start_again(resume, comm, options, err) : go_on(resume, comm, options, err);
 }
 
-void bt_resume_end(bt_resume *k)
+void bt_resume_end(bt_resume *resume)
 {
-    bt_snapshot_free(&k->s);
-    bt_case_free(&k->c);
-    free(k->path);
+    bt_snapshot_free(&resume->s);
+    bt_case_free(&resume->c);
+    free(resume->path);
 }
 
 // --- a run -----------------------------------------------------------------------------------------------------------
 
 /// Collective. *failed: the step that was not sound, −1 = none.
-static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_run_manner *m,
-                          int64_t *failed, bt_errors *err)
+static bt_status run_case(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
+                          bt_run_manner *manner, int64_t *failed, bt_errors *err)
 {
-    bt_running r;
-    bt_status status = bt_running_begin(&r, comm, c, o, m, err);
-    while (status == BT_OK && bt_running_goes_on(&r)) status = bt_running_step(&r, err);
-    status = bt_running_end(&r, status, err);
-    *failed = r.failed;
+    bt_running running;
+    bt_status status = bt_running_begin(&running, comm, input, options, manner, err);
+    while (status == BT_OK && bt_running_goes_on(&running)) status = bt_running_step(&running, err);
+    status = bt_running_end(&running, status, err);
+    *failed = running.failed;
     return status;
 }
 
 /// Collective. A call that is ended before its time, by a limit of its job or by hand, has said what it knew.
-static void tell(const bt_comm *comm, const bt_run_options *o, bt_errors *err)
+static void tell(const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
-    if (!o->aloud) return;
+    if (!options->aloud) return;
     bt_comm_errors(comm, err);
     bt_errors_print(err);
     bt_errors_free(err);
 }
 
-void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, double start,
-                         bt_errors *err)
+void bt_run_keep_failure(const bt_comm *comm, const bt_case *input, const bt_run_options *options, int64_t step,
+                         double start, bt_errors *err)
 {
-    tell(comm, o, err);
-    bt_run_options quiet = *o;
+    tell(comm, options, err);
+    bt_run_options quiet = *options;
     quiet.quiet = true;
     quiet.dump_step = -1;
-    bt_snapshot s = {0};
+    bt_snapshot snap = {0};
     char *path = NULL, *said = NULL;
     bt_errors unheard = {0};
     int from = 0;
-    if (comm->rank == 0 && o->from) from = bt_snapshot_read(&s, o->from, &unheard) == BT_OK;
-    else if (comm->rank == 0 && bt_checkpoint_there(o->dir))
-        from = bt_checkpoint_read(&s, o->dir, &path, &said, &unheard) == BT_OK;
+    if (comm->rank == 0 && options->from) from = bt_snapshot_read(&snap, options->from, &unheard) == BT_OK;
+    else if (comm->rank == 0 && bt_checkpoint_there(options->dir))
+        from = bt_checkpoint_read(&snap, options->dir, &path, &said, &unheard) == BT_OK;
     bt_comm_bcast(comm, &from, sizeof from);
-    if (from) bt_snapshot_share(comm, &s);
-    s.err = &unheard;
-    const int64_t again = step - 1 - (from ? bt_snapshot_int(&s, "world/step") : 0);
-    if (again > 0 && o->aloud)
+    if (from) bt_snapshot_share(comm, &snap);
+    snap.err = &unheard;
+    const int64_t again = step - 1 - (from ? bt_snapshot_int(&snap, "world/step") : 0);
+    if (again > 0 && options->aloud)
         bt_errors_add(err, "the %" PRId64 " steps up to the state before that one are made again", again);
-    tell(comm, o, err);
-    bt_run_manner m = {.kept = from ? &s : NULL, .start = start, .until = step - 1, .held = true};
+    tell(comm, options, err);
+    bt_run_manner manner = {.kept = from ? &snap : NULL, .start = start, .until = step - 1, .held = true};
     int64_t failed;
-    const bt_status status = run_case(comm, c, &quiet, &m, &failed, &unheard);
+    const bt_status status = run_case(comm, input, &quiet, &manner, &failed, &unheard);
     if (status == BT_OK)
-        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir,
-                      BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
+        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again",
+                      options->dir, BT_FAILURE_FILE, options->dir, BT_FAILURE_FILE);
     else if (status == BT_ERR_SIGNAL)
         bt_errors_add(err,
                       "the state before that step was not made again: stopped meanwhile; `bergtow resume %s` meets it",
-                      o->dir);
+                      options->dir);
     else
         for (size_t k = 0; k < unheard.n; k++)
             bt_errors_add(err, "the state before that step could not be kept: %s", unheard.text[k]);
     bt_errors_free(&unheard);
-    bt_snapshot_free(&s);
+    bt_snapshot_free(&snap);
     free(path);
     free(said);
 }
 
 /// Collective. A run, and what is kept of it when it fails. held: the caller has locked the folder.
-static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept,
-                             bool held, double start, bt_errors *err)
+static bt_status run_guarded(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
+                             bt_snapshot *kept, bool held, double start, bt_errors *err)
 {
-    bt_run_manner m = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
+    bt_run_manner manner = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     int64_t failed;
-    const bt_status status = run_case(comm, c, o, &m, &failed, err);
-    if (failed >= 0) bt_run_keep_failure(comm, c, o, failed, start, err);
-    const bool taken = m.lock >= 0 || (o->held && comm->rank == 0);
-    if (status != BT_OK && taken && bt_folder_keeps(o->dir))
-        bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", o->dir, o->dir,
+    const bt_status status = run_case(comm, input, options, &manner, &failed, err);
+    if (failed >= 0) bt_run_keep_failure(comm, input, options, failed, start, err);
+    const bool taken = manner.lock >= 0 || (options->held && comm->rank == 0);
+    if (status != BT_OK && taken && bt_folder_keeps(options->dir))
+        bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", options->dir, options->dir,
                       BT_FOLDER_REPLACED);
-    bt_lock_drop(o->dir, m.lock);
+    bt_lock_drop(options->dir, manner.lock);
     return status;
 }
 
-bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err)
+bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err)
 {
-    if (comm->size > 1 && o->dump_step >= 0) {
+    if (comm->size > 1 && options->dump_step >= 0) {
         bt_errors_add(err,
                       "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the "
                       "step is the same)",
                       comm->size);
         return BT_ERR_USAGE;
     }
-    return run_guarded(comm, c, o, NULL, false, bt_clock(), err);
+    return run_guarded(comm, input, options, NULL, false, bt_clock(), err);
 }
 
-bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err)
+bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
     const double start = bt_clock();
-    bt_resume k;
-    bt_status status = bt_resume_begin(&k, comm, o, err);
-    if (status == BT_OK && k.finished && comm->rank == 0 && !o->quiet)
-        printf("%s is finished: all %" PRId64 " steps are done\n", o->dir, bt_case_steps(&k.c));
-    if (status == BT_OK && !k.finished)
-        status = run_guarded(comm, &k.c, o, k.fresh ? NULL : &k.s, true, start, err);
-    bt_resume_end(&k);
-    bt_lock_drop(o->dir, k.lock);
+    bt_resume resume;
+    bt_status status = bt_resume_begin(&resume, comm, options, err);
+    if (status == BT_OK && resume.finished && comm->rank == 0 && !options->quiet)
+        printf("%s is finished: all %" PRId64 " steps are done\n", options->dir, bt_case_steps(&resume.c));
+    if (status == BT_OK && !resume.finished)
+        status = run_guarded(comm, &resume.c, options, resume.fresh ? NULL : &resume.s, true, start, err);
+    bt_resume_end(&resume);
+    bt_lock_drop(options->dir, resume.lock);
     return status;
 }

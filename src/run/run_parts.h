@@ -54,57 +54,58 @@ typedef struct bt_run_manner {
     int lock;            ///< out: by this, on rank 0
 } bt_run_manner;
 
-/// Collective. Field, world, folder and record of a run at its first step. comm, c and o must stay where they are until
-/// bt_running_end, which follows whatever the status is.
-bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c, const bt_run_options *o,
-                           bt_run_manner *m, bt_errors *err);
+/// Collective. Field, world, folder and record of a run at its first step. comm, `input` and `options` must stay where
+/// they are until bt_running_end, which follows whatever the status is.
+bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_case *input,
+                           const bt_run_options *options, bt_run_manner *manner, bt_errors *err);
 
 /// Is a step left, and has no stop been asked for?
-bool bt_running_goes_on(const bt_running *r);
+bool bt_running_goes_on(const bt_running *running);
 
 /// Collective. One step, observed, guarded and recorded; frame and checkpoint when they are due.
-bt_status bt_running_step(bt_running *r, bt_errors *err);
+bt_status bt_running_step(bt_running *running, bt_errors *err);
 
 /// Collective. The run ends here, before bt_running_end, as it does after --steps.
-bt_status bt_running_stop(bt_running *r, bt_errors *err);
+bt_status bt_running_stop(bt_running *running, bt_errors *err);
 
 /// Collective, between steps. A frame of the bodies as they are, beside those by the interval; nothing where one was
 /// taken after this step.
-bt_status bt_running_frame(bt_running *r, bt_errors *err);
+bt_status bt_running_frame(bt_running *running, bt_errors *err);
 
 /// Collective. status: of the last step. Summary and last checkpoint of a run whose steps were sound; closes and frees
 /// everything but the lock. Returns the status of the run.
-bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err);
+bt_status bt_running_end(bt_running *running, bt_status status, bt_errors *err);
 
 /// Collective, between steps. The whole state of the run, on rank 0 into a checkpoint of this name that is begun here.
 /// Errors: BT_ERR_IO, BT_ERR_NUMERIC.
-bt_status bt_running_save(bt_running *r, bt_snapshot *s, const char *name, bt_errors *err);
+bt_status bt_running_save(bt_running *running, bt_snapshot *snap, const char *name, bt_errors *err);
 
 /// Collective. Publish the record and write a checkpoint of this name.
-bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err);
+bt_status bt_running_checkpoint(bt_running *running, const char *name, bt_errors *err);
 
 /// What tells a run from others: a digest of what it begins with, the resolved case, the tables of current and wind and
 /// the ice as made. Those of the same case are alike, and may take each other's place. kept: the checkpoint, which has
 /// it, or NULL. The caller frees it.
-char *bt_running_identity(const bt_case *c, const bt_field *f, bt_snapshot *kept);
+char *bt_running_identity(const bt_case *input, const bt_field *field, bt_snapshot *kept);
 
 /// Time between frames, s.
-double bt_running_frame_interval(const bt_case *c);
+double bt_running_frame_interval(const bt_case *input);
 /// Does the case ask for frames at all?
-static inline bool bt_running_draws(const bt_case *c) { return c->output.frame_interval >= 0; }
+static inline bool bt_running_draws(const bt_case *input) { return input->output.frame_interval >= 0; }
 
 /// The case and the field of a checkpoint. Errors: BT_ERR_CASE.
-bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err);
-bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s);
+bt_status bt_running_load_case(bt_case *input, bt_snapshot *snap, bt_errors *err);
+bt_status bt_running_load_field(bt_field *field, bt_lead_stats *lead, bt_snapshot *snap);
 
 /// Collective. State of the world and counters of the run, into a world that was set up; distributes it over the ranks.
-bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
+bt_status bt_running_load(bt_running *running, bt_snapshot *snap, bt_errors *err);
 
 /// Collective, after bt_running_end, with the folder still held. A step was not sound: the state before it, made again
-/// from the last checkpoint (or the one of o->from, or the start), goes to failure.h5. What has come of it goes to err;
-/// o->aloud: what is in err before is printed first. start: bt_clock when the call began; o->max_wall counts from it.
-void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, double start,
-                         bt_errors *err);
+/// from the last checkpoint (or the one of options->from, or the start), goes to failure.h5. What has come of it goes
+/// to err; options->aloud: what is in err before is printed first. start: bt_clock when the call began;
+/// options->max_wall counts from it.
+void bt_run_keep_failure(const bt_comm *comm, const bt_case *input, const bt_run_options *options, int64_t step,
+                         double start, bt_errors *err);
 
 // --- going on --------------------------------------------------------------------------------------------------------
 
@@ -117,9 +118,9 @@ typedef struct bt_resume {
     bool finished; ///< all its steps are done, and its summary is written
 } bt_resume;
 
-/// Collective. What o->dir (or o->from) holds to go on from. bt_resume_end follows whatever the status is. Errors:
-/// BT_ERR_IO, BT_ERR_CASE.
-bt_status bt_resume_begin(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err);
-void bt_resume_end(bt_resume *k);
+/// Collective. What options->dir (or options->from) holds to go on from. bt_resume_end follows whatever the status is.
+/// Errors: BT_ERR_IO, BT_ERR_CASE.
+bt_status bt_resume_begin(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err);
+void bt_resume_end(bt_resume *resume);
 
 #endif

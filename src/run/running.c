@@ -40,101 +40,106 @@ typedef bt_running run;
 // --- begin -----------------------------------------------------------------------------------------------------------
 
 /// Add the time since the last part of the call to this one.
-static void clock_part(run *r, double *part)
+static void clock_part(run *running, double *part)
 {
     const double now = bt_clock();
-    *part += now - r->clocked;
-    r->clocked = now;
+    *part += now - running->clocked;
+    running->clocked = now;
 }
 
 /// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it.
 /// lead: on rank 0.
-static bt_status make_field(const bt_comm *comm, const bt_case *c, const char *fields, bt_field *f,
+static bt_status make_field(const bt_comm *comm, const bt_case *input, const char *fields, bt_field *field,
                             bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
-    if (comm->rank == 0) status = bt_cost_fits(c, bt_case_floes_made(c) + c->n_floes, comm, bt_cost_machine(), err);
-    if (comm->rank == 0 && status == BT_OK) status = bt_field_load_kept(fields, c, f, err);
+    if (comm->rank == 0)
+        status = bt_cost_fits(input, bt_case_floes_made(input) + input->n_floes, comm, bt_cost_machine(), err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_field_load_kept(fields, input, field, err);
     // a field that was read has only now a number
-    if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err);
-    if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(input, field->n, comm, bt_cost_machine(), err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(input, field, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
-    if (status == BT_OK) bt_field_share(comm, f);
+    if (status == BT_OK) bt_field_share(comm, field);
     return status;
 }
 
 /// Collective. kept: go on from there, or NULL for a fresh run.
-static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
+static bt_status open_record(run *running, bt_snapshot *kept, bt_errors *err)
 {
-    bt_record_bodies b;
-    bt_status status = bt_gather_bodies(r->comm, r->w, &r->roster, &b, err);
+    bt_record_bodies bodies;
+    bt_status status = bt_gather_bodies(running->comm, running->w, &running->roster, &bodies, err);
     if (status != BT_OK) return status;
-    b.outlines = &r->totals.outlines;
+    bodies.outlines = &running->totals.outlines;
     // steps that are made again leave the result that they belong to
-    const bool again = kept || r->until >= 0;
+    const bool again = kept || running->until >= 0;
     status =
-        again ? bt_record_reopen(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err)
-              : bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, r->digests, err);
-    bt_gather_free(&b);
-    free(r->roster.thickness); // result.h5 has it
-    r->roster.thickness = NULL;
+        again ? bt_record_reopen(&running->record, running->comm, running->o->dir, running->c, &bodies,
+                                 running->o->command_line, err)
+              : bt_record_open(&running->record, running->comm, running->o->dir, running->c, &bodies,
+                               running->o->command_line, running->digests, err);
+    bt_gather_free(&bodies);
+    free(running->roster.thickness); // result.h5 has it
+    running->roster.thickness = NULL;
     if (status != BT_OK) return status;
-    status = bt_comm_agree(r->comm, bt_record_identify(r->record, r->identity, err));
-    if (status == BT_OK && r->w->impacts)
-        status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
-    if (status == BT_OK && r->w->splitting)
-        status = bt_comm_agree(r->comm, bt_record_watch_splitting(r->record, r->w->splitting, &r->roster, err));
-    if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
-    if (status != BT_OK) bt_record_abandon(r->record);
+    status = bt_comm_agree(running->comm, bt_record_identify(running->record, running->identity, err));
+    if (status == BT_OK && running->w->impacts)
+        status = bt_comm_agree(running->comm, bt_record_watch_impacts(running->record, running->w->impacts, err));
+    if (status == BT_OK && running->w->splitting)
+        status = bt_comm_agree(running->comm, bt_record_watch_splitting(running->record, running->w->splitting,
+                                                                        &running->roster, err));
+    if (status == BT_OK && kept) status = bt_record_load(running->record, kept, &running->w->events, err);
+    if (status != BT_OK) bt_record_abandon(running->record);
     return status;
 }
 
-static bt_status record_frame(run *r, bt_errors *err)
+static bt_status record_frame(run *running, bt_errors *err)
 {
-    if (!r->record) return BT_OK;
-    r->framed = r->w->step;
-    bt_solver_rest(r->w);
+    if (!running->record) return BT_OK;
+    running->framed = running->w->step;
+    bt_solver_rest(running->w);
     bt_frame_row *rows;
     bt_piece_row *pieces;
     int64_t n_pieces;
-    bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, &pieces, &n_pieces, err);
-    const bt_frame_line line = bt_gather_line(r->w);
+    bt_status status = bt_gather_frame(running->comm, running->w, &running->roster, &rows, &pieces, &n_pieces, err);
+    const bt_frame_line line = bt_gather_line(running->w);
     if (status == BT_OK)
-        status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, &line, pieces, n_pieces, err);
+        status = bt_record_frame(running->record, (double)running->w->step * running->w->par.dt, rows, &line, pieces,
+                                 n_pieces, err);
     free(rows);
     free(pieces);
     return status;
 }
 
 /// Numbers of the run that follow from the field, which only rank 0 keeps from then on.
-static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threads)
+static void keep_field(run *running, bt_field *field, const bt_lead_stats *lead, int threads)
 {
     double thickness, radius;
-    bt_estimate_field(f, &thickness, &radius);
-    r->totals = (bt_run_totals){
-        .ranks = r->comm->size,
+    bt_estimate_field(field, &thickness, &radius);
+    running->totals = (bt_run_totals){
+        .ranks = running->comm->size,
         .threads = threads,
-        .dt = r->c->run.dt,
-        .mean_size = r->roster.mean_size,
-        .sizes = bt_field_sizes_of(r->c, f),
+        .dt = running->c->run.dt,
+        .mean_size = running->roster.mean_size,
+        .sizes = bt_field_sizes_of(running->c, field),
         .mean_thickness = thickness,
         .mean_radius = radius,
-        .concentration = lead->mode == BT_LEAD_NONE ? f->concentration : lead->concentration_before,
+        .concentration = lead->mode == BT_LEAD_NONE ? field->concentration : lead->concentration_before,
         .lead = *lead,
-        .outlines = f->outlines,
-        .tolerance = r->w->par.tolerance,
-        .call = r->totals.call,
+        .outlines = field->outlines,
+        .tolerance = running->w->par.tolerance,
+        .call = running->totals.call,
     };
-    if (r->comm->rank == 0) {
-        r->field = *f;
-        free(r->field.vertices); // the bodies have them
-        r->field.vertices = NULL;
-        r->field.cap_vertices = 0;
+    if (running->comm->rank == 0) {
+        running->field = *field;
+        free(running->field.vertices); // the bodies have them
+        running->field.vertices = NULL;
+        running->field.cap_vertices = 0;
     } else {
-        bt_field_free(f);
+        bt_field_free(field);
     }
-    *f = (bt_field){0};
+    *field = (bt_field){0};
 }
 
 /// Collective. The folder is this call's alone, or has been its caller's. *lock: on rank 0.
@@ -150,10 +155,10 @@ static bt_status take_folder(const bt_comm *comm, const char *dir, bool held, in
     return bt_comm_agree(comm, status);
 }
 
-int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked)
+int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked)
 {
     if (asked > 0) return asked;
-    if (c->run.threads > 0) return (int)c->run.threads;
+    if (input->run.threads > 0) return (int)input->run.threads;
     const int share = bt_cores_share(comm); // by all ranks, whatever the environment of each
     return getenv("OMP_NUM_THREADS") ? omp_get_max_threads() : share;
 }
@@ -179,124 +184,134 @@ static void start_threads(int n)
 }
 
 /// Field, world and cells, distributed to the ranks. kept: as it left them, or NULL.
-static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
+static bt_status set_up(run *running, bt_snapshot *kept, bt_errors *err)
 {
-    const int threads = bt_run_threads(r->comm, r->c, r->o->threads);
+    const int threads = bt_run_threads(running->comm, running->c, running->o->threads);
     start_threads(threads);
-    bt_pace_begin(&r->pace, threads, PACED && r->comm->size == 1);
-    bt_field f;
-    bt_field_init(&f);
+    bt_pace_begin(&running->pace, threads, PACED && running->comm->size == 1);
+    bt_field field;
+    bt_field_init(&field);
     bt_lead_stats lead = {0};
-    bt_status status = kept ? bt_running_load_field(&f, &lead, kept)
-                            : make_field(r->comm, r->c, r->o->fields, &f, &lead, err);
-    status = bt_comm_agree(r->comm, status);
-    clock_part(r, &r->totals.call.ice);
-    if (status == BT_OK) status = bt_comm_agree(r->comm, bt_setup_world(r->c, &f, &r->w, &r->roster, err));
+    bt_status status = kept ? bt_running_load_field(&field, &lead, kept)
+                            : make_field(running->comm, running->c, running->o->fields, &field, &lead, err);
+    status = bt_comm_agree(running->comm, status);
+    clock_part(running, &running->totals.call.ice);
+    if (status == BT_OK)
+        status = bt_comm_agree(running->comm, bt_setup_world(running->c, &field, &running->w, &running->roster, err));
     if (status == BT_OK) {
-        if (r->comm->rank == 0 && r->o->dir) r->identity = bt_running_identity(r->c, &f, kept);
-        keep_field(r, &f, &lead, threads);
+        if (running->comm->rank == 0 && running->o->dir)
+            running->identity = bt_running_identity(running->c, &field, kept);
+        keep_field(running, &field, &lead, threads);
         if (kept) {
-            status = bt_running_load(r, kept, err);
+            status = bt_running_load(running, kept, err);
         } else {
-            bt_domain_create(r->w, r->comm);
-            bt_cells_begin(r->w);
+            bt_domain_create(running->w, running->comm);
+            bt_cells_begin(running->w);
         }
-        r->first_step = r->w->step;
+        running->first_step = running->w->step;
     }
-    bt_field_free(&f);
-    clock_part(r, &r->totals.call.world);
+    bt_field_free(&field);
+    clock_part(running, &running->totals.call.world);
     return status;
 }
 
 /// The record is open, and the steps of this call are known.
-static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
+static bt_status begin_steps(run *running, bool fresh, bt_errors *err)
 {
-    const int64_t whole = bt_case_steps(r->c), asked = r->first_step + r->o->max_steps;
-    r->end_step = r->until >= 0 ? r->until : r->o->max_steps > 0 && asked < whole ? asked : whole;
-    r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = r->end_step, .quiet = r->o->quiet};
-    bt_progress_start(&r->progress, r->w->step);
-    const double energy = r->guard.energy; // of the start, from a checkpoint
-    bt_guard_begin(&r->guard, r->c, r->w, &r->roster);
-    if (energy > 0) r->guard.energy = energy;
-    clock_part(r, &r->totals.call.record);
-    r->began = r->clocked;
+    const int64_t whole = bt_case_steps(running->c), asked = running->first_step + running->o->max_steps;
+    running->end_step = running->until >= 0 ? running->until : running->o->max_steps > 0 && asked < whole
+                        ? asked : whole;
+    running->progress = (bt_progress){.interval = running->c->output.progress, .n_steps = running->end_step,
+                                      .quiet = running->o->quiet};
+    bt_progress_start(&running->progress, running->w->step);
+    const double energy = running->guard.energy; // of the start, from a checkpoint
+    bt_guard_begin(&running->guard, running->c, running->w, &running->roster);
+    if (energy > 0) running->guard.energy = energy;
+    clock_part(running, &running->totals.call.record);
+    running->began = running->clocked;
     if (!fresh) return BT_OK;
-    r->frames_due = 1;
-    r->frames = bt_running_draws(r->c);
-    const bt_status status = r->frames ? record_frame(r, err) : BT_OK;
-    r->totals.phases.output += bt_clock() - r->began;
+    running->frames_due = 1;
+    running->frames = bt_running_draws(running->c);
+    const bt_status status = running->frames ? record_frame(running, err) : BT_OK;
+    running->totals.phases.output += bt_clock() - running->began;
     return status;
 }
 
-bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c, const bt_run_options *o,
-                           bt_run_manner *m, bt_errors *err)
+bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_case *input,
+                           const bt_run_options *options, bt_run_manner *manner, bt_errors *err)
 {
-    *r = (run){.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c), .framed = -1, .failed = -1};
-    r->halt = (bt_halt){.steps = c->output.checkpoint_steps,
-                        .wall = c->output.checkpoint_wall,
-                        .max_wall = o->max_wall,
-                        .dir = o->dir,
-                        .stop_signal = o->stop_signal,
-                        .deaf = o->leave_signals,
-                        .first = comm->rank == 0,
-                        .started = m->start};
-    r->until = m->until;
-    r->clocked = o->began > 0 ? o->began : m->start;
-    clock_part(r, &r->totals.call.program);
+    *running = (run){.comm = comm, .c = input, .o = options, .reference_speed = bt_case_reference_speed(input),
+                     .framed = -1, .failed = -1};
+    running->halt = (bt_halt){.steps = input->output.checkpoint_steps,
+                              .wall = input->output.checkpoint_wall,
+                              .max_wall = options->max_wall,
+                              .dir = options->dir,
+                              .stop_signal = options->stop_signal,
+                              .deaf = options->leave_signals,
+                              .first = comm->rank == 0,
+                              .started = manner->start};
+    running->until = manner->until;
+    running->clocked = options->began > 0 ? options->began : manner->start;
+    clock_part(running, &running->totals.call.program);
     // before the field is made, which may take long: of what has been read
-    if (r->halt.first && o->dir && !m->kept) r->digests = bt_case_digests(c);
-    bt_status status = set_up(r, m->kept, err);
+    if (running->halt.first && options->dir && !manner->kept) running->digests = bt_case_digests(input);
+    bt_status status = set_up(running, manner->kept, err);
     // Only now: a case that is refused leaves nothing behind.
-    if (status == BT_OK && o->dir && !m->held) status = take_folder(comm, o->dir, o->held, &m->lock, err);
+    if (status == BT_OK && options->dir && !manner->held)
+        status = take_folder(comm, options->dir, options->held, &manner->lock, err);
     if (status != BT_OK) return status;
-    bt_halt_begin(&r->halt); // before the record, which says to whoever looks that the run has begun
-    if (o->dir) status = open_record(r, m->kept, err);
-    r->begun = status == BT_OK;
-    if (r->begun) return begin_steps(r, !m->kept, err);
-    bt_halt_end(&r->halt);
+    bt_halt_begin(&running->halt); // before the record, which says to whoever looks that the run has begun
+    if (options->dir) status = open_record(running, manner->kept, err);
+    running->begun = status == BT_OK;
+    if (running->begun) return begin_steps(running, !manner->kept, err);
+    bt_halt_end(&running->halt);
     return status;
 }
 
 // --- step ------------------------------------------------------------------------------------------------------------
 
 /// Collective, once a step. The worst status of all ranks, and what any of them was asked for.
-static bt_status agree(run *r, bt_status status)
+static bt_status agree(run *running, bt_status status)
 {
-    r->asked = bt_halt_look(&r->halt, r->w->step);
-    if (r->comm->size == 1) return status;
-    uint64_t bits = (status != BT_OK ? 1 : 0) | r->asked;
-    bt_comm_reduce(r->comm, NULL, 0, NULL, 0, &bits, 1);
-    r->asked = bits & ~UINT64_C(1);
-    return bits & 1 ? bt_comm_agree(r->comm, status) : BT_OK;
+    running->asked = bt_halt_look(&running->halt, running->w->step);
+    if (running->comm->size == 1) return status;
+    uint64_t bits = (status != BT_OK ? 1 : 0) | running->asked;
+    bt_comm_reduce(running->comm, NULL, 0, NULL, 0, &bits, 1);
+    running->asked = bits & ~UINT64_C(1);
+    return bits & 1 ? bt_comm_agree(running->comm, status) : BT_OK;
 }
 
-static void add_phases(bt_run_totals *t, const bt_step_stats *st)
+static void add_phases(bt_run_totals *totals, const bt_step_stats *st)
 {
-#define ADD(name, text) t->phases.name += st->phases.name, t->shared.name += st->shared.name;
+#define ADD(name, text) totals->phases.name += st->phases.name, totals->shared.name += st->shared.name;
     BT_WALL_PHASES(ADD)
 #undef ADD
 }
 
 /// A frame at the first step at or after each multiple of the interval, and at the end.
-static bt_status frame_if_due(run *r, double time, bt_errors *err)
+static bt_status frame_if_due(run *running, double time, bt_errors *err)
 {
-    if (!bt_running_draws(r->c)) return BT_OK;
-    const double interval = bt_running_frame_interval(r->c);
-    const bool due = time >= (double)r->frames_due * interval * (1 - 1e-12), whole = r->w->step == bt_case_steps(r->c);
-    if (r->framed == r->w->step || (!due && r->w->step != r->end_step)) return BT_OK;
-    while ((double)r->frames_due * interval * (1 - 1e-12) <= time) r->frames_due++;
-    if (due || whole) r->frames++;
-    return record_frame(r, err);
+    if (!bt_running_draws(running->c)) return BT_OK;
+    const double interval = bt_running_frame_interval(running->c);
+    const bool due = time >= (double)running->frames_due * interval * (1 - 1e-12),
+               whole = running->w->step == bt_case_steps(running->c);
+    if (running->framed == running->w->step || (!due && running->w->step != running->end_step)) return BT_OK;
+    while ((double)running->frames_due * interval * (1 - 1e-12) <= time) running->frames_due++;
+    if (due || whole) running->frames++;
+    return record_frame(running, err);
 }
 
 /// A force law could not say what it does.
-static bt_status tell_failed(const bt_forces *f, bt_errors *err)
+static bt_status tell_failed(const bt_forces *forces, bt_errors *err)
 {
-    bt_errors_add(err, "force %s: %s; the run ends here", f->failed->name, f->why);
+    bt_errors_add(err, "force %s: %s; the run ends here", forces->failed->name, forces->why);
     return BT_ERR_NUMERIC;
 }
 
-bool bt_running_goes_on(const bt_running *r) { return r->w->step < r->end_step && !bt_halt_stops(r->asked); }
+bool bt_running_goes_on(const bt_running *running)
+{
+    return running->w->step < running->end_step && !bt_halt_stops(running->asked);
+}
 
 /// s of all threads of this process on a core.
 static double processor_time(void)
@@ -305,16 +320,16 @@ static double processor_time(void)
     return clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t) == 0 ? (double)t.tv_sec + 1e-9 * (double)t.tv_nsec : 0;
 }
 
-static void step_at_pace(bt_world *w, bt_pace *p)
+static void step_at_pace(bt_world *world, bt_pace *pace)
 {
-    if (p->now != omp_get_max_threads()) start_threads(p->now);
+    if (pace->now != omp_get_max_threads()) start_threads(pace->now);
     const double wall = bt_clock(), cpu = processor_time();
-    bt_world_step(w);
+    bt_world_step(world);
     // not in the step itself: fields are shaken by steps that are not meant to converge
-    const bt_lock lock = w->stats.converged ? (bt_lock){0} : bt_locked(w);
-    w->stats.locked = lock.found;
-    w->stats.no_load = lock.towed;
-    bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.contact_updates);
+    const bt_lock lock = world->stats.converged ? (bt_lock){0} : bt_locked(world);
+    world->stats.locked = lock.found;
+    world->stats.no_load = lock.towed;
+    bt_pace_step(pace, bt_clock() - wall, processor_time() - cpu, (double)world->stats.contact_updates);
 }
 
 static void warn(const char *text, int64_t step)
@@ -325,200 +340,210 @@ static void warn(const char *text, int64_t step)
     bt_errors_free(&warnings);
 }
 
-static bt_status dump(const run *r, bt_errors *err)
+static bt_status dump(const run *running, bt_errors *err)
 {
     int64_t n = 0;
-    for (bt_idx k = 0; k < r->w->cells->n; k++) n += r->w->cells->cell[k].n_contacts;
-    if (n > 0) return bt_solver_dump(r->w, r->o->dump_path, err);
-    warn("has no contacts", r->w->step);
+    for (bt_idx k = 0; k < running->w->cells->n; k++) n += running->w->cells->cell[k].n_contacts;
+    if (n > 0) return bt_solver_dump(running->w, running->o->dump_path, err);
+    warn("has no contacts", running->w->step);
     return BT_OK;
 }
 
-bt_status bt_running_step(bt_running *r, bt_errors *err)
+bt_status bt_running_step(bt_running *running, bt_errors *err)
 {
-    bt_world *w = r->w;
+    bt_world *world = running->w;
     bt_status status = BT_OK;
-    step_at_pace(w, &r->pace);
-    add_phases(&r->totals, &w->stats);
-    w->stats.in_team = 0;
+    step_at_pace(world, &running->pace);
+    add_phases(&running->totals, &world->stats);
+    world->stats.in_team = 0;
     const double t0 = bt_clock();
-    if (w->step == r->o->dump_step) status = dump(r, err);
-    bt_sample *const s = &r->sample;
-    bt_observe(w, r->reference_speed, s);
-    bt_stall_step(&r->totals.stall, w, s->ice_resistance, s->tow_force, r->roster.mean_size);
-    const bt_status sound = w->forces->failed ? tell_failed(w->forces, err) : bt_guard_check(&r->guard, w, s, err);
+    if (world->step == running->o->dump_step) status = dump(running, err);
+    bt_sample *const sample = &running->sample;
+    bt_observe(world, running->reference_speed, sample);
+    bt_stall_step(&running->totals.stall, world, sample->ice_resistance, sample->tow_force, running->roster.mean_size);
+    const bt_status sound = world->forces->failed ? tell_failed(world->forces, err)
+                                                  : bt_guard_check(&running->guard, world, sample, err);
     // what is not has been reported, and the series hold numbers only
-    const bool writable = sound == BT_OK || !bt_sample_fault(s, bt_observe_applies(w));
-    if (status == BT_OK && r->record && writable) status = bt_record_sample(r->record, s, err);
-    if (status == BT_OK && r->record) status = bt_record_events(r->record, &w->events, err);
+    const bool writable = sound == BT_OK || !bt_sample_fault(sample, bt_observe_applies(world));
+    if (status == BT_OK && running->record && writable) status = bt_record_sample(running->record, sample, err);
+    if (status == BT_OK && running->record) status = bt_record_events(running->record, &world->events, err);
     if (status == BT_OK) status = sound;
-    status = agree(r, status);
-    if (status == BT_ERR_NUMERIC) bt_guard_name(&r->guard, w, err);
-    if (status == BT_OK) status = frame_if_due(r, s->time, err);
-    const bool saves = r->record && bt_halt_saves(r->asked); // at the end one is written anyway
-    if (status == BT_OK && saves && bt_running_goes_on(r)) status = bt_running_checkpoint(r, BT_CHECKPOINT_FILE, err);
-    bt_progress_step(&r->progress, w->step, s->time, s->ice_resistance);
-    r->totals.phases.output += bt_clock() - t0;
-    r->totals.shared.output += w->stats.in_team;
+    status = agree(running, status);
+    if (status == BT_ERR_NUMERIC) bt_guard_name(&running->guard, world, err);
+    if (status == BT_OK) status = frame_if_due(running, sample->time, err);
+    const bool saves = running->record && bt_halt_saves(running->asked); // at the end one is written anyway
+    if (status == BT_OK && saves && bt_running_goes_on(running))
+        status = bt_running_checkpoint(running, BT_CHECKPOINT_FILE, err);
+    bt_progress_step(&running->progress, world->step, sample->time, sample->ice_resistance);
+    running->totals.phases.output += bt_clock() - t0;
+    running->totals.shared.output += world->stats.in_team;
     return status;
 }
 
 // --- end -------------------------------------------------------------------------------------------------------------
 
 /// Collective. Floes whose centroid has left the domain where it is not periodic.
-static int64_t count_outside(const run *r)
+static int64_t count_outside(const run *running)
 {
-    const bt_bodies *b = &r->w->bodies;
-    const bt_case *c = r->c;
+    const bt_bodies *bodies = &running->w->bodies;
+    const bt_case *input = running->c;
     int64_t n = 0, all;
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (bt_roster_row(&r->roster, b->gid[i]) >= r->roster.n_floes || !bt_domain_owns(r->w, i)) continue;
-        const bool x_out = b->pose[i].x < c->domain.x0 || b->pose[i].x > c->domain.x0 + c->domain.length;
-        const bool y_out = b->pose[i].y < c->domain.y0 || b->pose[i].y > c->domain.y0 + c->domain.width;
-        n += (x_out && r->w->par.period_x == 0) || (y_out && r->w->par.period_y == 0);
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (bt_roster_row(&running->roster, bodies->gid[i]) >= running->roster.n_floes ||
+            !bt_domain_owns(running->w, i)) continue;
+        const bool x_out = bodies->pose[i].x < input->domain.x0 ||
+                           bodies->pose[i].x > input->domain.x0 + input->domain.length;
+        const bool y_out = bodies->pose[i].y < input->domain.y0 ||
+                           bodies->pose[i].y > input->domain.y0 + input->domain.width;
+        n += (x_out && running->w->par.period_x == 0) || (y_out && running->w->par.period_y == 0);
     }
-    bt_comm_before(r->comm, n, &all);
+    bt_comm_before(running->comm, n, &all);
     return all;
 }
 
 /// Collective.
-static void note_division(run *r)
+static void note_division(run *running)
 {
-    const bt_domain_stats s = bt_domain_get_stats(r->w);
-    r->totals.divisions = s.divisions;
-    r->totals.undivided_steps = s.undivided;
-    r->totals.imbalance = s.imbalance;
-    r->totals.worst_imbalance = s.worst_imbalance;
-    r->totals.repartition_imbalance = s.repartition_imbalance;
-    r->totals.worst_repartition_imbalance = s.worst_repartition_imbalance;
-    r->totals.edge_cut = s.cut;
-    r->totals.halo_share = s.halo;
-    bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);
+    const bt_domain_stats stats = bt_domain_get_stats(running->w);
+    running->totals.divisions = stats.divisions;
+    running->totals.undivided_steps = stats.undivided;
+    running->totals.imbalance = stats.imbalance;
+    running->totals.worst_imbalance = stats.worst_imbalance;
+    running->totals.repartition_imbalance = stats.repartition_imbalance;
+    running->totals.worst_repartition_imbalance = stats.worst_repartition_imbalance;
+    running->totals.edge_cut = stats.cut;
+    running->totals.halo_share = stats.halo;
+    bt_comm_before(running->comm, stats.moved, &running->totals.moved_floes);
 }
 
 /// Collective. Peak memory of all ranks, and the bytes that a sweep goes through for a contact point.
-static void measure_memory(run *r)
+static void measure_memory(run *running)
 {
-    const bt_cells *t = r->w->cells;
+    const bt_cells *cells = running->w->cells;
     struct rusage u;
     getrusage(RUSAGE_SELF, &u);
     double bytes = 0, points = 0;
-    for (bt_idx k = 0; k < t->n; k++) {
-        bytes += (double)t->cell[k].n_contacts * (double)bt_batch_bytes(&t->cell[k]);
-        points += (double)t->cell[k].n_points;
+    for (bt_idx k = 0; k < cells->n; k++) {
+        bytes += (double)cells->cell[k].n_contacts * (double)bt_batch_bytes(&cells->cell[k]);
+        points += (double)cells->cell[k].n_points;
     }
     bt_sum sums[3] = {{0}, {0}, {0}};
     bt_sum_add(&sums[0], 1024.0 * (double)u.ru_maxrss);
     bt_sum_add(&sums[1], bytes);
     bt_sum_add(&sums[2], points);
-    bt_comm_reduce(r->comm, sums, 3, NULL, 0, NULL, 0);
-    r->totals.memory = bt_sum_value(&sums[0]);
-    r->totals.sweep_bytes_per_contact =
+    bt_comm_reduce(running->comm, sums, 3, NULL, 0, NULL, 0);
+    running->totals.memory = bt_sum_value(&sums[0]);
+    running->totals.sweep_bytes_per_contact =
         bt_sum_value(&sums[2]) > 0 ? bt_sum_value(&sums[1]) / bt_sum_value(&sums[2]) : NAN;
 }
 
 /// Numbers of the end of the run.
-static void total_up(run *r)
+static void total_up(run *running)
 {
-    r->totals.n_steps = r->w->step;
-    r->totals.whole_steps = bt_case_steps(r->c);
-    r->totals.events = &r->w->events;
-    if (r->w->impacts) bt_impacts_end(r->w->impacts);
-    r->totals.floes_outside = count_outside(r);
-    r->totals.ice_area = bt_observe_ice_area(r->w);
-    measure_memory(r);
-    r->totals.state_hash = bt_world_hash(r->w);
-    r->totals.window = r->w->window;
-    r->totals.undisturbed = r->w->undisturbed;
-    r->totals.splitting = r->w->splitting;
-    note_division(r);
+    running->totals.n_steps = running->w->step;
+    running->totals.whole_steps = bt_case_steps(running->c);
+    running->totals.events = &running->w->events;
+    if (running->w->impacts) bt_impacts_end(running->w->impacts);
+    running->totals.floes_outside = count_outside(running);
+    running->totals.ice_area = bt_observe_ice_area(running->w);
+    measure_memory(running);
+    running->totals.state_hash = bt_world_hash(running->w);
+    running->totals.window = running->w->window;
+    running->totals.undisturbed = running->w->undisturbed;
+    running->totals.splitting = running->w->splitting;
+    note_division(running);
 }
 
 /// Collective. Guards and deepest overlap of the state that the last step has left, which no further step looks at. Its
 /// contacts are looked for as the next step would, so the number is the same after any resume and on any ranks; the
 /// state has been saved, and none of it is written from here on.
-static bt_status look_last(run *r, bt_errors *err)
+static bt_status look_last(run *running, bt_errors *err)
 {
-    const double overlap = bt_contacts_overlap(r->w);
-    if (r->record) bt_record_overlap(r->record, overlap);
-    const bt_status status = bt_comm_agree(r->comm, bt_guard_check_end(&r->guard, r->w, overlap, err));
-    if (status == BT_ERR_NUMERIC) bt_guard_name(&r->guard, r->w, err);
+    const double overlap = bt_contacts_overlap(running->w);
+    if (running->record) bt_record_overlap(running->record, overlap);
+    const bt_status status =
+        bt_comm_agree(running->comm, bt_guard_check_end(&running->guard, running->w, overlap, err));
+    if (status == BT_ERR_NUMERIC) bt_guard_name(&running->guard, running->w, err);
     return status;
 }
 
-static bool ends_early(const run *r) { return bt_halt_stops(r->asked) && r->w->step < r->end_step; }
+static bool ends_early(const run *running)
+{
+    return bt_halt_stops(running->asked) && running->w->step < running->end_step;
+}
 
 /// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order.
-static bt_status finish(run *r, bt_errors *err)
+static bt_status finish(run *running, bt_errors *err)
 {
     char stopped[96] = "";
-    bt_snapshot s = {0};
+    bt_snapshot snap = {0};
     const double t0 = bt_clock();
-    bt_status status = bt_running_save(r, &s, BT_CHECKPOINT_FILE, err); // before what is still open is closed
-    clock_part(r, &r->totals.call.steps);
-    r->totals.phases.output += r->clocked - t0;
-    r->totals.wall_time += r->clocked - r->began;
-    r->totals.stepped = r->clocked;
-    total_up(r);
-    if (status == BT_OK) status = look_last(r, err);
-    if (ends_early(r)) {
-        bt_halt_describe(&r->halt, r->asked, r->w->step, stopped);
-        r->totals.stopped = stopped;
+    bt_status status = bt_running_save(running, &snap, BT_CHECKPOINT_FILE, err); // before what is still open is closed
+    clock_part(running, &running->totals.call.steps);
+    running->totals.phases.output += running->clocked - t0;
+    running->totals.wall_time += running->clocked - running->began;
+    running->totals.stepped = running->clocked;
+    total_up(running);
+    if (status == BT_OK) status = look_last(running, err);
+    if (ends_early(running)) {
+        bt_halt_describe(&running->halt, running->asked, running->w->step, stopped);
+        running->totals.stopped = stopped;
     }
-    if (r->o->dump_step > r->w->step) warn("was not reached", r->o->dump_step);
+    if (running->o->dump_step > running->w->step) warn("was not reached", running->o->dump_step);
     const bool sound = status == BT_OK;
     const bt_status closed =
-        bt_record_close(r->record, sound ? &r->totals : NULL, sound ? &s : NULL, !r->o->quiet, err);
+        bt_record_close(running->record, sound ? &running->totals : NULL, sound ? &snap : NULL, !running->o->quiet,
+                        err);
     if (sound) status = closed;
-    bt_snapshot_free(&s);
-    status = bt_comm_agree(r->comm, status);
+    bt_snapshot_free(&snap);
+    status = bt_comm_agree(running->comm, status);
     if (status == BT_OK && *stopped) {
         bt_errors_add(err, "stopped by %s; %s holds everything up to there, and `bergtow resume %s` goes on", stopped,
-                      r->o->dir, r->o->dir);
+                      running->o->dir, running->o->dir);
         status = BT_ERR_SIGNAL;
     }
     return status;
 }
 
 /// Collective. status: of the last step.
-static bt_status close_steps(run *r, bt_status status, bt_errors *err)
+static bt_status close_steps(run *running, bt_status status, bt_errors *err)
 {
-    bt_progress_end(&r->progress);
-    if (status == BT_OK && r->until >= 0) {
-        status = ends_early(r) ? BT_ERR_SIGNAL : bt_running_checkpoint(r, BT_FAILURE_FILE, err);
-        bt_record_abandon(r->record);
+    bt_progress_end(&running->progress);
+    if (status == BT_OK && running->until >= 0) {
+        status = ends_early(running) ? BT_ERR_SIGNAL : bt_running_checkpoint(running, BT_FAILURE_FILE, err);
+        bt_record_abandon(running->record);
     } else if (status == BT_OK) {
-        status = r->record ? finish(r, err) : look_last(r, err);
-    } else if (r->record) {
+        status = running->record ? finish(running, err) : look_last(running, err);
+    } else if (running->record) {
         bt_errors more = {0}; // after a failed write another one says nothing new
-        bt_record_close(r->record, NULL, NULL, false, status == BT_ERR_IO ? &more : err);
+        bt_record_close(running->record, NULL, NULL, false, status == BT_ERR_IO ? &more : err);
         bt_errors_free(&more);
     }
-    if (status == BT_ERR_NUMERIC && r->w->step > r->first_step) r->failed = r->w->step;
-    bt_halt_end(&r->halt);
+    if (status == BT_ERR_NUMERIC && running->w->step > running->first_step) running->failed = running->w->step;
+    bt_halt_end(&running->halt);
     return status;
 }
 
-bt_status bt_running_stop(bt_running *r, bt_errors *err)
+bt_status bt_running_stop(bt_running *running, bt_errors *err)
 {
-    r->end_step = r->w->step;
-    return frame_if_due(r, (double)r->w->step * r->w->par.dt, err);
+    running->end_step = running->w->step;
+    return frame_if_due(running, (double)running->w->step * running->w->par.dt, err);
 }
 
-bt_status bt_running_frame(bt_running *r, bt_errors *err)
+bt_status bt_running_frame(bt_running *running, bt_errors *err)
 {
-    if (r->framed == r->w->step) return BT_OK;
-    r->frames++;
-    return record_frame(r, err);
+    if (running->framed == running->w->step) return BT_OK;
+    running->frames++;
+    return record_frame(running, err);
 }
 
-bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err)
+bt_status bt_running_end(bt_running *running, bt_status status, bt_errors *err)
 {
-    if (r->begun) status = close_steps(r, status, err);
-    bt_field_free(&r->field);
-    bt_roster_free(&r->roster);
-    bt_world_free(r->w);
-    free(r->digests);
-    free(r->identity);
+    if (running->begun) status = close_steps(running, status, err);
+    bt_field_free(&running->field);
+    bt_roster_free(&running->roster);
+    bt_world_free(running->w);
+    free(running->digests);
+    free(running->identity);
     return status;
 }

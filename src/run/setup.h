@@ -12,29 +12,30 @@
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:
 /// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
-bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_roster *r, bt_errors *err);
+bt_status bt_setup_world(const bt_case *input, const bt_field *field, bt_world **world, bt_roster *roster,
+                         bt_errors *err);
 
 /// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) in ice of this concentration,
 /// whose lee is estimated (force/exposure.h), into floe, and of the towed body into body, m/s; NaN where ice.start, the
 /// tow or a velocity that is given has it otherwise.
-void bt_setup_drift(const bt_case *c, double size, double thickness, double concentration, double floe[2],
+void bt_setup_drift(const bt_case *input, double size, double thickness, double concentration, double floe[2],
                     double body[2]);
 
 /// Track of the towed body through the ice as the tow is planned (the end of a line in place of the body that it
 /// pulls), with the mean floe, round, of this size and thickness (m), in free drift, in ice of this concentration.
 /// Empty without a tow. Release with bt_setup_track_free.
-bt_track bt_setup_track(const bt_case *c, double size, double thickness, double concentration);
-void bt_setup_track_free(bt_track *t);
+bt_track bt_setup_track(const bt_case *input, double size, double thickness, double concentration);
+void bt_setup_track_free(bt_track *track);
 
 /// Constants of the step from the case. size: mean floe size, m.
-bt_params bt_setup_params(const bt_case *c, double size);
+bt_params bt_setup_params(const bt_case *input, double size);
 
 // The tow of a case (private to the set-up).
 
 /// The tow at time zero of a case that was checked; release with bt_tow_free.
-bt_tow *bt_setup_tow(const bt_case *c);
+bt_tow *bt_setup_tow(const bt_case *input);
 
 /// Displacement from the start after this way of the tow, m.
-void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double way, double d[2]);
+void bt_setup_tow_displacement(const bt_case *input, const bt_tow *tow, double way, double d[2]);
 
 #endif

@@ -8,70 +8,70 @@
 #include "case/case_tow.h"
 #include "base/elementary.h"
 
-bt_tow *bt_setup_tow(const bt_case *c)
+bt_tow *bt_setup_tow(const bt_case *input)
 {
-    bt_tow *t = bt_alloc(1, sizeof *t);
-    const bool thrust = c->tow.mode == BT_TOW_THRUST, line = thrust || c->tow.mode == BT_TOW_LINE;
+    bt_tow *tow = bt_alloc(1, sizeof *tow);
+    const bool thrust = input->tow.mode == BT_TOW_THRUST, line = thrust || input->tow.mode == BT_TOW_LINE;
     double start[2];
-    bt_case_tow_start(c, start);
-    *t = (bt_tow){
-        .mode = c->tow.mode,
-        .ux = bt_cos(c->tow.direction),
-        .uy = bt_sin(c->tow.direction),
-        .speed = c->tow.speed,
-        .ramp = c->tow.ramp,
-        .n_branches = line ? (int)c->tow.line.branches : 0,
-        .branch[0] = {.length0 = c->tow.line_length,
-                      .k = line ? c->tow.line_stiffness / c->tow.line_length : 0,
-                      .c = c->tow.line_damping,
-                      .hull_x = c->tow.hull_x,
-                      .hull_y = c->tow.hull_y,
-                      .breaking = c->tow.line.breaking_load,
-                      .weight = c->tow.line.weight},
-        .dt = c->run.dt,
+    bt_case_tow_start(input, start);
+    *tow = (bt_tow){
+        .mode = input->tow.mode,
+        .ux = bt_cos(input->tow.direction),
+        .uy = bt_sin(input->tow.direction),
+        .speed = input->tow.speed,
+        .ramp = input->tow.ramp,
+        .n_branches = line ? (int)input->tow.line.branches : 0,
+        .branch[0] = {.length0 = input->tow.line_length,
+                      .k = line ? input->tow.line_stiffness / input->tow.line_length : 0,
+                      .c = input->tow.line_damping,
+                      .hull_x = input->tow.hull_x,
+                      .hull_y = input->tow.hull_y,
+                      .breaking = input->tow.line.breaking_load,
+                      .weight = input->tow.line.weight},
+        .dt = input->run.dt,
         .carriage_x = start[0],
         .carriage_y = start[1],
-        .travel_x = c->body.x,
-        .travel_y = c->body.y,
+        .travel_x = input->body.x,
+        .travel_y = input->body.y,
     };
-    if (t->n_branches > 1)
-        t->branch[1] = (bt_branch){.length0 = c->tow.branch2.length,
-                                   .k = c->tow.branch2.stiffness / c->tow.branch2.length,
-                                   .c = c->tow.branch2.damping,
-                                   .hull_x = c->tow.branch2.hull_x,
-                                   .hull_y = c->tow.branch2.hull_y,
-                                   .breaking = c->tow.branch2.breaking_load,
-                                   .weight = c->tow.line.weight};
-    if (c->tow.n_programme > 0) {
-        t->n_programme = c->tow.n_programme;
-        t->programme = bt_alloc((size_t)t->n_programme, 2 * sizeof *t->programme);
-        memcpy(t->programme, c->tow.programme, (size_t)t->n_programme * 2 * sizeof *t->programme);
+    if (tow->n_branches > 1)
+        tow->branch[1] = (bt_branch){.length0 = input->tow.branch2.length,
+                                     .k = input->tow.branch2.stiffness / input->tow.branch2.length,
+                                     .c = input->tow.branch2.damping,
+                                     .hull_x = input->tow.branch2.hull_x,
+                                     .hull_y = input->tow.branch2.hull_y,
+                                     .breaking = input->tow.branch2.breaking_load,
+                                     .weight = input->tow.line.weight};
+    if (input->tow.n_programme > 0) {
+        tow->n_programme = input->tow.n_programme;
+        tow->programme = bt_alloc((size_t)tow->n_programme, 2 * sizeof *tow->programme);
+        memcpy(tow->programme, input->tow.programme, (size_t)tow->n_programme * 2 * sizeof *tow->programme);
     }
     char why[200];
     // Straight on needs no path, but for the vessel, which has to find its place on it.
-    if (c->tow.n_waypoints > 0 || thrust) bt_case_tow_path(c, &t->path, why);
+    if (input->tow.n_waypoints > 0 || thrust) bt_case_tow_path(input, &tow->path, why);
     if (thrust) {
-        const double speed = bt_tow_speed(t, 0);
-        t->vessel = (bt_vessel){.mass = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass),
-                                .bollard_pull = c->tow.vessel.bollard_pull,
-                                .free_speed = c->tow.vessel.free_speed,
-                                .free_resistance = c->tow.vessel.free_resistance,
-                                .lateral = c->tow.vessel.lateral_drag,
-                                .lookahead = c->tow.vessel.lookahead,
-                                .vx = speed * t->ux,
-                                .vy = speed * t->uy};
+        const double speed = bt_tow_speed(tow, 0);
+        tow->vessel = (bt_vessel){.mass = input->tow.vessel.mass * (1 + input->tow.vessel.added_mass),
+                                  .bollard_pull = input->tow.vessel.bollard_pull,
+                                  .free_speed = input->tow.vessel.free_speed,
+                                  .free_resistance = input->tow.vessel.free_resistance,
+                                  .lateral = input->tow.vessel.lateral_drag,
+                                  .lookahead = input->tow.vessel.lookahead,
+                                  .vx = speed * tow->ux,
+                                  .vy = speed * tow->uy};
     }
-    return t;
+    return tow;
 }
 
-void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double way, double d[2])
+void bt_setup_tow_displacement(const bt_case *input, const bt_tow *tow, double way, double d[2])
 {
-    d[0] = way * bt_cos(c->tow.direction);
-    d[1] = way * bt_sin(c->tow.direction);
-    if (t->path.n == 0) return;
+    d[0] = way * bt_cos(input->tow.direction);
+    d[1] = way * bt_sin(input->tow.direction);
+    if (tow->path.n == 0) return;
     double start[2], tangent[2];
-    bt_path_at(&t->path, 0, start, tangent);
-    bt_path_at(&t->path, way, d, tangent);
+    bt_path_at(&tow->path, 0, start, tangent);
+    bt_path_at(&tow->path, way, d, tangent);
     d[0] -= start[0];
     d[1] -= start[1];
 }

@@ -50,11 +50,11 @@ static bt_status reported(bt_status status, bt_errors *err)
 {
     bt_comm_errors(bt_comm_world(), err);
     if (status != BT_OK || err->n > 0) {
-        bt_text t;
-        bt_text_begin(&t);
-        for (size_t i = 0; i < err->n; i++) fprintf(t.out, "%s%s", i ? "\n" : "", err->text[i]);
+        bt_text text;
+        bt_text_begin(&text);
+        for (size_t i = 0; i < err->n; i++) fprintf(text.out, "%s%s", i ? "\n" : "", err->text[i]);
         free(last_error);
-        last_error = bt_text_end(&t);
+        last_error = bt_text_end(&text);
     }
     bt_errors_free(err);
     return status;
@@ -77,18 +77,19 @@ static bt_status refuse_within(void)
 
 // --- begin, steps, end -----------------------------------------------------------------------------------------------
 
-static bt_status read_case(bt_case *c, const bt_simulation_options *o, bt_errors *err)
+static bt_status read_case(bt_case *input, const bt_simulation_options *options, bt_errors *err)
 {
-    *c = (bt_case){0};
-    if (!o->path && !o->text) {
+    *input = (bt_case){0};
+    if (!options->path && !options->text) {
         bt_errors_add(err, "no case: give its file in path, or the case itself in text");
         return BT_ERR_USAGE;
     }
-    const char **place = bt_alloc((size_t)o->n_set, sizeof *place);
-    for (int i = 0; i < o->n_set; i++) place[i] = ""; // messages name the value itself, and no option --set
+    const char **place = bt_alloc((size_t)options->n_set, sizeof *place);
+    for (int i = 0; i < options->n_set; i++) place[i] = ""; // messages name the value itself, and no option --set
     const bt_status status =
-        o->text ? bt_case_read_text(c, o->path ? o->path : "case", o->text, o->set, place, o->n_set, err)
-                : bt_case_read_placed(c, o->path, o->set, place, o->n_set, err);
+        options->text ? bt_case_read_text(input, options->path ? options->path : "case", options->text, options->set,
+                                          place, options->n_set, err)
+                      : bt_case_read_placed(input, options->path, options->set, place, options->n_set, err);
     free(place);
     return status;
 }
@@ -104,146 +105,150 @@ static char *place_of(const char *path)
     return whole;
 }
 
-static void release(bt_simulation *s)
+static void release(bt_simulation *sim)
 {
-    bt_lock_drop(s->dir, s->m.lock);
-    bt_case_free(&s->c);
-    free(s->dir);
-    free(s->from);
-    free(s->command_line);
-    free(s->why);
-    free(s->moved);
-    free(s);
+    bt_lock_drop(sim->dir, sim->m.lock);
+    bt_case_free(&sim->c);
+    free(sim->dir);
+    free(sim->from);
+    free(sim->command_line);
+    free(sim->why);
+    free(sim->moved);
+    free(sim);
 }
 
-static bt_simulation *simulation_of(const bt_simulation_options *o)
+static bt_simulation *simulation_of(const bt_simulation_options *options)
 {
-    bt_simulation *s = bt_alloc(1, sizeof *s);
-    s->dir = place_of(o->dir);
-    s->from = place_of(o->from);
-    s->command_line = copy_of(o->command_line);
-    s->o = (bt_run_options){.dir = s->dir,
-                            .from = s->from,
-                            .threads = o->threads,
-                            .quiet = !o->progress || bt_comm_world()->rank != 0,
-                            .dump_step = -1,
-                            .command_line = s->command_line,
-                            .leave_signals = !o->signals};
-    s->alone = true;
-    s->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
-    return s;
+    bt_simulation *sim = bt_alloc(1, sizeof *sim);
+    sim->dir = place_of(options->dir);
+    sim->from = place_of(options->from);
+    sim->command_line = copy_of(options->command_line);
+    sim->o = (bt_run_options){.dir = sim->dir,
+                              .from = sim->from,
+                              .threads = options->threads,
+                              .quiet = !options->progress || bt_comm_world()->rank != 0,
+                              .dump_step = -1,
+                              .command_line = sim->command_line,
+                              .leave_signals = !options->signals};
+    sim->alone = true;
+    sim->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
+    return sim;
 }
 
-static bt_status begin(bt_simulation *s, bt_errors *err)
+static bt_status begin(bt_simulation *sim, bt_errors *err)
 {
-    const bt_status status = bt_running_begin(&s->r, bt_comm_world(), &s->c, &s->o, &s->m, err);
-    if (status != BT_OK) bt_running_end(&s->r, status, err);
+    const bt_status status = bt_running_begin(&sim->r, bt_comm_world(), &sim->c, &sim->o, &sim->m, err);
+    if (status != BT_OK) bt_running_end(&sim->r, status, err);
     return status;
 }
 
-static bt_status check_numbers(const bt_simulation_options *o, bt_errors *err)
+static bt_status check_numbers(const bt_simulation_options *options, bt_errors *err)
 {
-    if (o->n_set < 0 || (o->n_set > 0 && !o->set)) {
-        bt_errors_add(err, "n_set: %d is no number of texts in set", o->n_set);
+    if (options->n_set < 0 || (options->n_set > 0 && !options->set)) {
+        bt_errors_add(err, "n_set: %d is no number of texts in set", options->n_set);
         return BT_ERR_USAGE;
     }
-    if (o->threads >= 0 && o->threads <= BT_MOST_THREADS) return BT_OK;
+    if (options->threads >= 0 && options->threads <= BT_MOST_THREADS) return BT_OK;
     bt_errors_add(err, "threads: %d cannot be had; give 1 to %d, or 0 for run.threads of the case or all cores",
-                  o->threads, BT_MOST_THREADS);
+                  options->threads, BT_MOST_THREADS);
     return BT_ERR_USAGE;
 }
 
 /// The end of create and resume.
-static bt_status hand_out(bt_simulation **out, bt_simulation *s, bt_status status, bt_errors *err)
+static bt_status hand_out(bt_simulation **out, bt_simulation *sim, bt_status status, bt_errors *err)
 {
-    *out = status == BT_OK ? s : NULL;
-    if (status != BT_OK) release(s);
+    *out = status == BT_OK ? sim : NULL;
+    if (status != BT_OK) release(sim);
     return reported(status, err);
 }
 
-bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *o)
+bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *options)
 {
     const bt_comm *comm = bt_comm_world();
     bt_errors err = {0};
-    bt_simulation *s = simulation_of(o);
-    bt_status status = check_numbers(o, &err);
-    if (status == BT_OK) status = read_case(&s->c, o, &err);
-    if (status == BT_OK && s->dir && comm->rank == 0)
-        status = bt_folder_may_take(s->dir, o->replace, "give another folder, or replace=True to replace it", &err);
+    bt_simulation *sim = simulation_of(options);
+    bt_status status = check_numbers(options, &err);
+    if (status == BT_OK) status = read_case(&sim->c, options, &err);
+    if (status == BT_OK && sim->dir && comm->rank == 0)
+        status = bt_folder_may_take(sim->dir, options->replace, "give another folder, or replace=True to replace it",
+                                    &err);
     status = bt_comm_agree(comm, status);
-    if (status == BT_OK) status = begin(s, &err);
-    return hand_out(out, s, status, &err);
+    if (status == BT_OK) status = begin(sim, &err);
+    return hand_out(out, sim, status, &err);
 }
 
-bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options *o)
+bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options *options)
 {
     bt_errors err = {0};
-    bt_simulation *s = simulation_of(o);
-    bt_resume k = {.lock = -1};
-    bt_status status = check_numbers(o, &err);
-    if (!o->dir) bt_errors_add(&err, "no folder to go on in; name that of the run in the options (dir)");
-    else if (o->path || o->text || o->n_set > 0)
-        bt_errors_add(&err, "%s holds the case that goes on; path, text and set are for another simulation", o->dir);
+    bt_simulation *sim = simulation_of(options);
+    bt_resume resume = {.lock = -1};
+    bt_status status = check_numbers(options, &err);
+    if (!options->dir) bt_errors_add(&err, "no folder to go on in; name that of the run in the options (dir)");
+    else if (options->path || options->text || options->n_set > 0)
+        bt_errors_add(&err, "%s holds the case that goes on; path, text and set are for another simulation",
+                      options->dir);
     if (err.n > 0) status = BT_ERR_USAGE;
-    else status = bt_resume_begin(&k, bt_comm_world(), &s->o, &err);
-    if (status == BT_OK && k.finished) {
-        bt_errors_add(&err, "%s is finished: all %lld steps are done", o->dir, (long long)bt_case_steps(&k.c));
+    else status = bt_resume_begin(&resume, bt_comm_world(), &sim->o, &err);
+    if (status == BT_OK && resume.finished) {
+        bt_errors_add(&err, "%s is finished: all %lld steps are done", options->dir,
+                      (long long)bt_case_steps(&resume.c));
         status = BT_ERR_USAGE;
     }
-    s->m.lock = k.lock;
-    s->m.held = true;
-    s->c = k.c; // ours from here on
-    k.c = (bt_case){0};
+    sim->m.lock = resume.lock;
+    sim->m.held = true;
+    sim->c = resume.c; // ours from here on
+    resume.c = (bt_case){0};
     if (status == BT_OK) {
-        s->m.kept = k.fresh ? NULL : &k.s;
-        status = begin(s, &err);
-        s->m.kept = NULL;
+        sim->m.kept = resume.fresh ? NULL : &resume.s;
+        status = begin(sim, &err);
+        sim->m.kept = NULL;
     }
-    bt_resume_end(&k);
-    return hand_out(out, s, status, &err);
+    bt_resume_end(&resume);
+    return hand_out(out, sim, status, &err);
 }
 
 /// Can the state before the step that failed be made again from what the folder holds, and nothing else?
-static bool keeps_failure(const bt_simulation *s)
+static bool keeps_failure(const bt_simulation *sim)
 {
-    const bool unsound = s->status == BT_ERR_NUMERIC && s->r.w->step > s->r.first_step;
-    return unsound && s->dir && s->alone && !s->r.edited;
+    const bool unsound = sim->status == BT_ERR_NUMERIC && sim->r.w->step > sim->r.first_step;
+    return unsound && sim->dir && sim->alone && !sim->r.edited;
 }
 
-static void forget_moved(bt_simulation *s)
+static void forget_moved(bt_simulation *sim)
 {
-    free(s->moved);
-    s->moved = NULL;
+    free(sim->moved);
+    sim->moved = NULL;
 }
 
-bt_status bt_simulation_step(bt_simulation *s, int64_t n)
+bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
 {
     bt_errors err = {0};
     if (stepping) return refuse_within(); // of any: applied forces have the bodies of one world at a time
-    if (s->status != BT_OK) return refuse("a step has failed before; end the simulation");
-    s->alone = s->alone && !bt_force_is_applied();
-    if (n > 0) forget_moved(s);
-    stepping = s;
-    for (; n > 0 && s->status == BT_OK && bt_running_goes_on(&s->r); n--) s->status = bt_running_step(&s->r, &err);
+    if (sim->status != BT_OK) return refuse("a step has failed before; end the simulation");
+    sim->alone = sim->alone && !bt_force_is_applied();
+    if (n > 0) forget_moved(sim);
+    stepping = sim;
+    for (; n > 0 && sim->status == BT_OK && bt_running_goes_on(&sim->r); n--)
+        sim->status = bt_running_step(&sim->r, &err);
     stepping = NULL;
-    if (s->status == BT_OK && bt_halt_stops(s->r.asked)) {
-        bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)s->r.w->step);
-        s->status = BT_ERR_SIGNAL;
+    if (sim->status == BT_OK && bt_halt_stops(sim->r.asked)) {
+        bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)sim->r.w->step);
+        sim->status = BT_ERR_SIGNAL;
     }
-    if (keeps_failure(s))
-        bt_errors_add(&err, "the end of the simulation writes the state before that step to %s/%s", s->dir,
+    if (keeps_failure(sim))
+        bt_errors_add(&err, "the end of the simulation writes the state before that step to %s/%s", sim->dir,
                       BT_FAILURE_FILE);
-    const bt_status status = reported(s->status, &err);
-    if (status != BT_OK) s->why = bt_text_copy(bt_last_error());
+    const bt_status status = reported(sim->status, &err);
+    if (status != BT_OK) sim->why = bt_text_copy(bt_last_error());
     return status;
 }
 
 /// Collective. The parts, and the state before a step that was not sound.
-static bt_status close_parts(bt_simulation *s, bt_status status, bt_errors *err)
+static bt_status close_parts(bt_simulation *sim, bt_status status, bt_errors *err)
 {
-    const bool keep = keeps_failure(s);
-    status = bt_running_end(&s->r, status, err);
-    if (keep) bt_run_keep_failure(bt_comm_world(), &s->c, &s->o, s->r.failed, s->m.start, err);
+    const bool keep = keeps_failure(sim);
+    status = bt_running_end(&sim->r, status, err);
+    if (keep) bt_run_keep_failure(bt_comm_world(), &sim->c, &sim->o, sim->r.failed, sim->m.start, err);
     return status;
 }
 
@@ -256,57 +261,57 @@ static void add_lines(bt_errors *err, const char *text)
     free(copy);
 }
 
-bt_status bt_simulation_end(bt_simulation *s)
+bt_status bt_simulation_end(bt_simulation *sim)
 {
-    if (s == stepping) return refuse_within();
+    if (sim == stepping) return refuse_within();
     bt_errors err = {0};
-    bt_status status = s->status == BT_ERR_SIGNAL ? BT_OK : s->status;
-    if (s->status == BT_OK) status = bt_running_stop(&s->r, &err);
-    status = close_parts(s, status, &err);
-    if (status != BT_OK && err.n == 0 && s->why) add_lines(&err, s->why);
-    release(s);
+    bt_status status = sim->status == BT_ERR_SIGNAL ? BT_OK : sim->status;
+    if (sim->status == BT_OK) status = bt_running_stop(&sim->r, &err);
+    status = close_parts(sim, status, &err);
+    if (status != BT_OK && err.n == 0 && sim->why) add_lines(&err, sim->why);
+    release(sim);
     return reported(status, &err);
 }
 
-void bt_simulation_drop(bt_simulation *s)
+void bt_simulation_drop(bt_simulation *sim)
 {
-    if (!s) return;
-    if (s == stepping) {
+    if (!sim) return;
+    if (sim == stepping) {
         refuse_within();
         return;
     }
     bt_errors err = {0};
-    close_parts(s, s->status == BT_OK ? BT_ERR_USAGE : s->status, &err);
+    close_parts(sim, sim->status == BT_OK ? BT_ERR_USAGE : sim->status, &err);
     bt_errors_free(&err);
-    release(s);
+    release(sim);
 }
 
-bt_status bt_simulation_checkpoint(bt_simulation *s)
+bt_status bt_simulation_checkpoint(bt_simulation *sim)
 {
     bt_errors err = {0};
-    if (s == stepping) return refuse_within();
-    if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
-    if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
-    return reported(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
+    if (sim == stepping) return refuse_within();
+    if (!sim->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
+    if (sim->status != BT_OK) return refuse("a step has failed: its state is not kept");
+    return reported(bt_running_checkpoint(&sim->r, BT_CHECKPOINT_FILE, &err), &err);
 }
 
-bt_status bt_simulation_frame(bt_simulation *s)
+bt_status bt_simulation_frame(bt_simulation *sim)
 {
     bt_errors err = {0};
-    if (s == stepping) return refuse_within();
-    if (!s->dir) return refuse("there is no folder for a frame; name one in the options (dir)");
-    if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
-    return reported(bt_running_frame(&s->r, &err), &err);
+    if (sim == stepping) return refuse_within();
+    if (!sim->dir) return refuse("there is no folder for a frame; name one in the options (dir)");
+    if (sim->status != BT_OK) return refuse("a step has failed: its state is not kept");
+    return reported(bt_running_frame(&sim->r, &err), &err);
 }
 
-int64_t bt_simulation_steps(const bt_simulation *s) { return s->r.w->step; }
-int64_t bt_simulation_steps_left(const bt_simulation *s)
+int64_t bt_simulation_steps(const bt_simulation *sim) { return sim->r.w->step; }
+int64_t bt_simulation_steps_left(const bt_simulation *sim)
 {
-    return s->status == BT_OK && bt_running_goes_on(&s->r) ? s->r.end_step - s->r.w->step : 0;
+    return sim->status == BT_OK && bt_running_goes_on(&sim->r) ? sim->r.end_step - sim->r.w->step : 0;
 }
-double bt_simulation_dt(const bt_simulation *s) { return s->r.w->par.dt; }
-double bt_simulation_time(const bt_simulation *s) { return (double)s->r.w->step * s->r.w->par.dt; }
-uint64_t bt_simulation_hash(const bt_simulation *s) { return bt_world_hash(s->r.w); }
+double bt_simulation_dt(const bt_simulation *sim) { return sim->r.w->par.dt; }
+double bt_simulation_time(const bt_simulation *sim) { return (double)sim->r.w->step * sim->r.w->par.dt; }
+uint64_t bt_simulation_hash(const bt_simulation *sim) { return bt_world_hash(sim->r.w); }
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
@@ -315,54 +320,55 @@ const int bt_body_widths[BT_BODY_KINDS] = {
     [BT_BODY_RADIUS] = 1, [BT_BODY_THICKNESS] = 1, [BT_BODY_MOTION] = 1, [BT_BODY_DRAG] = 5,
 };
 
-int64_t bt_simulation_bodies(const bt_simulation *s) { return s->r.w->bodies.n_global; }
-int64_t bt_simulation_towed(const bt_simulation *s) { return s->r.w->towed; }
+int64_t bt_simulation_bodies(const bt_simulation *sim) { return sim->r.w->bodies.n_global; }
+int64_t bt_simulation_towed(const bt_simulation *sim) { return sim->r.w->towed; }
 
-static void numbers_of(const bt_bodies *b, bt_idx i, bt_body_numbers kind, double *out)
+static void numbers_of(const bt_bodies *bodies, bt_idx i, bt_body_numbers kind, double *out)
 {
-    const bt_pose *p = &b->pose[i];
-    const bt_vel *v = &b->vel[i];
-    const bt_drag *d = &b->drag[i];
+    const bt_pose *pose = &bodies->pose[i];
+    const bt_vel *v = &bodies->vel[i];
+    const bt_drag *drag = &bodies->drag[i];
     switch (kind) {
-    case BT_BODY_PLACE: out[0] = p->x, out[1] = p->y, out[2] = p->yaw; break;
+    case BT_BODY_PLACE: out[0] = pose->x, out[1] = pose->y, out[2] = pose->yaw; break;
     case BT_BODY_VELOCITY: out[0] = v->x, out[1] = v->y, out[2] = v->w; break;
-    case BT_BODY_MASS: out[0] = b->mass[i], out[1] = b->share[i] * b->mass[i]; break;
-    case BT_BODY_INERTIA: out[0] = b->inertia[i]; break;
-    case BT_BODY_AREA: out[0] = b->area[i]; break;
-    case BT_BODY_RADIUS: out[0] = b->radius[i]; break;
-    case BT_BODY_THICKNESS: out[0] = b->thickness[i]; break;
-    case BT_BODY_MOTION: out[0] = b->motion[i]; break;
+    case BT_BODY_MASS: out[0] = bodies->mass[i], out[1] = bodies->share[i] * bodies->mass[i]; break;
+    case BT_BODY_INERTIA: out[0] = bodies->inertia[i]; break;
+    case BT_BODY_AREA: out[0] = bodies->area[i]; break;
+    case BT_BODY_RADIUS: out[0] = bodies->radius[i]; break;
+    case BT_BODY_THICKNESS: out[0] = bodies->thickness[i]; break;
+    case BT_BODY_MOTION: out[0] = bodies->motion[i]; break;
     case BT_BODY_DRAG:
-        memcpy(out, (const double[]){d->water_skin, d->water_form, d->air_skin, d->air_form, d->yaw}, 5 * sizeof *out);
+        memcpy(out, (const double[]){drag->water_skin, drag->water_form, drag->air_skin, drag->air_form, drag->yaw},
+               5 * sizeof *out);
         break;
     case BT_BODY_KINDS: break;
     }
 }
 
-bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, double *out)
+bt_status bt_simulation_read(const bt_simulation *sim, bt_body_numbers kind, double *out)
 {
     if ((unsigned)kind >= BT_BODY_KINDS) return refuse("there are no such numbers of a body; see bt_body_numbers");
-    const bt_bodies *b = &s->r.w->bodies;
+    const bt_bodies *bodies = &sim->r.w->bodies;
     const int width = bt_body_widths[kind];
-    for (bt_gid gid = 0; gid < b->n_global; gid++) {
-        const bt_idx i = b->index_of[gid];
-        if (i >= 0) numbers_of(b, i, kind, out + width * gid);
+    for (bt_gid gid = 0; gid < bodies->n_global; gid++) {
+        const bt_idx i = bodies->index_of[gid];
+        if (i >= 0) numbers_of(bodies, i, kind, out + width * gid);
         else
             for (int k = 0; k < width; k++) out[width * gid + k] = NAN;
     }
     return BT_OK;
 }
 
-int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, int64_t room)
+int64_t bt_simulation_outline(const bt_simulation *sim, int64_t id, double *xy, int64_t room)
 {
-    const bt_bodies *b = &s->r.w->bodies;
-    const bt_idx i = id < 0 || id >= b->n_global ? -1 : b->index_of[id];
+    const bt_bodies *bodies = &sim->r.w->bodies;
+    const bt_idx i = id < 0 || id >= bodies->n_global ? -1 : bodies->index_of[id];
     if (i < 0) return 0;
-    const int n = bt_body_corners(b, i);
-    const double *v = b->outline + 2 * b->offset[i];
+    const int n = bt_body_corners(bodies, i);
+    const double *v = bodies->outline + 2 * bodies->offset[i];
     for (int k = 0; k < n && k < room; k++) {
-        xy[2 * k] = b->pose[i].x + v[2 * k];
-        xy[2 * k + 1] = b->pose[i].y + v[2 * k + 1];
+        xy[2 * k] = bodies->pose[i].x + v[2 * k];
+        xy[2 * k + 1] = bodies->pose[i].y + v[2 * k + 1];
     }
     return n;
 }
@@ -370,93 +376,93 @@ int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, in
 #define NO_EDIT "a step has failed, or was the last: there is no next one for which a body could be changed"
 
 /// What a frame or a checkpoint has of this step is no longer the state.
-static bt_status edited(bt_simulation *s, bt_status status, bt_errors *err)
+static bt_status edited(bt_simulation *sim, bt_status status, bt_errors *err)
 {
     if (status == BT_OK) {
-        s->r.edited = true;
-        s->r.framed = -1;
+        sim->r.edited = true;
+        sim->r.framed = -1;
     }
     return reported(status, err);
 }
 
-bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate)
+bt_status bt_simulation_set_velocity(bt_simulation *sim, int64_t id, double x, double y, double rate)
 {
     bt_errors err = {0};
-    if (s == stepping) return refuse_within();
-    if (s->status != BT_OK) return refuse(NO_EDIT);
-    return edited(s, bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
+    if (sim == stepping) return refuse_within();
+    if (sim->status != BT_OK) return refuse(NO_EDIT);
+    return edited(sim, bt_edit_velocity(sim->r.w, id, (const double[]){x, y, rate}, &err), &err);
 }
 
 static bool is_outside(double x, double low, double length) { return x < low || x > low + length; }
 
-bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw)
+bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, double y, double yaw)
 {
-    if (s == stepping) return refuse_within();
-    if (s->status != BT_OK) return refuse(NO_EDIT);
+    if (sim == stepping) return refuse_within();
+    if (sim->status != BT_OK) return refuse(NO_EDIT);
     bt_errors err = {0};
-    const bt_params *p = &s->r.w->par;
-    const double length = s->c.domain.length, width = s->c.domain.width;
-    if (is_outside(x, p->x0, length) || is_outside(y, p->y0, width)) {
+    const bt_params *par = &sim->r.w->par;
+    const double length = sim->c.domain.length, width = sim->c.domain.width;
+    if (is_outside(x, par->x0, length) || is_outside(y, par->y0, width)) {
         bt_errors_add(&err, "body %lld: (%g, %g) m is outside of the domain, %g x %g m from (%g, %g)", (long long)id, x,
-                      y, length, width, p->x0, p->y0);
+                      y, length, width, par->x0, par->y0);
         return reported(BT_ERR_USAGE, &err);
     }
-    const bt_status status = bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err);
+    const bt_status status = bt_edit_place(sim->r.w, id, (const double[]){x, y, yaw}, &err);
     if (status == BT_OK) {
-        if (!s->moved) s->moved = bt_alloc((size_t)s->r.w->bodies.n_global, sizeof *s->moved);
-        s->moved[id] = true;
+        if (!sim->moved) sim->moved = bt_alloc((size_t)sim->r.w->bodies.n_global, sizeof *sim->moved);
+        sim->moved[id] = true;
     }
-    return edited(s, status, &err);
+    return edited(sim, status, &err);
 }
 
 // --- numbers and contacts --------------------------------------------------------------------------------------------
 
-bt_status bt_simulation_quantity(const bt_simulation *s, const char *name, double *value)
+bt_status bt_simulation_quantity(const bt_simulation *sim, const char *name, double *value)
 {
-    const bt_quantity *q = bt_series_find(name);
+    const bt_quantity *quantity = bt_series_find(name);
     *value = NAN;
-    if (!q) {
+    if (!quantity) {
         bt_errors err = {0};
         bt_errors_add(&err, "%s: there is no series of this name; see bergtow --list-quantities", name);
         return reported(BT_ERR_USAGE, &err);
     }
-    if (s->r.w->step > s->r.first_step) *value = bt_sample_value(&s->r.sample, q);
+    if (sim->r.w->step > sim->r.first_step) *value = bt_sample_value(&sim->r.sample, quantity);
     return BT_OK;
 }
 
 /// Arms from body a, from their components along normal and tangent: r·n = r×t, r·t = −r×n.
-static void columns_of(const bt_bodies *b, const bt_contact *c, double *out)
+static void columns_of(const bt_bodies *bodies, const bt_contact *contact, double *out)
 {
-    const bt_pose *p = &b->pose[c->a];
+    const bt_pose *pose = &bodies->pose[contact->a];
     double at[2][2];
     for (int i = 0; i < 2; i++) {
-        at[i][0] = p->x + c->rat * c->nx + c->ran[i] * c->ny;
-        at[i][1] = p->y + c->rat * c->ny - c->ran[i] * c->nx;
-        if (i >= c->n) at[i][0] = at[i][1] = NAN;
+        at[i][0] = pose->x + contact->rat * contact->nx + contact->ran[i] * contact->ny;
+        at[i][1] = pose->y + contact->rat * contact->ny - contact->ran[i] * contact->nx;
+        if (i >= contact->n) at[i][0] = at[i][1] = NAN;
     }
     memcpy(out,
            (const double[BT_CONTACT_COLUMNS]){
-               (double)b->gid[c->a], (double)b->gid[c->b], c->n, at[0][0], at[0][1], at[1][0], at[1][1], c->nx, c->ny,
-               c->ln[0], c->ln[1], c->lt},
+               (double)bodies->gid[contact->a], (double)bodies->gid[contact->b], contact->n, at[0][0], at[0][1],
+               at[1][0], at[1][1], contact->nx, contact->ny, contact->ln[0], contact->ln[1], contact->lt},
            BT_CONTACT_COLUMNS * sizeof *out);
 }
 
 /// Its bodies are where the last step left them: of one that was put elsewhere the contact is over.
-static bool still_there(const bt_simulation *s, const bt_contact *c)
+static bool still_there(const bt_simulation *sim, const bt_contact *contact)
 {
-    const bt_gid *gid = s->r.w->bodies.gid;
-    return !s->moved || !(s->moved[gid[c->a]] || s->moved[gid[c->b]]);
+    const bt_gid *gid = sim->r.w->bodies.gid;
+    return !sim->moved || !(sim->moved[gid[contact->a]] || sim->moved[gid[contact->b]]);
 }
 
-int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room)
+int64_t bt_simulation_contacts(const bt_simulation *sim, double *out, int64_t room)
 {
-    const bt_world *w = s->r.w;
+    const bt_world *world = sim->r.w;
     int64_t n = 0;
-    for (bt_idx k = 0; k < w->cells->n; k++) {
-        const bt_cell *cell = &w->cells->cell[k];
+    for (bt_idx k = 0; k < world->cells->n; k++) {
+        const bt_cell *cell = &world->cells->cell[k];
         for (bt_idx j = 0; cell->own && j < cell->n_contacts; j++) {
-            if (!still_there(s, &cell->contacts[j])) continue;
-            if (n < room) columns_of(&w->bodies, &cell->contacts[j], out + BT_CONTACT_COLUMNS * n);
+            if (!still_there(sim, &cell->contacts[j])) continue;
+            if (n < room) columns_of(&world->bodies, &cell->contacts[j], out + BT_CONTACT_COLUMNS * n);
             n++;
         }
     }
@@ -465,25 +471,25 @@ int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room
 
 // --- cases and texts -------------------------------------------------------------------------------------------------
 
-bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved, char **values)
+bt_status bt_case_check_text(const bt_simulation_options *options, char **resolved, char **values)
 {
     bt_errors err = {0};
-    bt_case c;
-    const bt_status status = read_case(&c, o, &err);
-    *resolved = status == BT_OK ? bt_case_resolved(&c) : NULL;
-    *values = status == BT_OK ? bt_case_resolved_json(&c) : NULL;
-    bt_case_free(&c);
+    bt_case input;
+    const bt_status status = read_case(&input, options, &err);
+    *resolved = status == BT_OK ? bt_case_resolved(&input) : NULL;
+    *values = status == BT_OK ? bt_case_resolved_json(&input) : NULL;
+    bt_case_free(&input);
     return reported(status, &err);
 }
 
-char *bt_simulation_progress(const bt_simulation *s)
+char *bt_simulation_progress(const bt_simulation *sim)
 {
     char line[BT_PROGRESS_LINE];
-    bt_progress_line(&s->r.progress, line);
+    bt_progress_line(&sim->r.progress, line);
     return bt_text_copy(line);
 }
 
-char *bt_simulation_case(const bt_simulation *s) { return bt_case_resolved(&s->c); }
+char *bt_simulation_case(const bt_simulation *sim) { return bt_case_resolved(&sim->c); }
 
 const char *bt_file_holds(const char *path)
 {
@@ -520,25 +526,25 @@ bt_status bt_seal_check(const char *path, const char *kind)
 /// The records of one member.
 static bt_member_records one_record(uint64_t *seen, const void *made_by, size_t n)
 {
-    bt_member_records r = {.n = 1, .seen = seen};
-    bt_checksum_digest_text(made_by, n, r.study);
-    return r;
+    bt_member_records records = {.n = 1, .seen = seen};
+    bt_checksum_digest_text(made_by, n, records.study);
+    return records;
 }
 
 bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n)
 {
     uint64_t seen = 0;
     bt_errors err = {0};
-    bt_member_records r = one_record(&seen, made_by, n);
-    return reported(bt_member_record_write(&r, 0, name, folder, &err), &err);
+    bt_member_records records = one_record(&seen, made_by, n);
+    return reported(bt_member_record_write(&records, 0, name, folder, &err), &err);
 }
 
 bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n)
 {
     uint64_t seen = 0;
     bt_errors err = {0};
-    bt_member_records r = one_record(&seen, made_by, n);
-    return reported(bt_member_record_check(&r, 0, name, folder, &err), &err);
+    bt_member_records records = one_record(&seen, made_by, n);
+    return reported(bt_member_record_check(&records, 0, name, folder, &err), &err);
 }
 
 bt_status bt_folder_lock(const char *dir, int *lock)
@@ -550,24 +556,24 @@ bt_status bt_folder_lock(const char *dir, int *lock)
 
 static char *limits_json(void)
 {
-    bt_json j = {0};
-    bt_json_open(&j, NULL, '{');
-    bt_json_open(&j, "verdicts", '[');
-    for (int k = 0; k <= BT_TOO_SHORT; k++) bt_json_string(&j, NULL, bt_verdict_names[k]);
-    bt_json_close(&j, ']');
-    bt_json_int(&j, "window_independent", BT_STEADY_INDEPENDENT);
-    bt_json_int(&j, "window_contact_stretches", BT_STEADY_STRETCHES);
-    bt_json_number(&j, "window_drift", BT_STEADY_MATERIAL);
-    bt_json_number(&j, "locking_body_widths", BT_ARCH_LOCKING);
-    bt_json_number(&j, "map_farthest_m", BT_MAP_FARTHEST);
-    bt_json_int(&j, "threads", BT_MOST_THREADS);
-    bt_json_int(&j, "contact_columns", BT_CONTACT_COLUMNS);
-    bt_json_string(&j, "map_local_crs", BT_MAP_LOCAL_NAME);
-    bt_json_open(&j, "map_words_near_thickness", '[');
-    for (int k = 0; bt_map_near_thickness[k]; k++) bt_json_string(&j, NULL, bt_map_near_thickness[k]);
-    bt_json_close(&j, ']');
-    bt_json_close(&j, '}');
-    return j.text;
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    bt_json_open(&json, "verdicts", '[');
+    for (int k = 0; k <= BT_TOO_SHORT; k++) bt_json_string(&json, NULL, bt_verdict_names[k]);
+    bt_json_close(&json, ']');
+    bt_json_int(&json, "window_independent", BT_STEADY_INDEPENDENT);
+    bt_json_int(&json, "window_contact_stretches", BT_STEADY_STRETCHES);
+    bt_json_number(&json, "window_drift", BT_STEADY_MATERIAL);
+    bt_json_number(&json, "locking_body_widths", BT_ARCH_LOCKING);
+    bt_json_number(&json, "map_farthest_m", BT_MAP_FARTHEST);
+    bt_json_int(&json, "threads", BT_MOST_THREADS);
+    bt_json_int(&json, "contact_columns", BT_CONTACT_COLUMNS);
+    bt_json_string(&json, "map_local_crs", BT_MAP_LOCAL_NAME);
+    bt_json_open(&json, "map_words_near_thickness", '[');
+    for (int k = 0; bt_map_near_thickness[k]; k++) bt_json_string(&json, NULL, bt_map_near_thickness[k]);
+    bt_json_close(&json, ']');
+    bt_json_close(&json, '}');
+    return json.text;
 }
 
 char *bt_list_json(const char *what)
@@ -575,10 +581,10 @@ char *bt_list_json(const char *what)
     if (!strcmp(what, "limits")) return limits_json();
     const bool keys = !strcmp(what, "keys");
     if (!keys && strcmp(what, "quantities") != 0) return NULL;
-    bt_text t;
-    bt_text_begin(&t);
-    (keys ? bt_case_list_keys_json : bt_quantities_list_json)(t.out);
-    return bt_text_end(&t);
+    bt_text text;
+    bt_text_begin(&text);
+    (keys ? bt_case_list_keys_json : bt_quantities_list_json)(text.out);
+    return bt_text_end(&text);
 }
 
 void bt_release(char *text) { free(text); }

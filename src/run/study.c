@@ -23,112 +23,114 @@ static void free_texts(char **text, int n)
     free(text);
 }
 
-static void free_sets(bt_study_variant *v, int n)
+static void free_sets(bt_study_variant *variant, int n)
 {
     for (int i = 0; i < n; i++) {
-        free(v[i].name);
-        free_texts(v[i].set, v[i].n_set);
-        free_texts(v[i].at, v[i].n_set);
+        free(variant[i].name);
+        free_texts(variant[i].set, variant[i].n_set);
+        free_texts(variant[i].at, variant[i].n_set);
     }
-    free(v);
+    free(variant);
 }
 
-void bt_study_free(bt_study *s)
+void bt_study_free(bt_study *study)
 {
-    for (int i = 0; i < s->n_parameters; i++) {
-        free(s->parameter[i].name);
-        free(s->parameter[i].at);
-        free(s->parameter[i].source);
-        free(s->parameter[i].stratum);
-        free_texts(s->parameter[i].value, s->parameter[i].n);
+    for (int i = 0; i < study->n_parameters; i++) {
+        free(study->parameter[i].name);
+        free(study->parameter[i].at);
+        free(study->parameter[i].source);
+        free(study->parameter[i].stratum);
+        free_texts(study->parameter[i].value, study->parameter[i].n);
     }
-    free_sets(s->variant, s->n_variants);
-    free_sets(s->with, s->n_with);
-    free_texts(s->set, s->n_set);
-    free_texts(s->set_at, s->n_set);
-    free(s->path);
-    free(s->text);
-    free(s->title);
-    free(s->base_name);
-    free(s->base);
-    *s = (bt_study){0};
+    free_sets(study->variant, study->n_variants);
+    free_sets(study->with, study->n_with);
+    free_texts(study->set, study->n_set);
+    free_texts(study->set_at, study->n_set);
+    free(study->path);
+    free(study->text);
+    free(study->title);
+    free(study->base_name);
+    free(study->base);
+    *study = (bt_study){0};
 }
 
 // --- members ---------------------------------------------------------------------------------------------------------
 
-static void add_override(bt_member *m, char *set, const char *at)
+static void add_override(bt_member *member, char *set, const char *at)
 {
-    m->at[m->n_set] = at;
-    m->set[m->n_set++] = set;
+    member->at[member->n_set] = at;
+    member->set[member->n_set++] = set;
 }
 
-void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
+void bt_study_member(const bt_study *study, int64_t m, bt_member *out)
 {
-    *out = (bt_member){.condition = m / s->repeats, .repeat = m % s->repeats};
+    *out = (bt_member){.condition = m / study->repeats, .repeat = m % study->repeats};
     snprintf(out->name, sizeof out->name, "c%03" PRId64 "-r%03" PRId64, out->condition + 1, out->repeat + 1);
-    const int64_t condition = s->common_fields ? 0 : out->condition;
-    bt_rng r = bt_rng_start(s->seed, BT_RNG_MEMBER, condition * ((int64_t)1 << 32) + out->repeat);
-    out->seed = (int64_t)(bt_rng_bits(&r) >> 2); // below 4.7e18
-    int most = s->n_set + s->n_parameters + 1;
-    for (int i = 0; i < s->n_variants; i++) most += s->variant[i].n_set;
-    for (int i = 0; i < s->n_with; i++) most += s->with[i].n_set;
+    const int64_t condition = study->common_fields ? 0 : out->condition;
+    bt_rng rng = bt_rng_start(study->seed, BT_RNG_MEMBER, condition * ((int64_t)1 << 32) + out->repeat);
+    out->seed = (int64_t)(bt_rng_bits(&rng) >> 2); // below 4.7e18
+    int most = study->n_set + study->n_parameters + 1;
+    for (int i = 0; i < study->n_variants; i++) most += study->variant[i].n_set;
+    for (int i = 0; i < study->n_with; i++) most += study->with[i].n_set;
     out->set = bt_alloc((size_t)most, sizeof *out->set);
     out->at = bt_alloc((size_t)most, sizeof *out->at);
-    for (int i = 0; i < s->n_set; i++) add_override(out, bt_text_copy(s->set[i]), s->set_at[i]);
-    for (int p = 0; p < s->n_parameters; p++) {
-        out->value[p] = bt_study_value(s, p, out->condition);
-        if (s->parameter[p].key >= 0) {
-            char *given = bt_text_of("%s=%s", s->parameter[p].name, out->value[p]);
-            add_override(out, given, s->parameter[p].at);
-            for (int i = 0; i < s->n_with; i++)
-                for (int k = 0; s->with[i].axis == p && k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++)
-                    add_override(out, bt_text_copy(s->with[i].set[k]), s->with[i].at[k]);
+    for (int i = 0; i < study->n_set; i++) add_override(out, bt_text_copy(study->set[i]), study->set_at[i]);
+    for (int p = 0; p < study->n_parameters; p++) {
+        out->value[p] = bt_study_value(study, p, out->condition);
+        if (study->parameter[p].key >= 0) {
+            char *given = bt_text_of("%s=%s", study->parameter[p].name, out->value[p]);
+            add_override(out, given, study->parameter[p].at);
+            for (int i = 0; i < study->n_with; i++)
+                for (int k = 0; study->with[i].axis == p && k < study->with[i].n_set &&
+                     !strcmp(study->with[i].name, given); k++)
+                    add_override(out, bt_text_copy(study->with[i].set[k]), study->with[i].at[k]);
             continue;
         }
-        for (int i = 0; i < s->n_variants; i++)
-            for (int k = 0; k < s->variant[i].n_set && !strcmp(s->variant[i].name, out->value[p]); k++)
-                add_override(out, bt_text_copy(s->variant[i].set[k]), s->variant[i].at[k]);
+        for (int i = 0; i < study->n_variants; i++)
+            for (int k = 0; k < study->variant[i].n_set && !strcmp(study->variant[i].name, out->value[p]); k++)
+                add_override(out, bt_text_copy(study->variant[i].set[k]), study->variant[i].at[k]);
     }
     add_override(out, bt_text_of("ice.seed=%" PRId64, out->seed), NULL);
 }
 
-void bt_member_free(bt_member *m)
+void bt_member_free(bt_member *member)
 {
-    free_texts(m->set, m->n_set);
-    free(m->at);
-    for (int i = 0; i < BT_MAX_PARAMETERS; i++) free(m->value[i]);
-    *m = (bt_member){0};
+    free_texts(member->set, member->n_set);
+    free(member->at);
+    for (int i = 0; i < BT_MAX_PARAMETERS; i++) free(member->value[i]);
+    *member = (bt_member){0};
 }
 
 /// A title of the study names its members, which that of the base, of one condition, would name wrongly.
-static void name_member(const bt_study *s, const bt_member *m, bt_case *c)
+static void name_member(const bt_study *study, const bt_member *member, bt_case *input)
 {
-    for (int i = 0; i < m->n_set; i++)
-        if (!strncmp(m->set[i], "run.title=", 10)) return;
-    if (!s->title || !*s->title) return;
+    for (int i = 0; i < member->n_set; i++)
+        if (!strncmp(member->set[i], "run.title=", 10)) return;
+    if (!study->title || !*study->title) return;
     char text[1024];
-    size_t n = (size_t)snprintf(text, sizeof text, "%s", s->title);
-    for (int p = 0; p < s->n_parameters && n < sizeof text; p++) {
-        const char *key = s->parameter[p].key >= 0 ? s->parameter[p].name : "";
-        n += (size_t)snprintf(text + n, sizeof text - n, ", %s%s%s", key, *key ? " " : "", m->value[p]);
+    size_t n = (size_t)snprintf(text, sizeof text, "%s", study->title);
+    for (int p = 0; p < study->n_parameters && n < sizeof text; p++) {
+        const char *key = study->parameter[p].key >= 0 ? study->parameter[p].name : "";
+        n += (size_t)snprintf(text + n, sizeof text - n, ", %s%s%s", key, *key ? " " : "", member->value[p]);
     }
     if (n >= sizeof text) return;
-    free(c->run.title);
-    c->run.title = bt_text_of("%s, field %" PRId64, text, m->repeat + 1);
+    free(input->run.title);
+    input->run.title = bt_text_of("%s, field %" PRId64, text, member->repeat + 1);
 }
 
-bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err)
+bt_status bt_member_case(const bt_study *study, const bt_member *member, bt_case *input, bt_errors *err)
 {
-    const bt_status status = bt_case_read_placed(c, s->base, (const char *const *)m->set, m->at, m->n_set, err);
-    if (status == BT_OK) name_member(s, m, c);
+    const bt_status status = bt_case_read_placed(input, study->base, (const char *const *)member->set, member->at,
+                                                 member->n_set, err);
+    if (status == BT_OK) name_member(study, member, input);
     return status;
 }
 
-bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err)
+bt_status bt_study_base_case(const bt_study *study, bt_case *input, bt_errors *err)
 {
     static const char *const none[] = {NULL};
-    return bt_case_read_placed(c, s->base, (const char *const *)s->set,
-                               s->set_at ? (const char *const *)s->set_at : none, s->n_set, err);
+    return bt_case_read_placed(input, study->base, (const char *const *)study->set,
+                               study->set_at ? (const char *const *)study->set_at : none, study->n_set, err);
 }
 
 /// Length of a line of YAML without its comment.
@@ -156,36 +158,39 @@ bool bt_study_resolved_alike(const char *a, const char *b)
     return true;
 }
 
-char *bt_study_resolved(const bt_study *s, bt_errors *err)
+char *bt_study_resolved(const bt_study *study, bt_errors *err)
 {
-    bt_case c;
-    const bt_status status = bt_study_base_case(s, &c, err);
-    char *base = status == BT_OK ? bt_case_resolved(&c) : NULL;
-    bt_case_free(&c);
+    bt_case input;
+    const bt_status status = bt_study_base_case(study, &input, err);
+    char *base = status == BT_OK ? bt_case_resolved(&input) : NULL;
+    bt_case_free(&input);
     if (!base) return NULL;
     bt_text text;
     bt_text_begin(&text);
     FILE *out = text.out;
     fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another "
                  "study.\n");
-    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed,
-            bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, "sampling")].choices[s->sampling],
-            s->n_conditions, s->common_fields ? "fields: common\n" : "");
-    for (int p = 0; p < s->n_parameters; p++) {
-        fprintf(out, "%s:", s->parameter[p].name);
-        const bt_study_parameter *q = &s->parameter[p];
-        if (q->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
-            fprintf(out, " %s%s from %.17g to %.17g, %s", bt_study_is_whole(q) ? "whole numbers, " : "",
-                    q->logarithmic ? "log" : "linear", q->from, q->to, bt_distribution_name(q->distribution));
+    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", study->seed,
+            bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, "sampling")].choices[study->sampling],
+            study->n_conditions, study->common_fields ? "fields: common\n" : "");
+    for (int p = 0; p < study->n_parameters; p++) {
+        fprintf(out, "%s:", study->parameter[p].name);
+        const bt_study_parameter *parameter = &study->parameter[p];
+        if (parameter->continuous && study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+            fprintf(out, " %s%s from %.17g to %.17g, %s", bt_study_is_whole(parameter) ? "whole numbers, " : "",
+                    parameter->logarithmic ? "log" : "linear", parameter->from, parameter->to,
+                    bt_distribution_name(parameter->distribution));
         } else
-            for (int i = 0; i < s->parameter[p].n; i++) fprintf(out, "%s %s", i ? "," : "", s->parameter[p].value[i]);
+            for (int i = 0; i < study->parameter[p].n; i++)
+                fprintf(out, "%s %s", i ? "," : "", study->parameter[p].value[i]);
         fputc('\n', out);
     }
-    for (int i = 0; i < s->n_variants; i++)
-        for (int k = 0; k < s->variant[i].n_set; k++)
-            fprintf(out, "variant %s: %s\n", s->variant[i].name, s->variant[i].set[k]);
-    for (int i = 0; i < s->n_with; i++)
-        for (int k = 0; k < s->with[i].n_set; k++) fprintf(out, "with %s: %s\n", s->with[i].name, s->with[i].set[k]);
+    for (int i = 0; i < study->n_variants; i++)
+        for (int k = 0; k < study->variant[i].n_set; k++)
+            fprintf(out, "variant %s: %s\n", study->variant[i].name, study->variant[i].set[k]);
+    for (int i = 0; i < study->n_with; i++)
+        for (int k = 0; k < study->with[i].n_set; k++)
+            fprintf(out, "with %s: %s\n", study->with[i].name, study->with[i].set[k]);
     fprintf(out, "# base case with `set`\n%s", base);
     free(base);
     return bt_text_end(&text);
@@ -195,27 +200,29 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
 
 // What a study gives to some of its members alone; reasons in study.h.
 
-static bt_study_setting *add_sets(bt_study_setting *to, const bt_study_variant *v, int n, const char *section)
+static bt_study_setting *add_sets(bt_study_setting *to, const bt_study_variant *variant, int n, const char *section)
 {
     for (int i = 0; i < n; i++)
-        for (int k = 0; k < v[i].n_set; k++)
-            *to++ = (bt_study_setting){v[i].set[k], (int)strcspn(v[i].set[k], "="), v[i].at[k], section, v[i].axis};
+        for (int k = 0; k < variant[i].n_set; k++)
+            *to++ = (bt_study_setting){variant[i].set[k], (int)strcspn(variant[i].set[k], "="), variant[i].at[k],
+                                       section, variant[i].axis};
     return to;
 }
 
 /// All of them, those of parameters first; the caller frees the list.
-static bt_study_setting *study_settings(const bt_study *s, int *n)
+static bt_study_setting *study_settings(const bt_study *study, int *n)
 {
-    size_t most = (size_t)s->n_parameters + 1;
-    for (int i = 0; i < s->n_variants; i++) most += (size_t)s->variant[i].n_set;
-    for (int i = 0; i < s->n_with; i++) most += (size_t)s->with[i].n_set;
+    size_t most = (size_t)study->n_parameters + 1;
+    for (int i = 0; i < study->n_variants; i++) most += (size_t)study->variant[i].n_set;
+    for (int i = 0; i < study->n_with; i++) most += (size_t)study->with[i].n_set;
     bt_study_setting *list = bt_alloc(most, sizeof *list), *to = list;
-    for (int p = 0; p < s->n_parameters; p++) {
-        const bt_study_parameter *q = &s->parameter[p];
-        if (q->key >= 0) *to++ = (bt_study_setting){q->name, (int)strlen(q->name), q->at, "parameters", p};
+    for (int p = 0; p < study->n_parameters; p++) {
+        const bt_study_parameter *parameter = &study->parameter[p];
+        if (parameter->key >= 0)
+            *to++ = (bt_study_setting){parameter->name, (int)strlen(parameter->name), parameter->at, "parameters", p};
     }
-    to = add_sets(to, s->variant, s->n_variants, "variants");
-    to = add_sets(to, s->with, s->n_with, "with");
+    to = add_sets(to, study->variant, study->n_variants, "variants");
+    to = add_sets(to, study->with, study->n_with, "with");
     *n = (int)(to - list);
     return list;
 }
@@ -227,12 +234,12 @@ static int by_key(const bt_study_setting *a, const bt_study_setting *b)
     return order ? order : a->length - b->length;
 }
 
-const char *bt_study_varied(const bt_study *s, const char *key)
+const char *bt_study_varied(const bt_study *study, const char *key)
 {
     const bt_study_setting wanted = {.text = key, .length = (int)strlen(key)};
     const char *section = NULL;
     int n;
-    bt_study_setting *list = study_settings(s, &n);
+    bt_study_setting *list = study_settings(study, &n);
     for (int i = 0; i < n && !section; i++)
         if (by_key(&list[i], &wanted) == 0) section = list[i].section;
     free(list);
@@ -247,10 +254,10 @@ static int by_key_in_list(const void *a, const void *b)
     return order ? order : (p > q) - (p < q);
 }
 
-void bt_study_check_axes(const bt_study *s, bt_errors *err)
+void bt_study_check_axes(const bt_study *study, bt_errors *err)
 {
     int n;
-    bt_study_setting *list = study_settings(s, &n);
+    bt_study_setting *list = study_settings(study, &n);
     const bt_study_setting **sorted = bt_alloc((size_t)n + 1, sizeof *sorted);
     for (int i = 0; i < n; i++) sorted[i] = &list[i];
     qsort(sorted, (size_t)n, sizeof *sorted, by_key_in_list);
@@ -261,7 +268,7 @@ void bt_study_check_axes(const bt_study *s, bt_errors *err)
             continue;
         }
         // the sets of one parameter go to different members; its own key, which comes first, goes to all
-        if (x->axis == y->axis && s->parameter[y->axis].name != y->text) continue;
+        if (x->axis == y->axis && study->parameter[y->axis].name != y->text) continue;
         bt_errors_add(err, "%s%.*s: is given under `%s`, and under `%s` in %.*s: a member would run with one value and "
                            "be recorded with the other; remove one",
                       x->at, x->length, x->text, x->section, y->section, (int)strlen(y->at) - 2, y->at);
@@ -278,33 +285,33 @@ typedef struct {
     bool fixed; ///< the ice does not depend on the seed
 } verdict;
 
-static void look_at_condition(const bt_study *s, int64_t condition, verdict *v)
+static void look_at_condition(const bt_study *study, int64_t condition, verdict *v)
 {
-    bt_member m;
-    bt_case c;
+    bt_member member;
+    bt_case input;
     bt_errors unheard = {0};
-    bt_study_member(s, condition * s->repeats, &m);
-    const bool read = bt_member_case(s, &m, &c, &unheard) == BT_OK;
-    v->fixed = v->fixed && read && !bt_case_ice_is_random(&c);
+    bt_study_member(study, condition * study->repeats, &member);
+    const bool read = bt_member_case(study, &member, &input, &unheard) == BT_OK;
+    v->fixed = v->fixed && read && !bt_case_ice_is_random(&input);
     for (int i = 0; i < v->n; i++) {
         char key[96];
         snprintf(key, sizeof key, "%.*s", v->list[i].length, v->list[i].text);
-        v->idle[i] = v->idle[i] && read && bt_case_key_is_idle(&c, key);
+        v->idle[i] = v->idle[i] && read && bt_case_key_is_idle(&input, key);
     }
-    bt_case_free(&c);
-    bt_member_free(&m);
+    bt_case_free(&input);
+    bt_member_free(&member);
     bt_errors_free(&unheard);
 }
 
-void bt_study_check_ice(const bt_study *s, bt_errors *err)
+void bt_study_check_ice(const bt_study *study, bt_errors *err)
 {
-    verdict v = {.fixed = s->repeats > 1};
-    v.list = study_settings(s, &v.n);
+    verdict v = {.fixed = study->repeats > 1};
+    v.list = study_settings(study, &v.n);
     v.idle = bt_alloc((size_t)v.n + 1, sizeof *v.idle);
     for (int i = 0; i < v.n; i++) v.idle[i] = true;
     bool open = true;
-    for (int64_t k = 0; k < s->n_conditions && open; k++) {
-        look_at_condition(s, k, &v);
+    for (int64_t k = 0; k < study->n_conditions && open; k++) {
+        look_at_condition(study, k, &v);
         open = v.fixed;
         for (int i = 0; i < v.n; i++) open = open || v.idle[i];
     }
@@ -313,7 +320,7 @@ void bt_study_check_ice(const bt_study *s, bt_errors *err)
                       "%s: repeats: the ice does not depend on the seed, as it is read from a file, or there is none: "
                       "the %" PRId64 " fields of a condition would be one run; set repeats: 1, and for other ice vary "
                       "the place of the body (body.x, body.y), or the file",
-                      s->path, s->repeats);
+                      study->path, study->repeats);
     for (int i = 0; i < v.n; i++)
         if (v.idle[i])
             bt_errors_add(err, "%s%.*s: has no effect, as all ice is read from files: members that differ by it would "
@@ -328,79 +335,80 @@ void bt_study_check_ice(const bt_study *s, bt_errors *err)
 // The files that the cases of a study name; reasons in study.h.
 
 /// Take over a path. A file that cannot be read is left out.
-static void add(bt_study_files *f, char *path)
+static void add(bt_study_files *files, char *path)
 {
-    bt_named_file x = {.path = path};
+    bt_named_file file = {.path = path};
     bt_errors unheard = {0};
-    bool wanted = path && stat(path, &x.seen) == 0;
-    for (int i = 0; i < f->n && wanted; i++) wanted = strcmp(f->list[i].path, path) != 0;
-    if (wanted && bt_checksum_digest_file(path, x.digest, &x.bytes, &unheard) == BT_OK) {
-        f->list = bt_realloc(f->list, (size_t)f->n + 1, sizeof *f->list);
-        f->list[f->n++] = x;
+    bool wanted = path && stat(path, &file.seen) == 0;
+    for (int i = 0; i < files->n && wanted; i++) wanted = strcmp(files->list[i].path, path) != 0;
+    if (wanted && bt_checksum_digest_file(path, file.digest, &file.bytes, &unheard) == BT_OK) {
+        files->list = bt_realloc(files->list, (size_t)files->n + 1, sizeof *files->list);
+        files->list[files->n++] = file;
     } else {
         free(path);
     }
     bt_errors_free(&unheard);
 }
 
-static char *text_of(const bt_key *k, const bt_case *c)
+static char *text_of(const bt_key *key, const bt_case *input)
 {
-    const char *text = bt_case_file(c, k);
+    const char *text = bt_case_file(input, key);
     return text ? bt_text_copy(text) : NULL;
 }
 
 /// The file that a text says for a key that stands in a study; the path is relative to the base case, as in a member.
-static char *file_of(const bt_study *s, const bt_key *k, const char *value)
+static char *file_of(const bt_study *study, const bt_key *key, const char *value)
 {
     bt_case scratch;
     bt_case_defaults(&scratch);
     char why[BT_WHY], *said = NULL;
-    if (bt_value_read(k, &scratch, value, true, why)) said = text_of(k, &scratch);
+    if (bt_value_read(key, &scratch, value, true, why)) said = text_of(key, &scratch);
     bt_case_free(&scratch);
-    char *absolute = said ? bt_case_named_file(s->base, said) : NULL;
+    char *absolute = said ? bt_case_named_file(study->base, said) : NULL;
     if (!absolute) return said;
     free(said);
     return absolute;
 }
 
-static void add_of_axes(bt_study_files *f, const bt_study *s)
+static void add_of_axes(bt_study_files *files, const bt_study *study)
 {
     int n;
-    bt_study_setting *list = study_settings(s, &n);
+    bt_study_setting *list = study_settings(study, &n);
     for (int i = 0; i < n; i++) {
         char name[96];
         snprintf(name, sizeof name, "%.*s", list[i].length, list[i].text);
-        const bt_key *k = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
-        const bt_study_parameter *p = &s->parameter[list[i].axis];
-        if (!k->file) continue;
-        if (list[i].text[list[i].length] == '=') add(f, file_of(s, k, list[i].text + list[i].length + 1));
+        const bt_key *key = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
+        const bt_study_parameter *parameter = &study->parameter[list[i].axis];
+        if (!key->file) continue;
+        if (list[i].text[list[i].length] == '=') add(files, file_of(study, key, list[i].text + list[i].length + 1));
         else
-            for (int v = 0; v < p->n; v++) add(f, file_of(s, k, p->value[v]));
+            for (int v = 0; v < parameter->n; v++) add(files, file_of(study, key, parameter->value[v]));
     }
     free(list);
 }
 
-void bt_study_files_find(bt_study_files *f, const bt_study *s)
+void bt_study_files_find(bt_study_files *files, const bt_study *study)
 {
-    *f = (bt_study_files){0};
-    bt_case c;
+    *files = (bt_study_files){0};
+    bt_case input;
     bt_errors unheard = {0};
-    if (bt_study_base_case(s, &c, &unheard) == BT_OK)
+    if (bt_study_base_case(study, &input, &unheard) == BT_OK)
         for (int k = 0; k < bt_n_case_keys; k++)
-            add(f, text_of(&bt_case_keys[k], &c));
-    bt_case_free(&c);
+            add(files, text_of(&bt_case_keys[k], &input));
+    bt_case_free(&input);
     bt_errors_free(&unheard);
-    add_of_axes(f, s);
+    add_of_axes(files, study);
 }
 
-void bt_study_files_free(bt_study_files *f)
+void bt_study_files_free(bt_study_files *files)
 {
-    for (int i = 0; i < f->n; i++) free(f->list[i].path);
-    free(f->list);
-    *f = (bt_study_files){0};
+    for (int i = 0; i < files->n; i++) free(files->list[i].path);
+    free(files->list);
+    *files = (bt_study_files){0};
 }
 
-bt_status bt_study_files_keep(const bt_study_files *f, const char *dir, bool old, bt_errors *warnings, bt_errors *err)
+bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *warnings,
+                              bt_errors *err)
 {
     char *path = bt_file_join(dir, "study.files"), *kept = NULL;
     size_t size;
@@ -411,22 +419,22 @@ bt_status bt_study_files_keep(const bt_study_files *f, const char *dir, bool old
     bt_text_begin(&text);
     fputs(kept ? kept : "", text.out);
     int added = 0;
-    for (int i = 0; i < f->n && status == BT_OK; i++) {
-        const bt_named_file *x = &f->list[i];
+    for (int i = 0; i < files->n && status == BT_OK; i++) {
+        const bt_named_file *file = &files->list[i];
         char line[96];
-        snprintf(line, sizeof line, "%" PRId64 " bytes, xxh128 %s\n", x->bytes, x->digest);
-        const char *before = bt_case_said_of(kept, x->path);
+        snprintf(line, sizeof line, "%" PRId64 " bytes, xxh128 %s\n", file->bytes, file->digest);
+        const char *before = bt_case_said_of(kept, file->path);
         if (before && strncmp(before, line, strlen(line))) {
             bt_errors_add(err, "%s: has changed since members in %s were made with it, and is of another study now; "
-                               "restore it, or give another folder with -o", x->path, dir);
+                               "restore it, or give another folder with -o", file->path, dir);
             status = BT_ERR_CASE;
         }
         if (before) continue;
-        fprintf(text.out, "%s: %s", x->path, line);
+        fprintf(text.out, "%s: %s", file->path, line);
         added++;
         if (old)
             bt_errors_add(warnings, "warning: %s: nothing in %s tells what it held when members were made with it; it "
-                                    "is taken as it is now", x->path, dir);
+                                    "is taken as it is now", file->path, dir);
     }
     char *now = bt_text_end(&text);
     if (status == BT_OK && added) status = bt_file_write(path, now, err);
@@ -443,22 +451,22 @@ static bool same_stat(const struct stat *a, const struct stat *b)
            a->st_ctim.tv_nsec == b->st_ctim.tv_nsec;
 }
 
-bt_status bt_study_files_same(bt_study_files *f, bt_errors *err)
+bt_status bt_study_files_same(bt_study_files *files, bt_errors *err)
 {
-    for (int i = 0; i < f->n; i++) {
-        bt_named_file *x = &f->list[i], now = {0};
+    for (int i = 0; i < files->n; i++) {
+        bt_named_file *file = &files->list[i], now = {0};
         bt_errors unheard = {0};
         // of one that is gone a member says so
-        if (stat(x->path, &now.seen) != 0 || same_stat(&x->seen, &now.seen)) continue;
-        const bool read = bt_checksum_digest_file(x->path, now.digest, &now.bytes, &unheard) == BT_OK;
+        if (stat(file->path, &now.seen) != 0 || same_stat(&file->seen, &now.seen)) continue;
+        const bool read = bt_checksum_digest_file(file->path, now.digest, &now.bytes, &unheard) == BT_OK;
         bt_errors_free(&unheard);
         if (!read) continue;
-        if (strcmp(now.digest, x->digest)) {
+        if (strcmp(now.digest, file->digest)) {
             bt_errors_add(err, "%s: has changed while the members of a study were made with it: restore it and call "
-                               "again, or give another folder with -o", x->path);
+                               "again, or give another folder with -o", file->path);
             return BT_ERR_CASE;
         }
-        x->seen = now.seen;
+        file->seen = now.seen;
     }
     return BT_OK;
 }

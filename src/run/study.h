@@ -23,16 +23,16 @@ typedef struct {
 } bt_study_setting;
 
 /// The section in which a key is given to some members alone, NULL = none.
-const char *bt_study_varied(const bt_study *s, const char *key);
+const char *bt_study_varied(const bt_study *study, const char *key);
 
 /// A member has one value of a key: an error for each key that two parameters decide, of which the study would run one
 /// and record the other.
-void bt_study_check_axes(const bt_study *s, bt_errors *err);
+void bt_study_check_axes(const bt_study *study, bt_errors *err);
 
 /// Errors for what makes members that are the same run: more than one field where no condition has ice that depends on
 /// the seed, and keys of how ice is made where all conditions read theirs. Reads conditions until one has neither; what
 /// is wrong with a case is not said here.
-void bt_study_check_ice(const bt_study *s, bt_errors *err);
+void bt_study_check_ice(const bt_study *study, bt_errors *err);
 
 // --- files that a study names ----------------------------------------------------------------------------------------
 
@@ -57,17 +57,18 @@ typedef struct bt_study_files {
 
 /// Those that the base case and the values of its keys name, each once, as far as they can be read: a member whose file
 /// is missing says so itself.
-void bt_study_files_find(bt_study_files *f, const bt_study *s);
-void bt_study_files_free(bt_study_files *f);
+void bt_study_files_find(bt_study_files *files, const bt_study *study);
+void bt_study_files_free(bt_study_files *files);
 
 /// Compare with DIR/study.files, and add there what it does not have; the caller holds DIR/lock. old: DIR has had
 /// members before, and a warning says of which file nothing tells what it was then. Errors: BT_ERR_CASE, a file has
 /// changed; BT_ERR_IO.
-bt_status bt_study_files_keep(const bt_study_files *f, const char *dir, bool old, bt_errors *warnings, bt_errors *err);
+bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *warnings,
+                              bt_errors *err);
 
 /// Are they what they were when they were found? Read again only where the system says that they have changed. Errors:
 /// BT_ERR_CASE.
-bt_status bt_study_files_same(bt_study_files *f, bt_errors *err);
+bt_status bt_study_files_same(bt_study_files *files, bt_errors *err);
 
 // --- values of its parameters ----------------------------------------------------------------------------------------
 
@@ -81,32 +82,33 @@ typedef struct {
 } bt_study_reader;
 
 /// An error in a line of the study.
-void bt_study_complain(const bt_study_reader *r, int line, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+void bt_study_complain(const bt_study_reader *reader, int line, const char *fmt,
+                       ...) __attribute__((format(printf, 3, 4)));
 
 /// Is it a single value? An error if not.
-bool bt_study_is_scalar(const bt_study_reader *r, const bt_node *node, int line, const char *name);
+bool bt_study_is_scalar(const bt_study_reader *reader, const bt_node *node, int line, const char *name);
 
 /// A whole number from lo to hi; out is left alone after an error.
-void bt_study_read_whole(const bt_study_reader *r, const bt_node *node, int line, const char *name, int64_t lo,
+void bt_study_read_whole(const bt_study_reader *reader, const bt_node *node, int line, const char *name, int64_t lo,
                          int64_t hi, int64_t *out);
 
 /// Is this text a value of the case key of index `key`? An error if not.
-bool bt_study_check_value(const bt_study_reader *r, int line, const char *name, int key, const bt_node *value);
+bool bt_study_check_value(const bt_study_reader *reader, int line, const char *name, int key, const bt_node *value);
 
 /// Values of a parameter from a list, and from a range {from, to, n, scale, distribution, source}.
-void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line, bt_study_parameter *p);
-void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line, bt_study_parameter *p);
+void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int line, bt_study_parameter *parameter);
+void bt_study_read_range(const bt_study_reader *reader, const bt_node *map, int line, bt_study_parameter *parameter);
 
 /// Does the parameter take whole numbers alone?
-bool bt_study_is_whole(const bt_study_parameter *p);
+bool bt_study_is_whole(const bt_study_parameter *parameter);
 
 /// Name of a distribution as a study writes it.
 const char *bt_distribution_name(bt_distribution d);
 
 /// Which stratum of the hypercube each condition takes, of every parameter.
-void bt_study_draw_strata(bt_study *s);
+void bt_study_draw_strata(bt_study *study);
 
 /// Text of parameter p in condition c; the caller frees it.
-char *bt_study_value(const bt_study *s, int p, int64_t c);
+char *bt_study_value(const bt_study *study, int p, int64_t c);
 
 #endif

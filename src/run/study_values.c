@@ -15,48 +15,49 @@
 #include "case/schema.h"
 #include "run/study.h"
 
-void bt_study_complain(const bt_study_reader *r, int line, const char *fmt, ...)
+void bt_study_complain(const bt_study_reader *reader, int line, const char *fmt, ...)
 {
     char text[600];
     va_list ap;
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    if (r->place) bt_errors_add(r->err, "%s: %s", r->place, text);
-    else bt_errors_add(r->err, "%s:%d: %s", r->s->path, line, text);
+    if (reader->place) bt_errors_add(reader->err, "%s: %s", reader->place, text);
+    else bt_errors_add(reader->err, "%s:%d: %s", reader->s->path, line, text);
 }
 
-bool bt_study_is_scalar(const bt_study_reader *r, const bt_node *node, int line, const char *name)
+bool bt_study_is_scalar(const bt_study_reader *reader, const bt_node *node, int line, const char *name)
 {
     if (node->kind == BT_NODE_SCALAR) return true;
-    bt_study_complain(r, line, "%s: needs a single value; write %s: value", name, name);
+    bt_study_complain(reader, line, "%s: needs a single value; write %s: value", name, name);
     return false;
 }
 
-void bt_study_read_whole(const bt_study_reader *r, const bt_node *node, int line, const char *name, int64_t lo,
+void bt_study_read_whole(const bt_study_reader *reader, const bt_node *node, int line, const char *name, int64_t lo,
                          int64_t hi, int64_t *out)
 {
-    if (!bt_study_is_scalar(r, node, line, name)) return;
+    if (!bt_study_is_scalar(reader, node, line, name)) return;
     char *end;
     const long long v = strtoll(node->text, &end, 10);
     if (end == node->text || *end || v < lo || v > hi)
-        bt_study_complain(r, line, "%s: %.60s: give a whole number from %" PRId64 " to %" PRId64, name, node->text, lo,
-                          hi);
+        bt_study_complain(reader, line, "%s: %.60s: give a whole number from %" PRId64 " to %" PRId64, name, node->text,
+                          lo, hi);
     else *out = v;
 }
 
-bool bt_study_check_value(const bt_study_reader *r, int line, const char *name, int key, const bt_node *value)
+bool bt_study_check_value(const bt_study_reader *reader, int line, const char *name, int key, const bt_node *value)
 {
     const bt_key *k = &bt_case_keys[key];
     if (value->kind != BT_NODE_SCALAR || k->type == BT_KEY_POINTS) {
-        bt_study_complain(r, line, "%s: a study takes single values; make another base case for lists of points", name);
+        bt_study_complain(reader, line, "%s: a study takes single values; make another base case for lists of points",
+                          name);
         return false;
     }
     bt_case scratch;
     bt_case_defaults(&scratch);
     char why[BT_WHY];
     const bool good = bt_value_read(k, &scratch, value->text, value->plain, why);
-    if (!good) bt_study_complain(r, line, "%s: %s", name, why);
+    if (!good) bt_study_complain(reader, line, "%s: %s", name, why);
     bt_case_free(&scratch);
     return good;
 }
@@ -67,23 +68,23 @@ typedef struct {
     char *text; ///< NULL of a number
 } said;
 
-static said read_said(const bt_key *k, const bt_node *value)
+static said read_said(const bt_key *key, const bt_node *value)
 {
     bt_case scratch;
     bt_case_defaults(&scratch);
     char why[BT_WHY];
-    bt_value_read(k, &scratch, value->text, value->plain, why); // it has been looked at
+    bt_value_read(key, &scratch, value->text, value->plain, why); // it has been looked at
     said x = {0};
     int64_t whole = 0;
-    if (k->type == BT_KEY_REAL) memcpy(&x.number, (const char *)&scratch + k->offset, sizeof x.number);
-    else if (k->type == BT_KEY_INT) memcpy(&whole, (const char *)&scratch + k->offset, sizeof whole);
+    if (key->type == BT_KEY_REAL) memcpy(&x.number, (const char *)&scratch + key->offset, sizeof x.number);
+    else if (key->type == BT_KEY_INT) memcpy(&whole, (const char *)&scratch + key->offset, sizeof whole);
     else {
         bt_text text;
         bt_text_begin(&text);
-        bt_value_write(k, &scratch, text.out);
+        bt_value_write(key, &scratch, text.out);
         x.text = bt_text_end(&text);
     }
-    if (k->type == BT_KEY_INT) x.number = (double)whole;
+    if (key->type == BT_KEY_INT) x.number = (double)whole;
     bt_case_free(&scratch);
     return x;
 }
@@ -96,30 +97,32 @@ static bool same(const said *a, const said *b)
     return fabs(a->number - b->number) <= 1e-12 * fabs(a->number);
 }
 
-void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line, bt_study_parameter *p)
+void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int line, bt_study_parameter *parameter)
 {
-    if (list->n == 0) bt_study_complain(r, line, "%s: the list is empty; give at least one value", p->name);
+    if (list->n == 0)
+        bt_study_complain(reader, line, "%s: the list is empty; give at least one value", parameter->name);
     if (list->n > BT_MOST_VALUES) { // each is compared with all before it
-        bt_study_complain(r, line, "%s: %d values, at most %d are read; take fewer, or a range", p->name, list->n,
-                          BT_MOST_VALUES);
+        bt_study_complain(reader, line, "%s: %d values, at most %d are read; take fewer, or a range", parameter->name,
+                          list->n, BT_MOST_VALUES);
         return;
     }
-    p->value = bt_alloc((size_t)list->n, sizeof *p->value);
+    parameter->value = bt_alloc((size_t)list->n, sizeof *parameter->value);
     said *value = bt_alloc((size_t)list->n, sizeof *value);
     for (int i = 0; i < list->n; i++) {
         const bt_node *item = list->item[i];
-        if (!bt_study_check_value(r, item->line, p->name, p->key, item)) continue;
-        value[p->n] = read_said(&bt_case_keys[p->key], item);
+        if (!bt_study_check_value(reader, item->line, parameter->name, parameter->key, item)) continue;
+        value[parameter->n] = read_said(&bt_case_keys[parameter->key], item);
         int twin = 0;
-        while (twin < p->n && !same(&value[twin], &value[p->n])) twin++;
-        if (twin < p->n && !strcmp(p->value[twin], item->text))
-            bt_study_complain(r, item->line, "%s: %s stands twice in the list; remove one", p->name, item->text);
-        else if (twin < p->n)
-            bt_study_complain(r, item->line, "%s: %s and %s are the same value; remove one", p->name, p->value[twin],
+        while (twin < parameter->n && !same(&value[twin], &value[parameter->n])) twin++;
+        if (twin < parameter->n && !strcmp(parameter->value[twin], item->text))
+            bt_study_complain(reader, item->line, "%s: %s stands twice in the list; remove one", parameter->name,
                               item->text);
-        p->value[p->n++] = bt_text_copy(item->text);
+        else if (twin < parameter->n)
+            bt_study_complain(reader, item->line, "%s: %s and %s are the same value; remove one", parameter->name,
+                              parameter->value[twin], item->text);
+        parameter->value[parameter->n++] = bt_text_copy(item->text);
     }
-    for (int i = 0; i < p->n; i++) free(value[i].text);
+    for (int i = 0; i < parameter->n; i++) free(value[i].text);
     free(value);
 }
 
@@ -156,9 +159,9 @@ static double between(double from, double to, bool logarithmic, double at)
 
 /// x as a case takes it, in SI with all its digits: a bare number, but for angles, which would be degrees without their
 /// unit (base/units.h).
-static char *value_text(const bt_study_parameter *p, double x)
+static char *value_text(const bt_study_parameter *parameter, double x)
 {
-    const bt_unit kind = bt_case_keys[p->key].unit;
+    const bt_unit kind = bt_case_keys[parameter->key].unit;
     const bool bare = kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;
     const char *unit = bare ? NULL : bt_units_symbol(kind);
     int digits = 6; // 0.3, not 0.30000000000000004, where nothing is lost
@@ -172,82 +175,87 @@ static char *value_text(const bt_study_parameter *p, double x)
 }
 
 /// Value at a place of a range, 0 ... 1 between its ends.
-static char *range_value(const bt_study_parameter *p, double at)
+static char *range_value(const bt_study_parameter *parameter, double at)
 {
-    const double x = between(p->from, p->to, p->logarithmic, at);
-    return bt_study_is_whole(p) ? bt_text_of("%.0f", nearbyint(x)) : value_text(p, x);
+    const double x = between(parameter->from, parameter->to, parameter->logarithmic, at);
+    return bt_study_is_whole(parameter) ? bt_text_of("%.0f", nearbyint(x)) : value_text(parameter, x);
 }
 
 /// Value below which the share u of what is drawn from a range lies. Each whole number stands for the half below and
 /// above it: rounded between the ends alone, these would come half as often as the others.
-static char *drawn_value(const bt_study_parameter *p, double u)
+static char *drawn_value(const bt_study_parameter *parameter, double u)
 {
-    const double at = quantile(p->distribution, u);
-    if (!bt_study_is_whole(p)) return range_value(p, at);
-    const double x = floor(between(p->from - 0.5, p->to + 0.5, p->logarithmic, at) + 0.5);
-    return bt_text_of("%.0f", p->distribution == BT_NORMAL ? x : bt_min(x, p->to)); // u can be rounded to 1
+    const double at = quantile(parameter->distribution, u);
+    if (!bt_study_is_whole(parameter)) return range_value(parameter, at);
+    const double x = floor(between(parameter->from - 0.5, parameter->to + 0.5, parameter->logarithmic, at) + 0.5);
+    // u can be rounded to 1
+    return bt_text_of("%.0f", parameter->distribution == BT_NORMAL ? x : bt_min(x, parameter->to));
 }
 
-static void read_distribution(const bt_study_reader *r, const bt_node *value, int line, bt_study_parameter *p)
+static void read_distribution(const bt_study_reader *reader, const bt_node *value, int line,
+                              bt_study_parameter *parameter)
 {
-    if (!bt_study_is_scalar(r, value, line, "distribution")) return;
+    if (!bt_study_is_scalar(reader, value, line, "distribution")) return;
     int d = 0;
     while (distributions[d] && strcmp(distributions[d], value->text)) d++;
-    if (distributions[d]) p->distribution = (bt_distribution)d;
-    else bt_study_complain(r, line, "%s.distribution: %.40s: give uniform, triangular or normal", p->name, value->text);
+    if (distributions[d]) parameter->distribution = (bt_distribution)d;
+    else bt_study_complain(reader, line, "%s.distribution: %.40s: give uniform, triangular or normal", parameter->name,
+                           value->text);
 }
 
 /// Does all that a normal distribution draws beyond the ends of its range belong to the key? A complaint if not.
-static bool in_range_of_key(const bt_study_reader *r, int line, const bt_study_parameter *p)
+static bool in_range_of_key(const bt_study_reader *reader, int line, const bt_study_parameter *parameter)
 {
-    if (p->distribution != BT_NORMAL) return true;
+    if (parameter->distribution != BT_NORMAL) return true;
     bool good = true;
     for (int k = 0; k < 2 && good; k++) {
-        char *text = drawn_value(p, k);
+        char *text = drawn_value(parameter, k);
         const bt_node node = {.kind = BT_NODE_SCALAR, .text = text, .plain = true};
         char name[160];
-        snprintf(name, sizeof name, "%.80s: a normal distribution with 95 %% from %g to %g reaches", p->name, p->from,
-                 p->to);
-        good = bt_study_check_value(r, line, name, p->key, &node);
+        snprintf(name, sizeof name, "%.80s: a normal distribution with 95 %% from %g to %g reaches", parameter->name,
+                 parameter->from, parameter->to);
+        good = bt_study_check_value(reader, line, name, parameter->key, &node);
         free(text);
     }
     return good;
 }
 
-bool bt_study_is_whole(const bt_study_parameter *p)
+bool bt_study_is_whole(const bt_study_parameter *parameter)
 {
-    return p->key >= 0 && bt_case_keys[p->key].type == BT_KEY_INT;
+    return parameter->key >= 0 && bt_case_keys[parameter->key].type == BT_KEY_INT;
 }
 
-char *bt_study_distribution(const bt_study_parameter *p)
+char *bt_study_distribution(const bt_study_parameter *parameter)
 {
-    if (!p->continuous) return bt_text_copy("");
-    return bt_text_of("%s%s%s %.6g to %.6g", p->logarithmic ? "log-" : "", distributions[p->distribution],
-                      p->distribution == BT_NORMAL ? ", 95 % from" : " from", p->from, p->to);
+    if (!parameter->continuous) return bt_text_copy("");
+    return bt_text_of("%s%s%s %.6g to %.6g", parameter->logarithmic ? "log-" : "",
+                      distributions[parameter->distribution], parameter->distribution == BT_NORMAL
+                      ? ", 95 % from" : " from", parameter->from, parameter->to);
 }
 
 /// An error where values of a range, which ascend, are the same: a grid would have conditions twice.
-static void check_distinct(const bt_study_reader *r, int line, const bt_study_parameter *p)
+static void check_distinct(const bt_study_reader *reader, int line, const bt_study_parameter *parameter)
 {
     int i = 1;
-    while (i < p->n && strcmp(p->value[i - 1], p->value[i])) i++;
-    if (i < p->n)
-        bt_study_complain(r, line, "%s: %d values from %.6g to %.6g have %s more than once%s; lower n", p->name, p->n,
-                          p->from, p->to, p->value[i], bt_study_is_whole(p) ? ", as they are whole numbers" : "");
+    while (i < parameter->n && strcmp(parameter->value[i - 1], parameter->value[i])) i++;
+    if (i < parameter->n)
+        bt_study_complain(reader, line, "%s: %d values from %.6g to %.6g have %s more than once%s; lower n",
+                          parameter->name, parameter->n, parameter->from, parameter->to, parameter->value[i],
+                          bt_study_is_whole(parameter) ? ", as they are whole numbers" : "");
 }
 
-void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line, bt_study_parameter *p)
+void bt_study_read_range(const bt_study_reader *reader, const bt_node *map, int line, bt_study_parameter *parameter)
 {
-    const bt_key *key = &bt_case_keys[p->key];
+    const bt_key *key = &bt_case_keys[parameter->key];
     static const char *const known[] = {"from", "to", "n", "scale", "distribution", "source", NULL};
     if (key->type != BT_KEY_REAL && key->type != BT_KEY_INT) {
-        bt_study_complain(r, line, "%s: has no range; give a list of its values", p->name);
+        bt_study_complain(reader, line, "%s: has no range; give a list of its values", parameter->name);
         return;
     }
     double end[2] = {NAN, NAN};
     int64_t n = 2;
     bool good = true;
-    p->continuous = true;
+    parameter->continuous = true;
     for (int i = 0; i < map->n; i++) {
         const bt_node *value = map->item[i];
         const int at = map->key_line[i];
@@ -258,7 +266,7 @@ void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line,
             const bool read =
                 value->kind == BT_NODE_SCALAR && bt_value_read(key, &scratch, value->text, value->plain, why);
             if (!read)
-                bt_study_complain(r, at, "%s.%s: %s", p->name, map->key[i],
+                bt_study_complain(reader, at, "%s.%s: %s", parameter->name, map->key[i],
                                   value->kind == BT_NODE_SCALAR ? why : "needs a single value");
             else if (key->type == BT_KEY_REAL)
                 memcpy(&end[map->key[i][0] == 't'], (const char *)&scratch + key->offset, sizeof(double));
@@ -270,31 +278,34 @@ void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line,
             good = good && read;
             bt_case_free(&scratch);
         } else if (!strcmp(map->key[i], "n")) {
-            bt_study_read_whole(r, value, at, "n", 2, BT_MOST_VALUES, &n);
+            bt_study_read_whole(reader, value, at, "n", 2, BT_MOST_VALUES, &n);
         } else if (!strcmp(map->key[i], "scale")) {
-            if (!bt_study_is_scalar(r, value, at, "scale")) continue;
-            p->logarithmic = !strcmp(value->text, "log");
-            if (!p->logarithmic && strcmp(value->text, "linear"))
-                bt_study_complain(r, at, "%s.scale: %.40s: give linear or log", p->name, value->text);
+            if (!bt_study_is_scalar(reader, value, at, "scale")) continue;
+            parameter->logarithmic = !strcmp(value->text, "log");
+            if (!parameter->logarithmic && strcmp(value->text, "linear"))
+                bt_study_complain(reader, at, "%s.scale: %.40s: give linear or log", parameter->name, value->text);
         } else if (!strcmp(map->key[i], "distribution")) {
-            read_distribution(r, value, at, p);
+            read_distribution(reader, value, at, parameter);
         } else if (!strcmp(map->key[i], "source")) {
-            if (bt_study_is_scalar(r, value, at, "source") && !p->source) p->source = bt_text_copy(value->text);
+            if (bt_study_is_scalar(reader, value, at, "source") && !parameter->source)
+                parameter->source = bt_text_copy(value->text);
         } else {
             const char *near = bt_suggest(map->key[i], known);
-            bt_study_complain(r, at, "%s.%.40s: unknown key; %s%s", p->name, map->key[i],
+            bt_study_complain(reader, at, "%s.%.40s: unknown key; %s%s", parameter->name, map->key[i],
                               near ? "did you mean " : "a range has from, to, n, scale, distribution and source",
                               near ? near : "");
         }
     }
-    p->from = end[0], p->to = end[1];
-    if (good && !(p->from < p->to)) bt_study_complain(r, line, "%s: needs from and to, from below to", p->name);
-    else if (good && p->logarithmic && !(p->from > 0))
-        bt_study_complain(r, line, "%s: a logarithmic range begins above zero; raise from", p->name);
-    else if (good && in_range_of_key(r, line, p)) {
-        p->value = bt_alloc((size_t)n, sizeof *p->value);
-        for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
-        if (r->s->sampling == BT_SAMPLING_GRID) check_distinct(r, line, p);
+    parameter->from = end[0], parameter->to = end[1];
+    if (good && !(parameter->from < parameter->to))
+        bt_study_complain(reader, line, "%s: needs from and to, from below to", parameter->name);
+    else if (good && parameter->logarithmic && !(parameter->from > 0))
+        bt_study_complain(reader, line, "%s: a logarithmic range begins above zero; raise from", parameter->name);
+    else if (good && in_range_of_key(reader, line, parameter)) {
+        parameter->value = bt_alloc((size_t)n, sizeof *parameter->value);
+        for (parameter->n = 0; parameter->n < n; parameter->n++)
+            parameter->value[parameter->n] = range_value(parameter, (double)parameter->n / (double)(n - 1));
+        if (reader->s->sampling == BT_SAMPLING_GRID) check_distinct(reader, line, parameter);
     }
 }
 
@@ -303,9 +314,9 @@ const char *bt_distribution_name(bt_distribution d) { return distributions[d]; }
 // --- what a condition takes ------------------------------------------------------------------------------------------
 
 /// The numbers of parameter p in condition c.
-static bt_rng draw(const bt_study *s, int p, int64_t c)
+static bt_rng draw(const bt_study *study, int p, int64_t c)
 {
-    return bt_rng_start(s->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p);
+    return bt_rng_start(study->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p);
 }
 
 typedef struct {
@@ -321,33 +332,33 @@ static int by_lot(const void *a, const void *b)
 }
 
 /// A random permutation of the strata for each parameter, by sorting lots.
-void bt_study_draw_strata(bt_study *s)
+void bt_study_draw_strata(bt_study *study)
 {
-    lot *l = bt_alloc((size_t)s->n_conditions, sizeof *l);
-    for (int p = 0; p < s->n_parameters; p++) {
-        for (int64_t c = 0; c < s->n_conditions; c++) {
-            bt_rng r = draw(s, p, c);
-            l[c] = (lot){bt_rng_bits(&r), c};
+    lot *l = bt_alloc((size_t)study->n_conditions, sizeof *l);
+    for (int p = 0; p < study->n_parameters; p++) {
+        for (int64_t c = 0; c < study->n_conditions; c++) {
+            bt_rng rng = draw(study, p, c);
+            l[c] = (lot){bt_rng_bits(&rng), c};
         }
-        qsort(l, (size_t)s->n_conditions, sizeof *l, by_lot);
-        s->parameter[p].stratum = bt_alloc((size_t)s->n_conditions, sizeof(int64_t));
-        for (int64_t k = 0; k < s->n_conditions; k++) s->parameter[p].stratum[l[k].condition] = k;
+        qsort(l, (size_t)study->n_conditions, sizeof *l, by_lot);
+        study->parameter[p].stratum = bt_alloc((size_t)study->n_conditions, sizeof(int64_t));
+        for (int64_t k = 0; k < study->n_conditions; k++) study->parameter[p].stratum[l[k].condition] = k;
     }
     free(l);
 }
 
-char *bt_study_value(const bt_study *s, int p, int64_t c)
+char *bt_study_value(const bt_study *study, int p, int64_t c)
 {
-    const bt_study_parameter *q = &s->parameter[p];
-    if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
-        bt_rng r = draw(s, p, c);
-        bt_rng_bits(&r); // the first was for the stratum
-        const double at = ((double)q->stratum[c] + bt_rng_uniform(&r)) / (double)s->n_conditions;
-        if (q->continuous) return drawn_value(q, at);
-        const int i = (int)(at * q->n);
-        return bt_text_copy(q->value[i < q->n ? i : q->n - 1]);
+    const bt_study_parameter *parameter = &study->parameter[p];
+    if (study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+        bt_rng rng = draw(study, p, c);
+        bt_rng_bits(&rng); // the first was for the stratum
+        const double at = ((double)parameter->stratum[c] + bt_rng_uniform(&rng)) / (double)study->n_conditions;
+        if (parameter->continuous) return drawn_value(parameter, at);
+        const int i = (int)(at * parameter->n);
+        return bt_text_copy(parameter->value[i < parameter->n ? i : parameter->n - 1]);
     }
     // The last parameter runs fastest.
-    for (int i = s->n_parameters - 1; i > p; i--) c /= s->parameter[i].n;
-    return bt_text_copy(q->value[c % q->n]);
+    for (int i = study->n_parameters - 1; i > p; i--) c /= study->parameter[i].n;
+    return bt_text_copy(parameter->value[c % parameter->n]);
 }

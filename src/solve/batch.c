@@ -55,10 +55,10 @@ size_t bt_batch_bytes(const bt_cell *cell)
 
 void bt_batch_begin(bt_cell *cell) { cell->work.n_last = 0; }
 
-static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *u, bool projection)
+static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *contact, bool projection)
 {
     if (projection) return BT_BATCH_PROJECTION;
-    return !cell->laws.limits ? BT_BATCH_RIGID : u->n > 0 ? BT_BATCH_BOUNDED : BT_BATCH_SHEETS;
+    return !cell->laws.limits ? BT_BATCH_RIGID : contact->n > 0 ? BT_BATCH_BOUNDED : BT_BATCH_SHEETS;
 }
 
 /// The contacts of a batch, and those of their bodies that can be moved.
@@ -76,36 +76,36 @@ typedef struct {
     bool few_listed[BT_FEW], *listed;      // [n_contacts]
 } packing;
 
-static void begin_packing(packing *s, const bt_cell *cell)
+static void begin_packing(packing *pack, const bt_cell *cell)
 {
     const size_t n = (size_t)cell->n_contacts, n_list = (size_t)cell->work.n_list;
     const bool few = n <= BT_FEW;
-    s->place = n_list > BT_FEW ? bt_realloc(NULL, n_list, sizeof *s->place) : s->few_places;
-    s->of = few ? s->few_unknowns : bt_realloc(NULL, n, sizeof *s->of);
-    s->u = few ? s->few_records : bt_realloc(NULL, n, sizeof *s->u);
-    s->listed = few ? s->few_listed : bt_realloc(NULL, n, sizeof *s->listed);
-    if (n > 0) memset(s->listed, 0, n * sizeof *s->listed);
+    pack->place = n_list > BT_FEW ? bt_realloc(NULL, n_list, sizeof *pack->place) : pack->few_places;
+    pack->of = few ? pack->few_unknowns : bt_realloc(NULL, n, sizeof *pack->of);
+    pack->u = few ? pack->few_records : bt_realloc(NULL, n, sizeof *pack->u);
+    pack->listed = few ? pack->few_listed : bt_realloc(NULL, n, sizeof *pack->listed);
+    if (n > 0) memset(pack->listed, 0, n * sizeof *pack->listed);
 }
 
-static void end_packing(packing *s)
+static void end_packing(packing *pack)
 {
-    if (s->place != s->few_places) free(s->place);
-    if (s->of != s->few_unknowns) free(s->of);
-    if (s->u != s->few_records) free(s->u);
-    if (s->listed != s->few_listed) free(s->listed);
+    if (pack->place != pack->few_places) free(pack->place);
+    if (pack->of != pack->few_unknowns) free(pack->of);
+    if (pack->u != pack->few_records) free(pack->u);
+    if (pack->listed != pack->few_listed) free(pack->listed);
 }
 
-static bool holds(const place *o, bt_idx body)
+static bool holds(const place *slot, bt_idx body)
 {
-    for (int l = 0; l < o->n_bodies; l++)
-        if (o->body[l] == body) return true;
+    for (int l = 0; l < slot->n_bodies; l++)
+        if (slot->body[l] == body) return true;
     return false;
 }
 
 /// May a contact stand in a batch?
-static bool fits(const place *o, bt_batch_kind kind, const bt_idx body[2], int n)
+static bool fits(const place *slot, bt_batch_kind kind, const bt_idx body[2], int n)
 {
-    return o->kind == kind && !(n > 0 && holds(o, body[0])) && !(n > 1 && holds(o, body[1]));
+    return slot->kind == kind && !(n > 0 && holds(slot, body[0])) && !(n > 1 && holds(slot, body[1]));
 }
 
 /// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
@@ -116,12 +116,12 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
     int n_open = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
-        const bt_contact *u = &contacts[i];
-        const bt_batch_kind kind = kind_of(cell, u, projection);
+        const bt_contact *contact = &contacts[i];
+        const bt_batch_kind kind = kind_of(cell, contact, projection);
         bt_idx body[2];
         int n = 0, k = 0;
-        if (inv[u->a].m > 0) body[n++] = u->a;
-        if (inv[u->b].m > 0) body[n++] = u->b;
+        if (inv[contact->a].m > 0) body[n++] = contact->a;
+        if (inv[contact->b].m > 0) body[n++] = contact->b;
         while (k < n_open && !fits(&o[open[k]], kind, body, n)) k++;
         if (k == n_open) {
             if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
@@ -140,76 +140,81 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
 
 /// What the last list hands on to the next one. A contact that was not in it has not been moved since; it has no
 /// multiplier.
-static void take_unknowns(const bt_cell *cell, bool projection, packing *s)
+static void take_unknowns(const bt_cell *cell, bool projection, packing *pack)
 {
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
-        const bt_contact *u = &s->u[i];
-        s->of[i] = projection ? (bt_unknowns){0} : (bt_unknowns){.before = {u->ln[0], u->ln[1], u->lt}};
-        s->listed[i] = true;
+        const bt_contact *contact = &pack->u[i];
+        pack->of[i] = projection ? (bt_unknowns){0}
+                                 : (bt_unknowns){.before = {contact->ln[0], contact->ln[1], contact->lt}};
+        pack->listed[i] = true;
     }
-    for (bt_idx k = 0; k < cell->work.n_last; k++) s->of[cell->work.last[k].contact] = cell->work.last[k];
+    for (bt_idx k = 0; k < cell->work.n_last; k++) pack->of[cell->work.last[k].contact] = cell->work.last[k];
 }
 
 /// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there,
 /// have none.
-static void put_projection(bt_batch *o, const bt_cell *cell, const bt_unknowns *of, double slop)
+static void put_projection(bt_batch *batch, const bt_cell *cell, const bt_unknowns *of, double slop)
 {
-    o->KEPT_BIAS_0 = o->bias[0], o->KEPT_BIAS_1 = o->bias[1], o->KEPT_MU = o->mu;
-    o->KEPT_LN_1 = o->x[1], o->KEPT_LT = o->x[2], o->KEPT_LN_0 = o->x[0];
-    for (int l = 0; l < o->n; l++) {
-        const bt_idx i = o->contact[l];
-        o->mu[l] = slop;
+    batch->KEPT_BIAS_0 = batch->bias[0], batch->KEPT_BIAS_1 = batch->bias[1], batch->KEPT_MU = batch->mu;
+    batch->KEPT_LN_1 = batch->x[1], batch->KEPT_LT = batch->x[2], batch->KEPT_LN_0 = batch->x[0];
+    for (int l = 0; l < batch->n; l++) {
+        const bt_idx i = batch->contact[l];
+        batch->mu[l] = slop;
         for (int c = 0; c < 2; c++) {
-            o->bias[c][l] = c < o->points[l] ? cell->gaps[i].gap[c] : 0;
-            o->x[c][l] = of[i].multiplier[c];
+            batch->bias[c][l] = c < batch->points[l] ? cell->gaps[i].gap[c] : 0;
+            batch->x[c][l] = of[i].multiplier[c];
         }
     }
 }
 
 /// Masses of sheets one by one: they have a root.
-BT_INLINE void put_sheets(bt_batch *o, const bt_contact *const u[BT_LANES], const bt_limit *limits, const bt_inv *inv)
+BT_INLINE void put_sheets(bt_batch *batch, const bt_contact *const contact[BT_LANES], const bt_limit *limits,
+                          const bt_inv *inv)
 {
-    for (int l = 0; l < o->n; l++) {
-        const bt_mass m = bt_mass_of(u[l], inv);
-        o->w[0][l] = m.w[0], o->mn[0][l] = m.mn[0], o->wt[l] = m.wt, o->mt[l] = m.mt;
-        o->BT_ENDS_X[l] = limits[o->contact[l]].ends[0], o->BT_ENDS_Y[l] = limits[o->contact[l]].ends[1];
+    for (int l = 0; l < batch->n; l++) {
+        const bt_mass m = bt_mass_of(contact[l], inv);
+        batch->w[0][l] = m.w[0], batch->mn[0][l] = m.mn[0], batch->wt[l] = m.wt, batch->mt[l] = m.mt;
+        batch->BT_ENDS_X[l] = limits[batch->contact[l]].ends[0],
+        batch->BT_ENDS_Y[l] = limits[batch->contact[l]].ends[1];
     }
 }
 
-BT_INLINE void put(bt_batch *o, const bt_contact *contacts, const bt_limit *limits, const place *p,
+BT_INLINE void put(bt_batch *batch, const bt_contact *contacts, const bt_limit *limits, const place *slot,
                    const bt_unknowns *of, const bt_inv *inv)
 {
     static const bt_contact nothing;
     static const bt_unknowns nowhere;
-    const bt_contact *u[BT_LANES];
-    const bt_unknowns *x[BT_LANES];
-    o->n = p->n, o->kind = p->kind;
+    const bt_contact *contact[BT_LANES];
+    const bt_unknowns *unknowns[BT_LANES];
+    batch->n = slot->n, batch->kind = slot->kind;
     for (int l = 0; l < BT_LANES; l++) {
-        const bool there = l < p->n;
-        const bt_contact *at = &contacts[p->contact[there ? l : 0]]; // empty lanes read its bodies, never write
-        u[l] = there ? at : &nothing;
-        x[l] = there ? &of[p->contact[l]] : &nowhere;
-        o->a[l] = at->a, o->b[l] = at->b, o->contact[l] = there ? p->contact[l] : 0;
-        o->pair[l] = u[l]->pair, o->points[l] = (uint8_t)u[l]->n;
-        o->moves_a[l] = there && inv[at->a].m > 0, o->moves_b[l] = there && inv[at->b].m > 0;
+        const bool there = l < slot->n;
+        const bt_contact *at = &contacts[slot->contact[there ? l : 0]]; // empty lanes read its bodies, never write
+        contact[l] = there ? at : &nothing;
+        unknowns[l] = there ? &of[slot->contact[l]] : &nowhere;
+        batch->a[l] = at->a, batch->b[l] = at->b, batch->contact[l] = there ? slot->contact[l] : 0;
+        batch->pair[l] = contact[l]->pair, batch->points[l] = (uint8_t)contact[l]->n;
+        batch->moves_a[l] = there && inv[at->a].m > 0, batch->moves_b[l] = there && inv[at->b].m > 0;
     }
-    const bt_four_rows r = bt_rows_of(u);
-    bt_invs a = bt_take_inv(inv, o->a), b = bt_take_inv(inv, o->b);
-    const bt_mask there = (bt_mask){0, 1, 2, 3} < (bt_mask){p->n, p->n, p->n, p->n};
+    const bt_four_rows rows = bt_rows_of(contact);
+    bt_invs a = bt_take_inv(inv, batch->a), b = bt_take_inv(inv, batch->b);
+    const bt_mask there = (bt_mask){0, 1, 2, 3} < (bt_mask){slot->n, slot->n, slot->n, slot->n};
     a.m = bt_only(there, a.m), a.i = bt_only(there, a.i), b.m = bt_only(there, b.m), b.i = bt_only(there, b.i);
-    const bt_masses m = bt_masses_of(&r, a, b);
-    o->nx = r.nx, o->ny = r.ny, o->rat = r.rat, o->rbt = r.rbt, o->mu = r.mu;
-    o->ma = a.m, o->ia = a.i, o->mb = b.m, o->ib = b.i;
-    o->w12 = m.w12, o->per_det = m.per_det, o->wt = m.wt, o->mt = m.mt;
+    const bt_masses m = bt_masses_of(&rows, a, b);
+    batch->nx = rows.nx, batch->ny = rows.ny, batch->rat = rows.rat, batch->rbt = rows.rbt, batch->mu = rows.mu;
+    batch->ma = a.m, batch->ia = a.i, batch->mb = b.m, batch->ib = b.i;
+    batch->w12 = m.w12, batch->per_det = m.per_det, batch->wt = m.wt, batch->mt = m.mt;
     for (int c = 0; c < 2; c++) {
-        o->ran[c] = r.ran[c], o->rbn[c] = r.rbn[c], o->bias[c] = r.bias[c], o->w[c] = m.w[c], o->mn[c] = m.mn[c];
-        o->x[c] = r.ln[c];
+        batch->ran[c] = rows.ran[c], batch->rbn[c] = rows.rbn[c], batch->bias[c] = rows.bias[c], batch->w[c] = m.w[c],
+        batch->mn[c] = m.mn[c];
+        batch->x[c] = rows.ln[c];
     }
-    o->x[2] = r.lt;
+    batch->x[2] = rows.lt;
     for (int c = 0; c < 3; c++)
-        o->before[c] = (bt_vec){x[0]->before[c], x[1]->before[c], x[2]->before[c], x[3]->before[c]};
-    if (p->kind == BT_BATCH_SHEETS) put_sheets(o, u, limits, inv);
+        batch->before[c] = (bt_vec){unknowns[0]->before[c], unknowns[1]->before[c], unknowns[2]->before[c],
+                                    unknowns[3]->before[c]};
+    if (slot->kind == BT_BATCH_SHEETS) put_sheets(batch, contact, limits, inv);
 }
 
 /// n records, of which none lies in the other place; a call of the library takes longer for so few.
@@ -223,59 +228,61 @@ BT_INLINE void copy_records(bt_contact *to, const bt_contact *from, bt_idx n)
 }
 
 BT_FOR_EACH_CPU
-static void put_aside(const bt_cell *cell, bt_contact *u) { copy_records(u, cell->contacts, cell->n_contacts); }
+static void put_aside(const bt_cell *cell,
+                      bt_contact *contact) { copy_records(contact, cell->contacts, cell->n_contacts); }
 
 BT_FOR_EACH_CPU
-static void put_all(bt_cell *cell, const packing *s, const bt_inv *inv, const double *slop)
+static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv, const double *slop)
 {
     for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        bt_batch *o = &cell->work.batch[k];
-        put(o, s->u, cell->laws.limits, &s->place[k], s->of, inv);
-        if (slop) put_projection(o, cell, s->of, *slop);
+        bt_batch *batch = &cell->work.batch[k];
+        put(batch, pack->u, cell->laws.limits, &pack->place[k], pack->of, inv);
+        if (slop) put_projection(batch, cell, pack->of, *slop);
         if (!cell->laws.limits) continue;
         bt_batch_bounds *at = &bounds_of(cell)[k];
         *at = (bt_batch_bounds){0};
-        for (int l = 0; l < o->n; l++)
-            for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[o->contact[l]].flat[c];
+        for (int l = 0; l < batch->n; l++)
+            for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[batch->contact[l]].flat[c];
     }
     bt_contact *rest = rest_of(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        if (!s->listed[i]) copy_records(rest++, &s->u[i], 1);
+        if (!pack->listed[i]) copy_records(rest++, &pack->u[i], 1);
 }
 
 void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
 {
-    packing s;
-    begin_packing(&s, cell);
-    put_aside(cell, s.u);
-    take_unknowns(cell, slop != NULL, &s);
-    const bt_idx n_batches = deal(cell, s.u, inv, slop != NULL, s.place);
+    packing pack;
+    begin_packing(&pack, cell);
+    put_aside(cell, pack.u);
+    take_unknowns(cell, slop != NULL, &pack);
+    const bt_idx n_batches = deal(cell, pack.u, inv, slop != NULL, pack.place);
     const size_t n_rest = (size_t)(cell->n_contacts - cell->work.n_list);
     bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + n_rest * sizeof(bt_contact));
     cell->work.n_batches = n_batches;
     cell->work.batch = (bt_batch *)cell->contacts;
     cell->work.packed = true;
-    put_all(cell, &s, inv, slop);
-    end_packing(&s);
+    put_all(cell, &pack, inv, slop);
+    end_packing(&pack);
 }
 
 // --- unpacking -------------------------------------------------------------------------------------------------------
 
 /// The records of the contacts of a batch.
-BT_INLINE void take_records(const bt_batch *o, bt_contact *u)
+BT_INLINE void take_records(const bt_batch *batch, bt_contact *contact)
 {
-    const bool projection = o->kind == BT_BATCH_PROJECTION;
+    const bool projection = batch->kind == BT_BATCH_PROJECTION;
     bt_vec line[4][BT_LANES];
     int32_t bodies[BT_LANES][2], tail[BT_LANES][2];
     for (int l = 0; l < BT_LANES; l++) {
-        bodies[l][0] = o->a[l], bodies[l][1] = o->b[l];
-        tail[l][0] = o->points[l], tail[l][1] = o->pair[l];
+        bodies[l][0] = batch->a[l], bodies[l][1] = batch->b[l];
+        tail[l][0] = batch->points[l], tail[l][1] = batch->pair[l];
     }
-    bt_motions m[4] = {{o->nx, o->ny, o->rat, o->rbt}, {o->ran[0], o->ran[1], o->rbn[0], o->rbn[1]}};
-    m[2] = projection ? (bt_motions){.x = o->KEPT_BIAS_0, .y = o->KEPT_BIAS_1, .w = o->KEPT_MU}
-                      : (bt_motions){.x = o->bias[0], .y = o->bias[1], .w = o->mu};
-    m[3] = projection ? (bt_motions){.x = o->KEPT_LN_0, .y = o->KEPT_LN_1, .w = o->KEPT_LT}
-                      : (bt_motions){.x = o->x[0], .y = o->x[1], .w = o->x[2]};
+    bt_motions m[4] =
+        {{batch->nx, batch->ny, batch->rat, batch->rbt}, {batch->ran[0], batch->ran[1], batch->rbn[0], batch->rbn[1]}};
+    m[2] = projection ? (bt_motions){.x = batch->KEPT_BIAS_0, .y = batch->KEPT_BIAS_1, .w = batch->KEPT_MU}
+                      : (bt_motions){.x = batch->bias[0], .y = batch->bias[1], .w = batch->mu};
+    m[3] = projection ? (bt_motions){.x = batch->KEPT_LN_0, .y = batch->KEPT_LN_1, .w = batch->KEPT_LT}
+                      : (bt_motions){.x = batch->x[0], .y = batch->x[1], .w = batch->x[2]};
     _Static_assert(offsetof(bt_contact, a) == 88 && offsetof(bt_contact, b) == 92, "end of the third line");
     _Static_assert(offsetof(bt_contact, n) == 120 && offsetof(bt_contact, pair) == 124, "end of the fourth line");
     memcpy(&m[2].unused, bodies, sizeof bodies);
@@ -284,56 +291,58 @@ BT_INLINE void take_records(const bt_batch *o, bt_contact *u)
         bt_transpose(&m[k]);
         line[k][0] = m[k].x, line[k][1] = m[k].y, line[k][2] = m[k].w, line[k][3] = m[k].unused;
     }
-    for (int l = 0; l < o->n; l++)
-        for (int k = 0; k < 4; k++) memcpy((char *)&u[o->contact[l]] + 32 * k, &line[k][l], sizeof line[k][l]);
+    for (int l = 0; l < batch->n; l++)
+        for (int k = 0; k < 4; k++)
+            memcpy((char *)&contact[batch->contact[l]] + 32 * k, &line[k][l], sizeof line[k][l]);
 }
 
-static void take_out(const bt_batch *o, bt_unknowns *of)
+static void take_out(const bt_batch *batch, bt_unknowns *of)
 {
-    const bool projection = o->kind == BT_BATCH_PROJECTION;
-    for (int l = 0; l < o->n; l++) {
+    const bool projection = batch->kind == BT_BATCH_PROJECTION;
+    for (int l = 0; l < batch->n; l++) {
         bt_unknowns *to = &of[l];
-        to->contact = o->contact[l];
-        for (int c = 0; c < 2; c++) to->before[c] = o->before[c][l], to->multiplier[c] = o->x[c][l];
-        to->before[2] = projection ? 0 : o->before[2][l];
+        to->contact = batch->contact[l];
+        for (int c = 0; c < 2; c++) to->before[c] = batch->before[c][l], to->multiplier[c] = batch->x[c][l];
+        to->before[2] = projection ? 0 : batch->before[2][l];
     }
 }
 
 /// Returns how many contacts are in batches.
 BT_FOR_EACH_CPU
-static bt_idx take_all(const bt_cell *cell, packing *s)
+static bt_idx take_all(const bt_cell *cell, packing *pack)
 {
-    bt_unknowns *of = s->of;
+    bt_unknowns *of = pack->of;
     for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        const bt_batch *o = &cell->work.batch[k];
-        take_records(o, s->u);
-        take_out(o, of);
-        of += o->n;
-        for (int l = 0; l < o->n; l++) s->listed[o->contact[l]] = true;
+        const bt_batch *batch = &cell->work.batch[k];
+        take_records(batch, pack->u);
+        take_out(batch, of);
+        of += batch->n;
+        for (int l = 0; l < batch->n; l++) pack->listed[batch->contact[l]] = true;
     }
     const bt_contact *rest = rest_of(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        if (!s->listed[i]) copy_records(&s->u[i], rest++, 1);
-    return (bt_idx)(of - s->of);
+        if (!pack->listed[i]) copy_records(&pack->u[i], rest++, 1);
+    return (bt_idx)(of - pack->of);
 }
 
 BT_FOR_EACH_CPU
-static void put_back(bt_cell *cell, const bt_contact *u) { copy_records(cell->contacts, u, cell->n_contacts); }
+static void put_back(bt_cell *cell,
+                     const bt_contact *contact) { copy_records(cell->contacts, contact, cell->n_contacts); }
 
 void bt_batch_unpack(bt_cell *cell)
 {
     if (!cell->work.packed) return;
-    packing s;
-    begin_packing(&s, cell);
-    const bt_idx n_last = take_all(cell, &s);
-    const size_t bytes = (size_t)cell->n_contacts * sizeof *s.u, more = (size_t)n_last * sizeof *s.of;
+    packing pack;
+    begin_packing(&pack, cell);
+    const bt_idx n_last = take_all(cell, &pack);
+    const size_t bytes = (size_t)cell->n_contacts * sizeof *pack.u, more = (size_t)n_last * sizeof *pack.of;
     bt_cells_make_room(cell, bytes + more);
     cell->work.packed = false;
     cell->work.batch = NULL;
     cell->work.n_batches = 0;
     cell->work.last = (bt_unknowns *)((char *)cell->contacts + bytes);
     cell->work.n_last = n_last;
-    put_back(cell, s.u);
-    memcpy(cell->work.last, s.of, more);
-    end_packing(&s);
+    put_back(cell, pack.u);
+    memcpy(cell->work.last, pack.of, more);
+    end_packing(&pack);
 }

@@ -40,18 +40,18 @@ void bt_batch_begin(bt_cell *cell);
 
 /// What a residual pass finds in the cell, whose impulses are in its contacts; it lists them. Or in the position
 /// projection, d: displacements, slop: overlap that is left alone, m.
-bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p);
+bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem);
 bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
-                                      const bt_problem *p);
+                                      const bt_problem *problem);
 
 /// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
 /// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
 /// first pass in *most. Returns how far it turned against its move, J.
-double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, double enough,
                       int64_t *done, double *most);
 
 /// The same for the position projection, in one pass.
-double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
+double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep, int64_t *done,
                         double *most);
 
 /// The contacts again, with their impulses; nothing when they are there.

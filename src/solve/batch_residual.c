@@ -17,32 +17,32 @@ typedef struct {
     double few_x[BT_FEW][2], (*x)[2];           // [n_contacts]
 } last_sweep;
 
-static void take_last(const bt_cell *cell, bool projection, last_sweep *s)
+static void take_last(const bt_cell *cell, bool projection, last_sweep *last)
 {
     const size_t n = (size_t)cell->n_contacts;
     const bool few = n <= BT_FEW;
-    s->moved = few ? s->few_moved : bt_realloc(NULL, n, sizeof *s->moved);
-    s->x = !projection ? NULL : few ? s->few_x : bt_realloc(NULL, n, sizeof *s->x);
-    if (n > 0) memset(s->moved, 0, n * sizeof *s->moved);
-    if (n > 0 && projection) memset(s->x, 0, n * sizeof *s->x);
+    last->moved = few ? last->few_moved : bt_realloc(NULL, n, sizeof *last->moved);
+    last->x = !projection ? NULL : few ? last->few_x : bt_realloc(NULL, n, sizeof *last->x);
+    if (n > 0) memset(last->moved, 0, n * sizeof *last->moved);
+    if (n > 0 && projection) memset(last->x, 0, n * sizeof *last->x);
     for (bt_idx k = 0; k < cell->work.n_last; k++) {
-        const bt_unknowns *o = &cell->work.last[k];
-        const bt_idx i = o->contact;
-        const bt_contact *u = &cell->contacts[i];
-        const double *b = o->before;
+        const bt_unknowns *unknowns = &cell->work.last[k];
+        const bt_idx i = unknowns->contact;
+        const bt_contact *contact = &cell->contacts[i];
+        const double *b = unknowns->before;
         if (projection) {
-            s->moved[i] = o->multiplier[0] != b[0] || o->multiplier[1] != b[1];
-            s->x[i][0] = o->multiplier[0], s->x[i][1] = o->multiplier[1];
+            last->moved[i] = unknowns->multiplier[0] != b[0] || unknowns->multiplier[1] != b[1];
+            last->x[i][0] = unknowns->multiplier[0], last->x[i][1] = unknowns->multiplier[1];
         } else {
-            s->moved[i] = u->ln[0] != b[0] || u->ln[1] != b[1] || u->lt != b[2];
+            last->moved[i] = contact->ln[0] != b[0] || contact->ln[1] != b[1] || contact->lt != b[2];
         }
     }
 }
 
-static void free_last(last_sweep *s)
+static void free_last(last_sweep *last)
 {
-    if (s->moved != s->few_moved) free(s->moved);
-    if (s->x && s->x != s->few_x) free(s->x);
+    if (last->moved != last->few_moved) free(last->moved);
+    if (last->x && last->x != last->few_x) free(last->x);
 }
 
 /// Lanes of a vector for loops over contacts.
@@ -89,31 +89,31 @@ BT_INLINE bt_mask there_are(const bt_cell *cell, bt_idx i)
 
 BT_INLINE int64_t sum_of(bt_mask a) { return a[0] + a[1] + a[2] + a[3]; }
 
-BT_INLINE bt_vec limits_of(const bt_limit *const k[BT_LANES], int c)
+BT_INLINE bt_vec limits_of(const bt_limit *const limit[BT_LANES], int c)
 {
     // of `most` and `flat` the lower one: nothing rises here
-    bt_vec most = {k[0]->most[c], k[1]->most[c], k[2]->most[c], k[3]->most[c]};
-    return bt_smaller(most, (bt_vec){k[0]->flat[c], k[1]->flat[c], k[2]->flat[c], k[3]->flat[c]});
+    bt_vec most = {limit[0]->most[c], limit[1]->most[c], limit[2]->most[c], limit[3]->most[c]};
+    return bt_smaller(most, (bt_vec){limit[0]->flat[c], limit[1]->flat[c], limit[2]->flat[c], limit[3]->flat[c]});
 }
 
 /// As bt_contact_residual and the list of residual_in_place (solver.c).
-BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem,
                             const uint8_t *moved, bool bounded)
 {
-    const double near = BT_NEAR * p->tolerance;
+    const double near = BT_NEAR * problem->tolerance;
     const bt_vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY};
     const bt_limit *limits = cell->laws.limits;
-    bt_found f = {0};
+    bt_found found = {0};
     bt_vec most = zero;
     bt_mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
         const four o = four_from(cell, i, v, inv);
-        const bt_contact *const *u = o.u;
+        const bt_contact *const *contact = o.u;
         const bt_four_rows r = o.r;
         const bt_masses m = o.m;
         const bt_motions a = o.a, b = o.b;
-        const bt_limit *k[BT_LANES];
-        for (int l = 0; bounded && l < BT_LANES; l++) k[l] = &limits[u[l] - cell->contacts];
+        const bt_limit *limit[BT_LANES];
+        for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &limits[contact[l] - cell->contacts];
         const bt_vec dx = b.x - a.x, dy = b.y - a.y, un = r.nx * dx + r.ny * dy;
         bt_vec worst = zero, square[3], total = zero;
         bt_mask on = (r.ln[0] + r.ln[1] > zero) | (r.lt != zero);
@@ -123,14 +123,14 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
             bt_vec map;
             if (bounded) {
                 const bt_vec to = w - m.w[c] * r.ln[c];
-                map = bt_larger(zero, bt_smaller(-to * m.mn[c], limits_of(k, c)));
+                map = bt_larger(zero, bt_smaller(-to * m.mn[c], limits_of(limit, c)));
             } else {
                 map = bt_larger(zero, r.ln[c] - w * m.mn[c]);
             }
             const bt_vec more = map - r.ln[c];
             bt_vec e = bt_only(there, bt_size_of(more * m.w[c]));
             if (bounded) { // bt_short_residual
-                const bt_vec lacks = bt_smaller(-w, (more / map) * (p->tolerance / BT_SHORT));
+                const bt_vec lacks = bt_smaller(-w, (more / map) * (problem->tolerance / BT_SHORT));
                 e = bt_larger(e, bt_only(there & (more > zero), lacks));
             }
             worst = bt_larger(worst, e);
@@ -148,66 +148,68 @@ BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, c
         rows += counts & (1 - r.one - r.two);
         const lanes normal = lanes_of(square[0]), second = lanes_of(square[1]), tangent = lanes_of(square[2]);
         for (int l = 0; l < BT_LANES && i + l < cell->n_contacts; l++) {
-            bool listed = p->plain || on[l] || moved[i + l];
-            if (bounded && u[l]->n == 0) {
-                const bt_mass own = bt_mass_of(u[l], inv);
-                const double largest = bt_sheets_residual(u[l], &own, k[l], v, p->tolerance, &f.squares);
-                listed = p->plain || u[l]->ln[0] + u[l]->ln[1] > 0 || u[l]->lt != 0 || moved[i + l] || largest > 0;
-                f.most = bt_max(f.most, largest);
-                f.bad += largest > near;
-                f.rows += 2;
+            bool listed = problem->plain || on[l] || moved[i + l];
+            if (bounded && contact[l]->n == 0) {
+                const bt_mass own = bt_mass_of(contact[l], inv);
+                const double largest = bt_sheets_residual(contact[l], &own, limit[l], v, problem->tolerance,
+                                                          &found.squares);
+                listed = problem->plain || contact[l]->ln[0] + contact[l]->ln[1] > 0 || contact[l]->lt != 0 ||
+                         moved[i + l] || largest > 0;
+                found.most = bt_max(found.most, largest);
+                found.bad += largest > near;
+                found.rows += 2;
             } else {
-                f.squares += normal.of[l];
-                f.squares += second.of[l];
-                f.squares += tangent.of[l];
+                found.squares += normal.of[l];
+                found.squares += second.of[l];
+                found.squares += tangent.of[l];
             }
             cell->work.list[cell->work.n_list] = i + l;
             cell->work.n_list += listed;
         }
     }
-    f.most = bt_max(f.most, bt_largest_lane(most));
-    f.bad += sum_of(bad);
-    f.rows += sum_of(rows);
-    return f;
+    found.most = bt_max(found.most, bt_largest_lane(most));
+    found.bad += sum_of(bad);
+    found.rows += sum_of(rows);
+    return found;
 }
 
 BT_FOR_EACH_CPU
-static bt_found residual_of_rigid(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+static bt_found residual_of_rigid(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem,
                                   const uint8_t *moved)
 {
-    return residual(cell, v, inv, p, moved, false);
+    return residual(cell, v, inv, problem, moved, false);
 }
 
 BT_FOR_EACH_CPU
-static bt_found residual_of_bounded(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p,
+static bt_found residual_of_bounded(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem,
                                     const uint8_t *moved)
 {
-    return residual(cell, v, inv, p, moved, true);
+    return residual(cell, v, inv, problem, moved, true);
 }
 
-bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *p)
+bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem)
 {
-    last_sweep s;
-    take_last(cell, false, &s);
-    const bt_found f = cell->laws.limits ? residual_of_bounded(cell, v, inv, p, s.moved)
-                                         : residual_of_rigid(cell, v, inv, p, s.moved);
-    free_last(&s);
-    return f;
+    last_sweep last;
+    take_last(cell, false, &last);
+    const bt_found found = cell->laws.limits ? residual_of_bounded(cell, v, inv, problem, last.moved)
+                                             : residual_of_rigid(cell, v, inv, problem, last.moved);
+    free_last(&last);
+    return found;
 }
 
 /// As residual_in_place of project.c.
 BT_FOR_EACH_CPU
 static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
-                                       const bt_problem *p, const last_sweep *s)
+                                       const bt_problem *problem, const last_sweep *last)
 {
-    const double near = BT_NEAR * p->tolerance;
+    const double near = BT_NEAR * problem->tolerance;
     const bt_vec zero = {0};
-    bt_found f = {0};
+    bt_found found = {0};
     bt_vec most = zero;
     bt_mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
         const four o = four_from(cell, i, d, inv);
-        const bt_contact *const *u = o.u;
+        const bt_contact *const *contact = o.u;
         const bt_four_rows r = o.r;
         const bt_masses m = o.m;
         const bt_motions a = o.a, b = o.b;
@@ -218,8 +220,8 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
             const bt_mask there = c ? r.two : r.one;
             bt_vec gap, x;
             for (int l = 0; l < BT_LANES; l++) {
-                const bt_idx j = (bt_idx)(u[l] - cell->contacts);
-                gap[l] = cell->gaps[j].gap[c], x[l] = s->x[j][c];
+                const bt_idx j = (bt_idx)(contact[l] - cell->contacts);
+                gap[l] = cell->gaps[j].gap[c], x[l] = last->x[j][c];
             }
             const bt_vec open = un + r.rbn[c] * b.w - r.ran[c] * a.w + gap + slop;
             const bt_vec e = bt_only(there, bt_size_of(bt_larger(zero, x - open * m.mn[c]) - x) * m.w[c]);
@@ -233,24 +235,24 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
         rows += counts & (-r.one - r.two);
         const lanes first = lanes_of(square[0]), second = lanes_of(square[1]);
         for (int l = 0; l < BT_LANES && i + l < cell->n_contacts; l++) {
-            f.squares += first.of[l];
-            f.squares += second.of[l];
+            found.squares += first.of[l];
+            found.squares += second.of[l];
             cell->work.list[cell->work.n_list] = i + l;
-            cell->work.n_list += on[l] || s->moved[i + l];
+            cell->work.n_list += on[l] || last->moved[i + l];
         }
     }
-    f.most = bt_max(f.most, bt_largest_lane(most));
-    f.bad += sum_of(bad);
-    f.rows += sum_of(rows);
-    return f;
+    found.most = bt_max(found.most, bt_largest_lane(most));
+    found.bad += sum_of(bad);
+    found.rows += sum_of(rows);
+    return found;
 }
 
 bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
-                                      const bt_problem *p)
+                                      const bt_problem *problem)
 {
-    last_sweep s;
-    take_last(cell, true, &s);
-    const bt_found f = residual_of_projection(cell, slop, d, inv, p, &s);
-    free_last(&s);
-    return f;
+    last_sweep last;
+    take_last(cell, true, &last);
+    const bt_found found = residual_of_projection(cell, slop, d, inv, problem, &last);
+    free_last(&last);
+    return found;
 }

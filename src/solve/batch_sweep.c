@@ -32,16 +32,18 @@ BT_INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
 }
 
 /// As bt_solve_normals.
-BT_INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b, vec *l1, vec *l2)
+BT_INLINE void solve_normals(const bt_batch *batch, const motion *a, const motion *b, vec *l1, vec *l2)
 {
-    const vec zero = {0}, un = o->nx * (b->x - a->x) + o->ny * (b->y - a->y);
-    const vec u1 = un + o->rbn[0] * b->w - o->ran[0] * a->w + o->bias[0],
-              u2 = un + o->rbn[1] * b->w - o->ran[1] * a->w + o->bias[1];
-    const vec b1 = u1 - o->w[0] * o->x[0] - o->w12 * o->x[1], b2 = u2 - o->w12 * o->x[0] - o->w[1] * o->x[1];
-    const vec both1 = (o->w12 * b2 - o->w[1] * b1) * o->per_det, both2 = (o->w12 * b1 - o->w[0] * b2) * o->per_det;
-    const vec only1 = bt_larger(zero, -b1 * o->mn[0]), only2 = bt_larger(zero, -b2 * o->mn[1]);
-    const mask both = (o->per_det > zero) & (both1 >= zero) & (both2 >= zero),
-               first = (b2 + o->w12 * only1 >= zero) | (only2 == zero);
+    const vec zero = {0}, un = batch->nx * (b->x - a->x) + batch->ny * (b->y - a->y);
+    const vec u1 = un + batch->rbn[0] * b->w - batch->ran[0] * a->w + batch->bias[0],
+              u2 = un + batch->rbn[1] * b->w - batch->ran[1] * a->w + batch->bias[1];
+    const vec b1 = u1 - batch->w[0] * batch->x[0] - batch->w12 * batch->x[1],
+              b2 = u2 - batch->w12 * batch->x[0] - batch->w[1] * batch->x[1];
+    const vec both1 = (batch->w12 * b2 - batch->w[1] * b1) * batch->per_det,
+              both2 = (batch->w12 * b1 - batch->w[0] * b2) * batch->per_det;
+    const vec only1 = bt_larger(zero, -b1 * batch->mn[0]), only2 = bt_larger(zero, -b2 * batch->mn[1]);
+    const mask both = (batch->per_det > zero) & (both1 >= zero) & (both2 >= zero),
+               first = (b2 + batch->w12 * only1 >= zero) | (only2 == zero);
     *l1 = bt_choose(both, both1, bt_choose(first, only1, zero));
     *l2 = bt_choose(both, both2, bt_choose(first, zero, only2));
 }
@@ -49,7 +51,7 @@ BT_INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b
 BT_INLINE bool any_of(mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 
 /// As bt_limit_rim.
-BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[2])
+BT_INLINE void rim(const bt_batch *batch, const vec bound[2], const vec b[2], vec l[2])
 {
     const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY}, half = {0.5, 0.5, 0.5, 0.5};
     vec least = endless;
@@ -58,10 +60,10 @@ BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[
         const int i = side >> 1, k = 1 - i;
         vec x[2];
         x[i] = side & 1 ? bound[i] : zero;
-        x[k] = bt_larger(zero, bt_smaller(bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
-        const vec slope = b[i] + o->w[i] * x[i] + o->w12 * x[k];
-        const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) +
-                          x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
+        x[k] = bt_larger(zero, bt_smaller(bound[k], -(b[k] + batch->w12 * x[i]) * batch->mn[k]));
+        const vec slope = b[i] + batch->w[i] * x[i] + batch->w12 * x[k];
+        const vec value = x[0] * (half * (batch->w[0] * x[0] + batch->w12 * x[1]) + b[0]) +
+                          x[1] * (half * (batch->w12 * x[0] + batch->w[1] * x[1]) + b[1]);
         const mask right = side & 1 ? slope <= zero : slope >= zero, open = ~done & (x[i] < endless),
                    take = open & (right | (value < least));
         l[0] = bt_choose(take, x[0], l[0]);
@@ -73,99 +75,107 @@ BT_INLINE void rim(const bt_batch *o, const vec bound[2], const vec b[2], vec l[
 
 /// As bt_limit_normals where no bound rises. The second point of a contact with one has no mass and no bound: of all
 /// sides of the rim it stays at 0, and the first comes to its bound, as it does alone.
-BT_INLINE void bound_normals(const bt_batch *o, const vec bound[2], const motion *p, const motion *q, vec *l1, vec *l2)
+BT_INLINE void bound_normals(const bt_batch *batch, const vec bound[2], const motion *p, const motion *q, vec *l1,
+                             vec *l2)
 {
     const mask over = (*l1 > bound[0]) | (*l2 > bound[1]);
     if (!any_of(over)) return;
-    const vec un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
+    const vec un = batch->nx * (q->x - p->x) + batch->ny * (q->y - p->y);
     vec b[2], l[2] = {*l1, *l2};
     for (int i = 0; i < 2; i++)
-        b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
-    rim(o, bound, b, l);
+        b[i] = un + batch->rbn[i] * q->w - batch->ran[i] * p->w + batch->bias[i] - batch->w[i] * batch->x[i] -
+               batch->w12 * batch->x[1 - i];
+    rim(batch, bound, b, l);
     *l1 = bt_choose(over, l[0], *l1);
     *l2 = bt_choose(over, l[1], *l2);
 }
 
 /// As bt_update_sheets; lanes without a contact bear nothing and have no step.
-BT_INLINE vec update_sheets(bt_batch *o, vec friction, bt_vel *v)
+BT_INLINE vec update_sheets(bt_batch *batch, vec friction, bt_vel *v)
 {
     const vec zero = {0}, one = {1, 1, 1, 1};
-    motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
+    motion a = bt_take_four(v, batch->a), b = bt_take_four(v, batch->b);
     const vec dvx = b.x - a.x, dvy = b.y - a.y;
-    vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
-    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
-    const vec ends = o->BT_ENDS_X * o->BT_ENDS_X + o->BT_ENDS_Y * o->BT_ENDS_Y;
-    const vec along = (x * o->BT_ENDS_X + y * o->BT_ENDS_Y) / ends;
+    vec x = batch->x[0] - (batch->nx * dvx + batch->ny * dvy + batch->rbn[0] * b.w - batch->ran[0] * a.w) *
+            batch->mn[0];
+    vec y = batch->x[2] - (batch->nx * dvy - batch->ny * dvx + batch->rbt * b.w - batch->rat * a.w) * batch->mt,
+        far = {0};
+    const vec ends = batch->BT_ENDS_X * batch->BT_ENDS_X + batch->BT_ENDS_Y * batch->BT_ENDS_Y;
+    const vec along = (x * batch->BT_ENDS_X + y * batch->BT_ENDS_Y) / ends;
     const vec part = bt_choose(ends > zero, bt_larger(-one, bt_smaller(one, along)), zero);
-    const vec out_x = x - part * o->BT_ENDS_X, out_y = y - part * o->BT_ENDS_Y, square = out_x * out_x + out_y * out_y;
+    const vec out_x = x - part * batch->BT_ENDS_X, out_y = y - part * batch->BT_ENDS_Y,
+              square = out_x * out_x + out_y * out_y;
     for (int l = 0; l < BT_LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
     const mask outside = far > friction;
-    x = bt_choose(outside, part * o->BT_ENDS_X + out_x * (friction / far), x);
-    y = bt_choose(outside, part * o->BT_ENDS_Y + out_y * (friction / far), y);
-    const vec dx = x - o->x[0], dy = y - o->x[2], jx = dx * o->nx - dy * o->ny, jy = dx * o->ny + dy * o->nx;
-    a.x -= o->ma * jx;
-    a.y -= o->ma * jy;
-    a.w -= o->ia * (dx * o->ran[0] + dy * o->rat);
-    b.x += o->mb * jx;
-    b.y += o->mb * jy;
-    b.w += o->ib * (dx * o->rbn[0] + dy * o->rbt);
-    o->x[0] = x, o->x[2] = y;
-    store(v, o->a, o->moves_a, a);
-    store(v, o->b, o->moves_b, b);
-    return bt_larger(bt_size_of(dx), bt_size_of(dy)) * o->wt;
+    x = bt_choose(outside, part * batch->BT_ENDS_X + out_x * (friction / far), x);
+    y = bt_choose(outside, part * batch->BT_ENDS_Y + out_y * (friction / far), y);
+    const vec dx = x - batch->x[0], dy = y - batch->x[2], jx = dx * batch->nx - dy * batch->ny,
+              jy = dx * batch->ny + dy * batch->nx;
+    a.x -= batch->ma * jx;
+    a.y -= batch->ma * jy;
+    a.w -= batch->ia * (dx * batch->ran[0] + dy * batch->rat);
+    b.x += batch->mb * jx;
+    b.y += batch->mb * jy;
+    b.w += batch->ib * (dx * batch->rbn[0] + dy * batch->rbt);
+    batch->x[0] = x, batch->x[2] = y;
+    store(v, batch->a, batch->moves_a, a);
+    store(v, batch->b, batch->moves_b, b);
+    return bt_larger(bt_size_of(dx), bt_size_of(dy)) * batch->wt;
 }
 
 /// As bt_update_contact, with bounds of the normals or NULL; the largest changes of a row's speed, m/s.
-BT_INLINE vec update(bt_batch *o, const vec *limits, bt_vel *v)
+BT_INLINE vec update(bt_batch *batch, const vec *limits, bt_vel *v)
 {
-    motion a = bt_take_four(v, o->a), b = bt_take_four(v, o->b);
+    motion a = bt_take_four(v, batch->a), b = bt_take_four(v, batch->b);
     vec l1, l2;
-    solve_normals(o, &a, &b, &l1, &l2);
-    if (limits) bound_normals(o, limits, &a, &b, &l1, &l2);
-    const vec d1 = l1 - o->x[0], d2 = l2 - o->x[1], jn = d1 + d2, jx = jn * o->nx, jy = jn * o->ny;
-    a.x -= o->ma * jx;
-    a.y -= o->ma * jy;
-    a.w -= o->ia * (d1 * o->ran[0] + d2 * o->ran[1]);
-    b.x += o->mb * jx;
-    b.y += o->mb * jy;
-    b.w += o->ib * (d1 * o->rbn[0] + d2 * o->rbn[1]);
-    const vec ut = o->nx * (b.y - a.y) - o->ny * (b.x - a.x) + o->rbt * b.w - o->rat * a.w, bound = o->mu * (l1 + l2);
-    const vec t = bt_larger(-bound, bt_smaller(bound, o->x[2] - ut * o->mt)), dt = t - o->x[2], tx = dt * o->ny,
-              ty = dt * o->nx;
-    a.x += o->ma * tx;
-    a.y -= o->ma * ty;
-    a.w -= o->ia * (dt * o->rat);
-    b.x -= o->mb * tx;
-    b.y += o->mb * ty;
-    b.w += o->ib * (dt * o->rbt);
-    o->x[0] = l1, o->x[1] = l2, o->x[2] = t;
-    store(v, o->a, o->moves_a, a);
-    store(v, o->b, o->moves_b, b);
-    const vec u1 = o->w[0] * d1 + o->w12 * d2, u2 = o->w12 * d1 + o->w[1] * d2;
-    return bt_larger(bt_larger(bt_size_of(u1), bt_size_of(u2)), bt_size_of(dt) * o->wt);
+    solve_normals(batch, &a, &b, &l1, &l2);
+    if (limits) bound_normals(batch, limits, &a, &b, &l1, &l2);
+    const vec d1 = l1 - batch->x[0], d2 = l2 - batch->x[1], jn = d1 + d2, jx = jn * batch->nx, jy = jn * batch->ny;
+    a.x -= batch->ma * jx;
+    a.y -= batch->ma * jy;
+    a.w -= batch->ia * (d1 * batch->ran[0] + d2 * batch->ran[1]);
+    b.x += batch->mb * jx;
+    b.y += batch->mb * jy;
+    b.w += batch->ib * (d1 * batch->rbn[0] + d2 * batch->rbn[1]);
+    const vec ut = batch->nx * (b.y - a.y) - batch->ny * (b.x - a.x) + batch->rbt * b.w - batch->rat * a.w,
+              bound = batch->mu * (l1 + l2);
+    const vec t = bt_larger(-bound, bt_smaller(bound, batch->x[2] - ut * batch->mt)), dt = t - batch->x[2],
+              tx = dt * batch->ny, ty = dt * batch->nx;
+    a.x += batch->ma * tx;
+    a.y -= batch->ma * ty;
+    a.w -= batch->ia * (dt * batch->rat);
+    b.x -= batch->mb * tx;
+    b.y += batch->mb * ty;
+    b.w += batch->ib * (dt * batch->rbt);
+    batch->x[0] = l1, batch->x[1] = l2, batch->x[2] = t;
+    store(v, batch->a, batch->moves_a, a);
+    store(v, batch->b, batch->moves_b, b);
+    const vec u1 = batch->w[0] * d1 + batch->w12 * d2, u2 = batch->w12 * d1 + batch->w[1] * d2;
+    return bt_larger(bt_larger(bt_size_of(u1), bt_size_of(u2)), bt_size_of(dt) * batch->wt);
 }
 
 /// As the update of one contact in project.c: its points one after the other.
-BT_INLINE vec project(bt_batch *o, bt_vel *d)
+BT_INLINE vec project(bt_batch *batch, bt_vel *d)
 {
-    motion a = bt_take_four(d, o->a), b = bt_take_four(d, o->b);
+    motion a = bt_take_four(d, batch->a), b = bt_take_four(d, batch->b);
     const vec zero = {0};
     vec most = zero;
     for (int i = 0; i < 2; i++) {
-        const vec un = o->nx * (b.x - a.x) + o->ny * (b.y - a.y) + o->rbn[i] * b.w - o->ran[i] * a.w;
-        const vec open = un + o->bias[i] + o->mu, p = bt_larger(zero, o->x[i] - open * o->mn[i]), step = p - o->x[i];
-        const vec x = step * o->nx, y = step * o->ny;
-        a.x -= o->ma * x;
-        a.y -= o->ma * y;
-        a.w -= o->ia * (step * o->ran[i]);
-        b.x += o->mb * x;
-        b.y += o->mb * y;
-        b.w += o->ib * (step * o->rbn[i]);
-        o->x[i] = p;
-        most = bt_larger(most, bt_size_of(step) * o->w[i]);
+        const vec un = batch->nx * (b.x - a.x) + batch->ny * (b.y - a.y) + batch->rbn[i] * b.w - batch->ran[i] * a.w;
+        const vec open = un + batch->bias[i] + batch->mu, p = bt_larger(zero, batch->x[i] - open * batch->mn[i]),
+                  step = p - batch->x[i];
+        const vec x = step * batch->nx, y = step * batch->ny;
+        a.x -= batch->ma * x;
+        a.y -= batch->ma * y;
+        a.w -= batch->ia * (step * batch->ran[i]);
+        b.x += batch->mb * x;
+        b.y += batch->mb * y;
+        b.w += batch->ib * (step * batch->rbn[i]);
+        batch->x[i] = p;
+        most = bt_larger(most, bt_size_of(step) * batch->w[i]);
     }
-    store(d, o->a, o->moves_a, a);
-    store(d, o->b, o->moves_b, b);
+    store(d, batch->a, batch->moves_a, a);
+    store(d, batch->b, batch->moves_b, b);
     return most;
 }
 
@@ -244,36 +254,36 @@ static double against_projection(const bt_batch *batch, bt_idx n, const moved *y
 
 typedef double pass_of_batches(bt_batch *batch, bt_idx n, bt_vel *v);
 
-static double visit(bt_cell *cell, bt_vel *v, pass_of_batches *once, const bt_sweep *s, int times, double enough,
+static double visit(bt_cell *cell, bt_vel *v, pass_of_batches *once, const bt_sweep *sweep, int times, double enough,
                     int64_t *done, double *most)
 {
     bt_batch *batch = cell->work.batch;
     const bt_idx n_batches = cell->work.n_batches;
     moved few[BT_FEW / BT_LANES], *y = few;
-    if (s->moves && n_batches > BT_FEW / BT_LANES) y = bt_alloc_aligned((size_t)n_batches, sizeof *y);
+    if (sweep->moves && n_batches > BT_FEW / BT_LANES) y = bt_alloc_aligned((size_t)n_batches, sizeof *y);
     const bool projection = once == pass_projection;
-    if (s->moves) (projection ? move_projection : move)(batch, n_batches, s->beta, y);
+    if (sweep->moves) (projection ? move_projection : move)(batch, n_batches, sweep->beta, y);
     double last = INFINITY;
     for (int n = 0; n == 0 || (n < times && last > enough); n++) {
         last = once(batch, n_batches, v);
         if (n == 0) *most = last;
         *done += cell->work.n_list;
     }
-    const double turned = !s->moves ? 0 : (projection ? against_projection : against)(batch, n_batches, y);
+    const double turned = !sweep->moves ? 0 : (projection ? against_projection : against)(batch, n_batches, y);
     if (y != few) free(y);
     return turned;
 }
 
-double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, double enough,
                       int64_t *done, double *most)
 {
     if (!cell->work.packed) bt_batch_pack(cell, inv, NULL);
-    return visit(cell, v, cell->laws.limits ? pass_bounded : pass, s, times, enough, done, most);
+    return visit(cell, v, cell->laws.limits ? pass_bounded : pass, sweep, times, enough, done, most);
 }
 
-double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
+double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep, int64_t *done,
                         double *most)
 {
     if (!cell->work.packed) bt_batch_pack(cell, inv, &slop);
-    return visit(cell, d, pass_projection, s, 1, 0, done, most);
+    return visit(cell, d, pass_projection, sweep, 1, 0, done, most);
 }

@@ -15,74 +15,75 @@
 
 bt_islands *bt_islands_create(void) { return bt_alloc(1, sizeof(bt_islands)); }
 
-void bt_islands_free(bt_islands *s)
+void bt_islands_free(bt_islands *islands)
 {
-    if (!s) return;
-    free(s->root);
-    free(s->name);
-    free(s->share);
-    free(s->sum);
-    free(s);
+    if (!islands) return;
+    free(islands->root);
+    free(islands->name);
+    free(islands->share);
+    free(islands->sum);
+    free(islands);
 }
 
 /// With path halving.
-static bt_idx islands_root(bt_islands *s, bt_idx i)
+static bt_idx islands_root(bt_islands *islands, bt_idx i)
 {
-    while (s->root[i] != i) i = s->root[i] = s->root[s->root[i]];
+    while (islands->root[i] != i) i = islands->root[i] = islands->root[islands->root[i]];
     return i;
 }
 
-bt_idx bt_islands_of(const bt_world *w, bt_islands *s, const bt_contact *u)
+bt_idx bt_islands_of(const bt_world *world, bt_islands *islands, const bt_contact *contact)
 {
-    return islands_root(s, w->bodies.inv[u->a].m > 0 ? u->a : u->b);
+    return islands_root(islands, world->bodies.inv[contact->a].m > 0 ? contact->a : contact->b);
 }
 
-static void make_room(const bt_bodies *b, bt_islands *s)
+static void make_room(const bt_bodies *bodies, bt_islands *islands)
 {
-    if (b->n > s->cap) {
-        s->cap = b->n;
-        s->root = bt_realloc(s->root, (size_t)b->n, sizeof *s->root);
-        s->name = bt_realloc(s->name, (size_t)b->n, sizeof *s->name);
-        s->share = bt_realloc(s->share, (size_t)b->n, sizeof *s->share);
-        s->sum = bt_realloc(s->sum, (size_t)b->n, sizeof *s->sum);
+    if (bodies->n > islands->cap) {
+        islands->cap = bodies->n;
+        islands->root = bt_realloc(islands->root, (size_t)bodies->n, sizeof *islands->root);
+        islands->name = bt_realloc(islands->name, (size_t)bodies->n, sizeof *islands->name);
+        islands->share = bt_realloc(islands->share, (size_t)bodies->n, sizeof *islands->share);
+        islands->sum = bt_realloc(islands->sum, (size_t)bodies->n, sizeof *islands->sum);
     }
-    for (bt_idx i = 0; i < b->n; i++) {
-        s->root[i] = i;
-        s->name[i] = b->gid[i];
-        s->share[i] = 1;
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        islands->root[i] = i;
+        islands->name[i] = bodies->gid[i];
+        islands->share[i] = 1;
     }
 }
 
-void bt_islands_make(bt_world *w, bt_islands *s, bool (*joins)(const bt_cell *cell, bt_idx contact))
+void bt_islands_make(bt_world *world, bt_islands *islands, bool (*joins)(const bt_cell *cell, bt_idx contact))
 {
-    const bt_cells *ts = w->cells;
-    const bt_bodies *b = &w->bodies;
-    make_room(b, s);
+    const bt_cells *ts = world->cells;
+    const bt_bodies *bodies = &world->bodies;
+    make_room(bodies, islands);
     for (bt_idx i = 0; i < ts->n_order; i++) {
         const bt_cell *cell = &ts->cell[ts->order[i]];
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            const bt_contact *u = &cell->contacts[j];
-            if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0 || (joins && !joins(cell, j))) continue;
-            s->root[islands_root(s, u->b)] = islands_root(s, u->a);
+            const bt_contact *contact = &cell->contacts[j];
+            if (bodies->inv[contact->a].m == 0 || bodies->inv[contact->b].m == 0 || (joins && !joins(cell, j)))
+                continue;
+            islands->root[islands_root(islands, contact->b)] = islands_root(islands, contact->a);
         }
     }
-    if (!w->domain) return;
-    bt_gid *name = bt_alloc((size_t)b->n, sizeof *name);
-    for (bt_idx i = 0; i < b->n; i++) name[i] = s->name[islands_root(s, i)];
-    bt_domain_join_names(w, name);
-    for (bt_idx i = 0; i < b->n; i++)
-        if (s->root[i] == i) s->name[i] = name[i];
+    if (!world->domain) return;
+    bt_gid *name = bt_alloc((size_t)bodies->n, sizeof *name);
+    for (bt_idx i = 0; i < bodies->n; i++) name[i] = islands->name[islands_root(islands, i)];
+    bt_domain_join_names(world, name);
+    for (bt_idx i = 0; i < bodies->n; i++)
+        if (islands->root[i] == i) islands->name[i] = name[i];
     free(name);
 }
 
-void bt_islands_clear(const bt_world *w, bt_islands *s)
+void bt_islands_clear(const bt_world *world, bt_islands *islands)
 {
-    for (bt_idx i = 0; i < w->bodies.n; i++) s->sum[i] = (bt_sum){0};
+    for (bt_idx i = 0; i < world->bodies.n; i++) islands->sum[i] = (bt_sum){0};
 }
 
-void bt_islands_add(const bt_world *w, bt_islands *s)
+void bt_islands_add(const bt_world *world, bt_islands *islands)
 {
-    if (w->domain) bt_domain_add_by_name(w, s->root, s->name, s->sum);
+    if (world->domain) bt_domain_add_by_name(world, islands->root, islands->name, islands->sum);
 }
 
 // --- bodies that cannot give way -------------------------------------------------------------------------------------
@@ -106,225 +107,232 @@ typedef struct {
 /// Does it bear load, and any load?
 static bool is_hard(const bt_cell *cell, bt_idx j)
 {
-    const bt_contact *u = &cell->contacts[j];
-    if (u->n == 0 || u->ln[0] + u->ln[1] == 0) return false;
-    const bt_limit *k = cell->laws.limits ? &cell->laws.limits[j] : NULL;
-    return !k || !(isfinite(k->most[0]) || (u->n > 1 && isfinite(k->most[1])));
+    const bt_contact *contact = &cell->contacts[j];
+    if (contact->n == 0 || contact->ln[0] + contact->ln[1] == 0) return false;
+    const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[j] : NULL;
+    return !limit || !(isfinite(limit->most[0]) || (contact->n > 1 && isfinite(limit->most[1])));
 }
 
 /// The contacts of this rank, and how fast they would close.
-static loads collect(const bt_world *w)
+static loads collect(const bt_world *world)
 {
-    const bt_cells *cells = w->cells;
-    const bt_vel *at_first = w->bodies.vel_free;
-    loads l = {.first = bt_alloc((size_t)cells->n + 1, sizeof *l.first), .closing = w->par.tolerance};
+    const bt_cells *cells = world->cells;
+    const bt_vel *at_first = world->bodies.vel_free;
+    loads found = {.first = bt_alloc((size_t)cells->n + 1, sizeof *found.first), .closing = world->par.tolerance};
     bool *works = bt_alloc((size_t)cells->n, sizeof *works);
     size_t n = 0;
     for (bt_idx i = 0; i < cells->n_order; i++) {
         works[cells->order[i]] = true;
         n += (size_t)cells->cell[cells->order[i]].n_contacts;
     }
-    l.contact = bt_alloc(n + 1, sizeof *l.contact);
+    found.contact = bt_alloc(n + 1, sizeof *found.contact);
     for (bt_idx k = 0; k < cells->n; k++) {
         const bt_cell *cell = &cells->cell[k];
-        l.first[k + 1] = l.first[k];
+        found.first[k + 1] = found.first[k];
         for (bt_idx j = 0; works[k] && j < cell->n_contacts; j++) {
             if (!is_hard(cell, j)) continue;
-            const bt_contact *u = &cell->contacts[j];
-            hard *h = &l.contact[l.first[k + 1]++];
-            *h = (hard){*u, {u->bias[0], u->bias[1]}, u->ln[0] + u->ln[1]};
+            const bt_contact *contact = &cell->contacts[j];
+            hard *h = &found.contact[found.first[k + 1]++];
+            *h = (hard){*contact, {contact->bias[0], contact->bias[1]}, contact->ln[0] + contact->ln[1]};
             h->u.bias[0] = h->u.bias[1] = 0;
-            for (int c = 0; c < u->n; c++)
-                l.closing = bt_max(l.closing, -bt_normal_velocity(u, c, &at_first[u->a], &at_first[u->b]));
+            for (int c = 0; c < contact->n; c++)
+                found.closing = bt_max(found.closing,
+                                       -bt_normal_velocity(contact, c, &at_first[contact->a], &at_first[contact->b]));
         }
     }
     free(works);
-    bt_domain_maxima(w, &l.closing, 1);
-    return l;
+    bt_domain_maxima(world, &found.closing, 1);
+    return found;
 }
 
-static void no_change(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void no_change(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)context, (void)t;
-    const bt_cell *cell = &w->cells->cell[k];
-    memset(w->solver->shift + cell->first, 0, (size_t)(cell->end - cell->first) * sizeof *w->solver->shift);
+    (void)context, (void)totals;
+    const bt_cell *cell = &world->cells->cell[k];
+    memset(world->solver->shift + cell->first, 0, (size_t)(cell->end - cell->first) * sizeof *world->solver->shift);
 }
 
-static void push(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void push(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)t;
-    const loads *l = context;
-    bt_vel *change = w->solver->shift;
-    const bt_inv *inv = w->bodies.inv;
-    for (bt_idx i = l->first[k]; i < l->first[k + 1]; i++) {
-        const bt_contact *u = &l->contact[i].u;
-        bt_vel va = change[u->a], vb = change[u->b];
-        bt_apply(u, u->ln[0] + u->ln[1], u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1],
-                 u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], u->lt, inv[u->a], inv[u->b], &va, &vb);
-        bt_store(&change[u->a], inv[u->a], &va);
-        bt_store(&change[u->b], inv[u->b], &vb);
+    (void)totals;
+    const loads *found = context;
+    bt_vel *change = world->solver->shift;
+    const bt_inv *inv = world->bodies.inv;
+    for (bt_idx i = found->first[k]; i < found->first[k + 1]; i++) {
+        const bt_contact *contact = &found->contact[i].u;
+        bt_vel va = change[contact->a], vb = change[contact->b];
+        bt_apply(contact, contact->ln[0] + contact->ln[1],
+                 contact->ln[0] * contact->ran[0] + contact->ln[1] * contact->ran[1], contact->ln[0] * contact->rbn[0] +
+                 contact->ln[1] * contact->rbn[1], contact->lt, inv[contact->a], inv[contact->b], &va, &vb);
+        bt_store(&change[contact->a], inv[contact->a], &va);
+        bt_store(&change[contact->b], inv[contact->b], &vb);
     }
 }
 
 /// M⁻¹Jᵀλ into the array of the position projection.
-static void form_change(bt_world *w, const loads *l)
+static void form_change(bt_world *world, const loads *found)
 {
-    bt_totals t = {0};
-    bt_phases_run(w, &(bt_before){no_change, NULL}, push, l, w->solver->shift, &t);
-    bt_domain_settle(w, w->solver->shift);
+    bt_totals totals = {0};
+    bt_phases_run(world, &(bt_before){no_change, NULL}, push, found, world->solver->shift, &totals);
+    bt_domain_settle(world, world->solver->shift);
 }
 
-static void relax(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void relax(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    const loads *l = context;
-    for (bt_idx i = l->first[k]; i < l->first[k + 1]; i++) {
-        bt_contact *u = &l->contact[i].u;
-        const bt_mass m = bt_mass_of(u, w->bodies.inv);
-        t->most = bt_max(t->most, bt_update_contact(u, &m, NULL, w->solver->shift, w->bodies.inv));
+    const loads *found = context;
+    for (bt_idx i = found->first[k]; i < found->first[k + 1]; i++) {
+        bt_contact *contact = &found->contact[i].u;
+        const bt_mass m = bt_mass_of(contact, world->bodies.inv);
+        totals->most =
+            bt_max(totals->most, bt_update_contact(contact, &m, NULL, world->solver->shift, world->bodies.inv));
     }
 }
 
 /// λ to loads that balance each other, with the friction of contacts that stick: sweeps of the same problem with all
 /// that drives it at rest.
-static void balance(bt_world *w, const loads *l)
+static void balance(bt_world *world, const loads *found)
 {
-    form_change(w, l);
+    form_change(world, found);
     for (int sweep = 0; sweep < BT_LOCKED_SWEEPS; sweep++) {
-        bt_totals t = {0};
-        bt_phases_run(w, NULL, relax, l, w->solver->shift, &t);
-        bt_domain_maxima(w, &t.most, 1);
-        if (t.most <= BT_LOCKED_AT_REST * l->closing) break;
+        bt_totals totals = {0};
+        bt_phases_run(world, NULL, relax, found, world->solver->shift, &totals);
+        bt_domain_maxima(world, &totals.most, 1);
+        if (totals.most <= BT_LOCKED_AT_REST * found->closing) break;
     }
 }
 
 /// A of each island into share.
-static void power_of_closing(bt_world *w, bt_islands *s, const loads *l)
+static void power_of_closing(bt_world *world, bt_islands *islands, const loads *found)
 {
-    const bt_vel *v = w->bodies.vel;
-    bt_islands_clear(w, s);
-    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
-        const bt_contact *u = &l->contact[i].u;
-        double power = -u->lt * bt_tangent_velocity(u, &v[u->a], &v[u->b]);
-        for (int c = 0; c < u->n; c++)
-            power -= u->ln[c] * (bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + l->contact[i].bias[c]);
-        bt_sum_add(&s->sum[bt_islands_of(w, s, u)], power);
+    const bt_vel *v = world->bodies.vel;
+    bt_islands_clear(world, islands);
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
+        const bt_contact *contact = &found->contact[i].u;
+        double power = -contact->lt * bt_tangent_velocity(contact, &v[contact->a], &v[contact->b]);
+        for (int c = 0; c < contact->n; c++)
+            power -= contact->ln[c] * (bt_normal_velocity(contact, c, &v[contact->a], &v[contact->b]) +
+                                       found->contact[i].bias[c]);
+        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)], power);
     }
-    bt_islands_add(w, s);
-    for (bt_idx i = 0; i < w->bodies.n; i++) s->share[i] = bt_sum_value(&s->sum[i]);
+    bt_islands_add(world, islands);
+    for (bt_idx i = 0; i < world->bodies.n; i++) islands->share[i] = bt_sum_value(&islands->sum[i]);
 }
 
 /// P of each island into sum.
-static void imbalance(bt_world *w, bt_islands *s)
+static void imbalance(bt_world *world, bt_islands *islands)
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_cells *ts = w->cells;
-    bt_islands_clear(w, s);
+    const bt_bodies *bodies = &world->bodies;
+    const bt_cells *ts = world->cells;
+    bt_islands_clear(world, islands);
     for (bt_idx k = 0; k < ts->n_busy; k++) {
         const bt_cell *cell = &ts->cell[ts->busy[k]];
         for (bt_idx i = cell->first; cell->own && i < cell->end; i++) {
-            const bt_vel *d = &w->solver->shift[i];
-            if (b->inv[i].m == 0 || (d->x == 0 && d->y == 0 && d->w == 0)) continue;
-            const double moment = b->inv[i].i > 0 ? fabs(d->w) / (b->inv[i].i * b->radius[i]) : 0;
-            bt_sum_add(&s->sum[islands_root(s, i)], bt_hypot(d->x, d->y) / b->inv[i].m + moment);
+            const bt_vel *d = &world->solver->shift[i];
+            if (bodies->inv[i].m == 0 || (d->x == 0 && d->y == 0 && d->w == 0)) continue;
+            const double moment = bodies->inv[i].i > 0 ? fabs(d->w) / (bodies->inv[i].i * bodies->radius[i]) : 0;
+            bt_sum_add(&islands->sum[islands_root(islands, i)], bt_hypot(d->x, d->y) / bodies->inv[i].m + moment);
         }
     }
-    bt_islands_add(w, s);
+    bt_islands_add(world, islands);
 }
 
 /// Strike out islands whose A is no more than `speed` times their sum.
-static void drop_islands_below(bt_world *w, bt_islands *s, double speed)
+static void drop_islands_below(bt_world *world, bt_islands *islands, double speed)
 {
-    for (bt_idx i = 0; i < w->bodies.n; i++)
-        if (!(s->share[i] > speed * bt_sum_value(&s->sum[i]))) s->share[i] = 0;
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (!(islands->share[i] > speed * bt_sum_value(&islands->sum[i]))) islands->share[i] = 0;
 }
 
 /// Strike out islands that close by no more than the tolerance.
-static void drop_islands_not_closing(bt_world *w, bt_islands *s, const loads *l)
+static void drop_islands_not_closing(bt_world *world, bt_islands *islands, const loads *found)
 {
-    bt_islands_clear(w, s);
-    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
-        const bt_contact *u = &l->contact[i].u;
-        bt_sum_add(&s->sum[bt_islands_of(w, s, u)], u->ln[0] + u->ln[1]);
+    bt_islands_clear(world, islands);
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
+        const bt_contact *contact = &found->contact[i].u;
+        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)], contact->ln[0] + contact->ln[1]);
     }
-    bt_islands_add(w, s);
-    drop_islands_below(w, s, w->par.tolerance);
+    bt_islands_add(world, islands);
+    drop_islands_below(world, islands, world->par.tolerance);
 }
 
 /// Strike out islands whose loads are not those that the sweeps have come to.
-static void drop_islands_moved(bt_world *w, bt_islands *s, const loads *l)
+static void drop_islands_moved(bt_world *world, bt_islands *islands, const loads *found)
 {
-    bt_islands_clear(w, s);
-    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
-        const bt_contact *u = &l->contact[i].u;
-        const double was = l->contact[i].at_first;
-        bt_sum_add(&s->sum[bt_islands_of(w, s, u)], fabs(u->ln[0] + u->ln[1] - was) - BT_LOCKED_OTHER * was);
+    bt_islands_clear(world, islands);
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
+        const bt_contact *contact = &found->contact[i].u;
+        const double was = found->contact[i].at_first;
+        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
+                   fabs(contact->ln[0] + contact->ln[1] - was) - BT_LOCKED_OTHER * was);
     }
-    bt_islands_add(w, s);
-    for (bt_idx i = 0; i < w->bodies.n; i++)
-        if (bt_sum_value(&s->sum[i]) > 0) s->share[i] = 0;
+    bt_islands_add(world, islands);
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (bt_sum_value(&islands->sum[i]) > 0) islands->share[i] = 0;
 }
 
 /// A of the islands in which A/P is beyond what gives way into share, 0 for all others.
-static void mark(bt_world *w, bt_islands *s, const loads *l, double speeds)
+static void mark(bt_world *world, bt_islands *islands, const loads *found, double speeds)
 {
-    form_change(w, l);
-    power_of_closing(w, s, l);
-    imbalance(w, s);
-    drop_islands_below(w, s, speeds * l->closing);
+    form_change(world, found);
+    power_of_closing(world, islands, found);
+    imbalance(world, islands);
+    drop_islands_below(world, islands, speeds * found->closing);
 }
 
 /// Is an island marked, and one that presses on the towed body?
-static bt_lock marked(const bt_world *w, bt_islands *s, const loads *l)
+static bt_lock marked(const bt_world *world, bt_islands *islands, const loads *l)
 {
-    const bt_idx towed = bt_world_towed(w);
+    const bt_idx towed = bt_world_towed(world);
     double found[2] = {0};
-    for (bt_idx i = 0; i < w->bodies.n; i++)
-        if (s->root[i] == i && s->share[i] > 0) found[0] = 1;
-    for (bt_idx i = 0; towed >= 0 && i < l->first[w->cells->n]; i++) {
-        const bt_contact *u = &l->contact[i].u;
-        if ((u->a == towed || u->b == towed) && s->share[bt_islands_of(w, s, u)] > 0) found[1] = 1;
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (islands->root[i] == i && islands->share[i] > 0) found[0] = 1;
+    for (bt_idx i = 0; towed >= 0 && i < l->first[world->cells->n]; i++) {
+        const bt_contact *contact = &l->contact[i].u;
+        if ((contact->a == towed || contact->b == towed) && islands->share[bt_islands_of(world, islands, contact)] > 0)
+            found[1] = 1;
     }
-    bt_domain_maxima(w, found, 2);
+    bt_domain_maxima(world, found, 2);
     return (bt_lock){found[0] > 0, found[1] > 0};
 }
 
 /// Friction of the contacts that stick, or of none, is in the proof.
-static void take_friction(const bt_world *w, const loads *l, bool held)
+static void take_friction(const bt_world *world, const loads *found, bool held)
 {
-    for (bt_idx i = 0; i < l->first[w->cells->n]; i++) {
-        bt_contact *u = &l->contact[i].u;
-        u->mu *= BT_LOCKED_STICKS;
-        if (!held || fabs(u->lt) > u->mu * (u->ln[0] + u->ln[1])) u->mu = 0, u->lt = 0;
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
+        bt_contact *contact = &found->contact[i].u;
+        contact->mu *= BT_LOCKED_STICKS;
+        if (!held || fabs(contact->lt) > contact->mu * (contact->ln[0] + contact->ln[1]))
+            contact->mu = 0, contact->lt = 0;
     }
 }
 
 /// The proof by loads that are balanced first, of normals alone or with the friction that holds.
-static bt_lock by_balance(bt_world *w, bt_islands *s, const loads *found, bool held)
+static bt_lock by_balance(bt_world *world, bt_islands *islands, const loads *found, bool held)
 {
-    const size_t n = (size_t)found->first[w->cells->n];
+    const size_t n = (size_t)found->first[world->cells->n];
     loads l = *found;
     l.contact = bt_alloc(n + 1, sizeof *l.contact);
     memcpy(l.contact, found->contact, n * sizeof *l.contact);
-    take_friction(w, &l, held);
-    balance(w, &l);
-    mark(w, s, &l, held ? BT_LOCKED_HELD_SPEEDS : BT_LOCKED_SPEEDS);
-    drop_islands_not_closing(w, s, &l);
-    if (held) drop_islands_moved(w, s, &l);
+    take_friction(world, &l, held);
+    balance(world, &l);
+    mark(world, islands, &l, held ? BT_LOCKED_HELD_SPEEDS : BT_LOCKED_SPEEDS);
+    drop_islands_not_closing(world, islands, &l);
+    if (held) drop_islands_moved(world, islands, &l);
     free(l.contact);
-    return marked(w, s, found);
+    return marked(world, islands, found);
 }
 
-bt_lock bt_locked(bt_world *w)
+bt_lock bt_locked(bt_world *world)
 {
-    bt_islands *s = w->solver->islands;
-    const loads l = collect(w);
-    bt_solver_make_shift(w);
-    bt_islands_make(w, s, is_hard);
+    bt_islands *islands = world->solver->islands;
+    const loads found = collect(world);
+    bt_solver_make_shift(world);
+    bt_islands_make(world, islands, is_hard);
     bt_lock lock = {0};
     for (int held = 0; held < 2 && !lock.towed; held++) {
-        const bt_lock more = by_balance(w, s, &l, held);
+        const bt_lock more = by_balance(world, islands, &found, held);
         lock = (bt_lock){lock.found || more.found, more.towed};
     }
-    free(l.contact), free(l.first);
+    free(found.contact), free(found.first);
     return lock;
 }

@@ -22,18 +22,18 @@ typedef struct bt_islands {
 } bt_islands;
 
 bt_islands *bt_islands_create(void);
-void bt_islands_free(bt_islands *s);
+void bt_islands_free(bt_islands *islands);
 
 /// Collective. Join the bodies of all contacts of this step that `joins` takes (NULL: of all).
-void bt_islands_make(bt_world *w, bt_islands *s, bool (*joins)(const bt_cell *cell, bt_idx contact));
+void bt_islands_make(bt_world *world, bt_islands *islands, bool (*joins)(const bt_cell *cell, bt_idx contact));
 
 /// The same of a contact with at least one movable body.
-bt_idx bt_islands_of(const bt_world *w, bt_islands *s, const bt_contact *u);
+bt_idx bt_islands_of(const bt_world *world, bt_islands *islands, const bt_contact *contact);
 
 /// Sums of all islands to 0.
-void bt_islands_clear(const bt_world *w, bt_islands *s);
+void bt_islands_clear(const bt_world *world, bt_islands *islands);
 /// Collective. Sums over this rank's part of each island to sums over the island.
-void bt_islands_add(const bt_world *w, bt_islands *s);
+void bt_islands_add(const bt_world *world, bt_islands *islands);
 
 // --- bodies that cannot give way -------------------------------------------------------------------------------------
 
@@ -102,6 +102,6 @@ typedef struct bt_lock {
 
 /// Collective. After a solution that has not converged. Uses the array of the position projection; impulses and
 /// velocities stay.
-bt_lock bt_locked(bt_world *w);
+bt_lock bt_locked(bt_world *world);
 
 #endif

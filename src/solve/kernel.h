@@ -13,14 +13,15 @@
 /// by one they need 2 to 10 times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points
 /// that coincide) the first of the single cases that holds is taken; so it is for one point, whose second has no mass
 /// (mn 0).
-static inline void bt_solve_normals(const bt_contact *u, const bt_mass *m, const bt_vel *va, const bt_vel *vb,
+static inline void bt_solve_normals(const bt_contact *contact, const bt_mass *m, const bt_vel *va, const bt_vel *vb,
                                     double *l1, double *l2)
 {
-    const double dx = vb->x - va->x, dy = vb->y - va->y, un = u->nx * dx + u->ny * dy;
-    const double u1 = un + u->rbn[0] * vb->w - u->ran[0] * va->w + u->bias[0];
-    const double u2 = un + u->rbn[1] * vb->w - u->ran[1] * va->w + u->bias[1];
+    const double dx = vb->x - va->x, dy = vb->y - va->y, un = contact->nx * dx + contact->ny * dy;
+    const double u1 = un + contact->rbn[0] * vb->w - contact->ran[0] * va->w + contact->bias[0];
+    const double u2 = un + contact->rbn[1] * vb->w - contact->ran[1] * va->w + contact->bias[1];
     // Velocities with both impulses taken off.
-    const double b1 = u1 - m->w[0] * u->ln[0] - m->w12 * u->ln[1], b2 = u2 - m->w12 * u->ln[0] - m->w[1] * u->ln[1];
+    const double b1 = u1 - m->w[0] * contact->ln[0] - m->w12 * contact->ln[1],
+                 b2 = u2 - m->w12 * contact->ln[0] - m->w[1] * contact->ln[1];
     *l1 = (m->w12 * b2 - m->w[1] * b1) * m->per_det;
     *l2 = (m->w12 * b1 - m->w[0] * b2) * m->per_det;
     if (!(m->per_det > 0 && *l1 >= 0 && *l2 >= 0)) {
@@ -36,74 +37,78 @@ static inline void bt_solve_normals(const bt_contact *u, const bt_mass *m, const
 /// separate unknowns would drift apart along their null space and eat up the friction cone. Returns how much the
 /// contact changes the speed of one of its rows at most, m/s: of two points that share a load each needs but half an
 /// impulse, and its residual is the whole speed.
-static inline double bt_take_normals(bt_contact *u, const bt_mass *m, double l1, double l2, bt_vel va, bt_vel vb,
+static inline double bt_take_normals(bt_contact *contact, const bt_mass *m, double l1, double l2, bt_vel va, bt_vel vb,
                                      bt_vel *v, const bt_inv *inv)
 {
-    const bt_inv ia = inv[u->a], ib = inv[u->b];
-    const double d1 = l1 - u->ln[0], d2 = l2 - u->ln[1];
-    bt_apply(u, d1 + d2, d1 * u->ran[0] + d2 * u->ran[1], d1 * u->rbn[0] + d2 * u->rbn[1], 0, ia, ib, &va, &vb);
-    const double t = bt_clamp(u->lt - bt_tangent_velocity(u, &va, &vb) * m->mt, u->mu * (l1 + l2)), dt = t - u->lt;
-    bt_apply(u, 0, 0, 0, dt, ia, ib, &va, &vb);
-    u->ln[0] = l1, u->ln[1] = l2, u->lt = t;
-    bt_store(&v[u->a], ia, &va);
-    bt_store(&v[u->b], ib, &vb);
+    const bt_inv ia = inv[contact->a], ib = inv[contact->b];
+    const double d1 = l1 - contact->ln[0], d2 = l2 - contact->ln[1];
+    bt_apply(contact, d1 + d2, d1 * contact->ran[0] + d2 * contact->ran[1], d1 * contact->rbn[0] + d2 * contact->rbn[1],
+             0, ia, ib, &va, &vb);
+    const double t = bt_clamp(contact->lt - bt_tangent_velocity(contact, &va, &vb) * m->mt, contact->mu * (l1 + l2)),
+                 dt = t - contact->lt;
+    bt_apply(contact, 0, 0, 0, dt, ia, ib, &va, &vb);
+    contact->ln[0] = l1, contact->ln[1] = l2, contact->lt = t;
+    bt_store(&v[contact->a], ia, &va);
+    bt_store(&v[contact->b], ib, &vb);
     const double u1 = m->w[0] * d1 + m->w12 * d2, u2 = m->w12 * d1 + m->w[1] * d2;
     return bt_max(bt_max(fabs(u1), fabs(u2)), fabs(dt) * m->wt);
 }
 
 /// The nearest load that sheets can bear (contact/raft.h): as much of `ends` as there is, to one side or the other, and
 /// as far from it as friction reaches.
-static inline void bt_onto_sheets(const bt_limit *k, double *x, double *y)
+static inline void bt_onto_sheets(const bt_limit *limit, double *x, double *y)
 {
-    const double *e = k->ends, part = bt_part_of_ends(e, *x, *y);
+    const double *e = limit->ends, part = bt_part_of_ends(e, *x, *y);
     const double dx = *x - part * e[0], dy = *y - part * e[1];
-    const double far = sqrt(dx * dx + dy * dy), radius = k->flat[0];
+    const double far = sqrt(dx * dx + dy * dy), radius = limit->flat[0];
     if (!(far > radius)) return;
     *x = part * e[0] + dx * (radius / far);
     *y = part * e[1] + dy * (radius / far);
 }
 
 /// What the load of sheets would be after a step of its own (contact/raft.h).
-static inline void bt_sheets_map(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *va,
+static inline void bt_sheets_map(const bt_contact *contact, const bt_mass *m, const bt_limit *limit, const bt_vel *va,
                                  const bt_vel *vb, double *x, double *y)
 {
-    *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * m->mn[0];
-    *y = u->lt - bt_tangent_velocity(u, va, vb) * m->mt;
-    bt_onto_sheets(k, x, y);
+    *x = contact->ln[0] - bt_normal_velocity(contact, 0, va, vb) * m->mn[0];
+    *y = contact->lt - bt_tangent_velocity(contact, va, vb) * m->mt;
+    bt_onto_sheets(limit, x, y);
 }
 
-static inline double bt_update_sheets(bt_contact *u, const bt_mass *m, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+static inline double bt_update_sheets(bt_contact *contact, const bt_mass *m, const bt_limit *limit, bt_vel *v,
+                                      const bt_inv *inv)
 {
-    const bt_inv ia = inv[u->a], ib = inv[u->b];
-    bt_vel va = v[u->a], vb = v[u->b];
+    const bt_inv ia = inv[contact->a], ib = inv[contact->b];
+    bt_vel va = v[contact->a], vb = v[contact->b];
     double x, y;
-    bt_sheets_map(u, m, k, &va, &vb, &x, &y);
-    const double dx = x - u->ln[0], dy = y - u->lt;
-    bt_apply(u, dx, dx * u->ran[0], dx * u->rbn[0], dy, ia, ib, &va, &vb);
-    u->ln[0] = x, u->lt = y;
-    bt_store(&v[u->a], ia, &va);
-    bt_store(&v[u->b], ib, &vb);
+    bt_sheets_map(contact, m, limit, &va, &vb, &x, &y);
+    const double dx = x - contact->ln[0], dy = y - contact->lt;
+    bt_apply(contact, dx, dx * contact->ran[0], dx * contact->rbn[0], dy, ia, ib, &va, &vb);
+    contact->ln[0] = x, contact->lt = y;
+    bt_store(&v[contact->a], ia, &va);
+    bt_store(&v[contact->b], ib, &vb);
     return bt_max(fabs(dx), fabs(dy)) * m->wt;
 }
 
-/// Gauss–Seidel update of a manifold: its normals together, then its friction. k: its bounds, NULL = none.
-static inline double bt_update_contact(bt_contact *u, const bt_mass *m, const bt_limit *k, bt_vel *v,
+/// Gauss–Seidel update of a manifold: its normals together, then its friction. limit: its bounds, NULL = none.
+static inline double bt_update_contact(bt_contact *contact, const bt_mass *m, const bt_limit *limit, bt_vel *v,
                                        const bt_inv *inv)
 {
-    if (k && u->n == 0) return bt_update_sheets(u, m, k, v, inv);
-    const bt_vel va = v[u->a], vb = v[u->b];
+    if (limit && contact->n == 0) return bt_update_sheets(contact, m, limit, v, inv);
+    const bt_vel va = v[contact->a], vb = v[contact->b];
     double l[2];
-    bt_solve_normals(u, m, &va, &vb, &l[0], &l[1]);
-    if (k) bt_limit_normals(k, u, m, &va, &vb, l);
-    return bt_take_normals(u, m, l[0], l[1], va, vb, v, inv);
+    bt_solve_normals(contact, m, &va, &vb, &l[0], &l[1]);
+    if (limit) bt_limit_normals(limit, contact, m, &va, &vb, l);
+    return bt_take_normals(contact, m, l[0], l[1], va, vb, v, inv);
 }
 
 /// What the normal impulse of point i would be with all others held.
-static inline double bt_normal_map(const bt_contact *u, const bt_mass *m, const bt_limit *k, int i, const bt_vel *va,
-                                   const bt_vel *vb)
+static inline double bt_normal_map(const bt_contact *contact, const bt_mass *m, const bt_limit *limit, int i,
+                                   const bt_vel *va, const bt_vel *vb)
 {
-    const double w = bt_normal_velocity(u, i, va, vb) + u->bias[i];
-    return k ? bt_limit_point(k, u, m, i, w - m->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * m->mn[i]);
+    const double w = bt_normal_velocity(contact, i, va, vb) + contact->bias[i];
+    return limit ? bt_limit_point(limit, contact, m, i, w - m->w[i] * contact->ln[i])
+                 : bt_max(0, contact->ln[i] - w * m->mn[i]);
 }
 
 #define BT_SHORT 0.01 // part of its bound by which an impulse may be short of it, assumed
@@ -120,20 +125,20 @@ static inline double bt_short_residual(double closing, double part, double toler
     return bt_min(closing, part * (tolerance / BT_SHORT));
 }
 
-static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
-                                        double tolerance, double *sum)
+static inline double bt_sheets_residual(const bt_contact *contact, const bt_mass *m, const bt_limit *limit,
+                                        const bt_vel *v, double tolerance, double *sum)
 {
-    const bt_vel *va = &v[u->a], *vb = &v[u->b];
+    const bt_vel *va = &v[contact->a], *vb = &v[contact->b];
     double x, y;
-    bt_sheets_map(u, m, k, va, vb, &x, &y);
-    const double *e = k->ends, friction = k->flat[0], dx = x - u->ln[0], dy = y - u->lt;
-    const double un = bt_normal_velocity(u, 0, va, vb), ut = bt_tangent_velocity(u, va, vb);
+    bt_sheets_map(contact, m, limit, va, vb, &x, &y);
+    const double *e = limit->ends, friction = limit->flat[0], dx = x - contact->ln[0], dy = y - contact->lt;
+    const double un = bt_normal_velocity(contact, 0, va, vb), ut = bt_tangent_velocity(contact, va, vb);
     const double bears = friction + sqrt(e[0] * e[0] + e[1] * e[1]),
                  takes = friction * sqrt(un * un + ut * ut) + fabs(e[0] * un + e[1] * ut);
     x = dx * m->wt, y = dy * m->wt;
     double lacks = 0;
     if (takes > 0) {
-        const double braked = -(u->ln[0] * un + u->lt * ut);
+        const double braked = -(contact->ln[0] * un + contact->lt * ut);
         const double part = bt_min(sqrt(dx * dx + dy * dy) / bears, 1 - braked / takes);
         lacks = bt_short_residual(takes / bears, part, tolerance);
     }
@@ -143,51 +148,53 @@ static inline double bt_sheets_residual(const bt_contact *u, const bt_mass *m, c
 
 /// Natural-map residual of a contact, m/s, and of rows under bounds what they are short of them; into *sum the squares
 /// over its rows (a normal one a point, one tangential; two of sheets). tolerance: of the problem, m/s.
-static inline double bt_contact_residual(const bt_contact *u, const bt_mass *m, const bt_limit *k, const bt_vel *v,
-                                         double tolerance, double *sum)
+static inline double bt_contact_residual(const bt_contact *contact, const bt_mass *m, const bt_limit *limit,
+                                         const bt_vel *v, double tolerance, double *sum)
 {
-    if (k && u->n == 0) return bt_sheets_residual(u, m, k, v, tolerance, sum);
-    const bt_vel *va = &v[u->a], *vb = &v[u->b];
+    if (limit && contact->n == 0) return bt_sheets_residual(contact, m, limit, v, tolerance, sum);
+    const bt_vel *va = &v[contact->a], *vb = &v[contact->b];
     double worst = 0, total = 0;
-    for (int i = 0; i < u->n; i++) {
-        const double map = bt_normal_map(u, m, k, i, va, vb), more = map - u->ln[i];
+    for (int i = 0; i < contact->n; i++) {
+        const double map = bt_normal_map(contact, m, limit, i, va, vb), more = map - contact->ln[i];
         double r = fabs(more * m->w[i]);
-        if (k && more > 0) {
-            const double w = bt_normal_velocity(u, i, va, vb) + u->bias[i];
+        if (limit && more > 0) {
+            const double w = bt_normal_velocity(contact, i, va, vb) + contact->bias[i];
             r = bt_max(r, bt_short_residual(-w, more / map, tolerance));
         }
         worst = bt_max(worst, r);
         *sum += r * r;
-        total += u->ln[i];
+        total += contact->ln[i];
     }
-    const double wt = bt_tangent_velocity(u, va, vb), r = (bt_clamp(u->lt - wt * m->mt, u->mu * total) - u->lt) * m->wt;
+    const double wt = bt_tangent_velocity(contact, va, vb),
+                 r = (bt_clamp(contact->lt - wt * m->mt, contact->mu * total) - contact->lt) * m->wt;
     *sum += r * r;
     return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY; // the maximum itself passes over a NaN
 }
 
 /// How far point i is open beyond the slop after the displacements da and db, m (solve/project.c).
-static inline double bt_opening(const bt_contact *u, const bt_gaps *g, double slop, int i, const bt_vel *da,
+static inline double bt_opening(const bt_contact *contact, const bt_gaps *gaps, double slop, int i, const bt_vel *da,
                                 const bt_vel *db)
 {
-    return bt_normal_velocity(u, i, da, db) + g->gap[i] + slop;
+    return bt_normal_velocity(contact, i, da, db) + gaps->gap[i] + slop;
 }
 
 /// Gauss–Seidel update of the multipliers of a contact in the position projection, kg m, d: displacements. Returns the
 /// largest correction, m.
-static inline double bt_project_contact(const bt_contact *u, const bt_mass *m, const bt_gaps *g, double multiplier[2],
-                                        double slop, bt_vel *d, const bt_inv *inv)
+static inline double bt_project_contact(const bt_contact *contact, const bt_mass *m, const bt_gaps *gaps,
+                                        double multiplier[2], double slop, bt_vel *d, const bt_inv *inv)
 {
-    bt_vel da = d[u->a], db = d[u->b];
+    bt_vel da = d[contact->a], db = d[contact->b];
     double most = 0;
-    for (int i = 0; i < u->n; i++) {
-        const double p = bt_max(0, multiplier[i] - bt_opening(u, g, slop, i, &da, &db) * m->mn[i]);
+    for (int i = 0; i < contact->n; i++) {
+        const double p = bt_max(0, multiplier[i] - bt_opening(contact, gaps, slop, i, &da, &db) * m->mn[i]);
         const double step = p - multiplier[i];
         multiplier[i] = p;
-        bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
+        bt_apply(contact, step, step * contact->ran[i], step * contact->rbn[i], 0, inv[contact->a], inv[contact->b],
+                 &da, &db);
         most = bt_max(most, fabs(step) * m->w[i]);
     }
-    bt_store(&d[u->a], inv[u->a], &da);
-    bt_store(&d[u->b], inv[u->b], &db);
+    bt_store(&d[contact->a], inv[contact->a], &da);
+    bt_store(&d[contact->b], inv[contact->b], &db);
     return most;
 }
 

@@ -9,34 +9,35 @@
 #include "contact/row.h"
 
 /// The rising part of bounds, all 0 where there is none.
-static inline const bt_rise *bt_rise_of(const bt_limit *l)
+static inline const bt_rise *bt_rise_of(const bt_limit *limit)
 {
     static const bt_rise none;
-    return l->rise ? l->rise : &none;
+    return limit->rise ? limit->rise : &none;
 }
 
 /// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising
 /// part of the bound, λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 +
 /// slope W), and that of a hit where a quadratic equation has its root; there it is above the flat part exactly when
 /// that is so at the solution. `place` and not the bias: a rebound is no crushing.
-static inline double bt_limit_point(const bt_limit *l, const bt_contact *u, const bt_mass *m, int i, double b)
+static inline double bt_limit_point(const bt_limit *limit, const bt_contact *contact, const bt_mass *m, int i, double b)
 {
-    const bt_rise *r = bt_rise_of(l);
-    const double free = u->bias[i] - b, w = m->w[i]; // approach
-    const double rising = r->hit[i].before > 0
-                              ? (free - l->place[i] - bt_hit_end(&r->hit[i], l->place[i], free, w)) / w
-                              : (r->base[i] + r->slope[i] * (free - l->place[i])) / (1 + r->slope[i] * w);
-    return bt_max(0, bt_min(-b * m->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
+    const bt_rise *rise = bt_rise_of(limit);
+    const double free = contact->bias[i] - b, w = m->w[i]; // approach
+    const double rising = rise->hit[i].before > 0
+                              ? (free - limit->place[i] - bt_hit_end(&rise->hit[i], limit->place[i], free, w)) / w
+                              : (rise->base[i] + rise->slope[i] * (free - limit->place[i])) / (1 + rise->slope[i] * w);
+    return bt_max(0, bt_min(-b * m->mn[i], bt_min(limit->most[i], bt_max(limit->flat[i], rising))));
 }
 
 /// Bound of point i at these velocities, N s.
-static inline double bt_limit_bound(const bt_limit *l, const bt_contact *u, int i, const bt_vel *v)
+static inline double bt_limit_bound(const bt_limit *limit, const bt_contact *contact, int i, const bt_vel *v)
 {
-    const double approach = bt_max(0, -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]));
-    const bt_rise *r = bt_rise_of(l);
-    const double rising = r->hit[i].before > 0 ? bt_hit_bound(&r->hit[i], l->place[i], approach)
-                                               : r->base[i] + r->slope[i] * approach;
-    return bt_min(l->most[i], bt_max(l->flat[i], rising));
+    const double approach =
+        bt_max(0, -(bt_normal_velocity(contact, i, &v[contact->a], &v[contact->b]) + limit->place[i]));
+    const bt_rise *rise = bt_rise_of(limit);
+    const double rising = rise->hit[i].before > 0 ? bt_hit_bound(&rise->hit[i], limit->place[i], approach)
+                                                  : rise->base[i] + rise->slope[i] * approach;
+    return bt_min(limit->most[i], bt_max(limit->flat[i], rising));
 }
 
 /// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
@@ -61,34 +62,35 @@ static inline void bt_limit_rim(const bt_mass *m, const double b[2], const doubl
 
 /// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point
 /// by point, a few times: the sweeps do the rest.
-static inline void bt_limit_two(const bt_limit *k, const bt_contact *u, const bt_mass *m, const double b[2],
+static inline void bt_limit_two(const bt_limit *limit, const bt_contact *contact, const bt_mass *m, const double b[2],
                                 double l[2])
 {
     enum { TURNS = 4 };
     l[0] = (m->w12 * b[1] - m->w[1] * b[0]) * m->per_det;
     l[1] = (m->w12 * b[0] - m->w[0] * b[1]) * m->per_det;
-    if (m->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= k->flat[0] && l[1] <= k->flat[1]) return;
-    const bt_rise *r = bt_rise_of(k);
-    if (r->slope[0] == 0 && r->slope[1] == 0 && !(r->hit[0].before > 0 || r->hit[1].before > 0)) {
-        bt_limit_rim(m, b, k->flat, l);
+    if (m->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= limit->flat[0] && l[1] <= limit->flat[1]) return;
+    const bt_rise *rise = bt_rise_of(limit);
+    if (rise->slope[0] == 0 && rise->slope[1] == 0 && !(rise->hit[0].before > 0 || rise->hit[1].before > 0)) {
+        bt_limit_rim(m, b, limit->flat, l);
         return;
     }
-    l[0] = u->ln[0], l[1] = u->ln[1];
+    l[0] = contact->ln[0], l[1] = contact->ln[1];
     for (int turn = 0; turn < TURNS; turn++)
-        for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, m, i, b[i] + m->w12 * l[1 - i]);
+        for (int i = 0; i < 2; i++) l[i] = bt_limit_point(limit, contact, m, i, b[i] + m->w12 * l[1 - i]);
 }
 
 /// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is
 /// below the flat parts.
-static inline void bt_limit_normals(const bt_limit *k, const bt_contact *u, const bt_mass *m, const bt_vel *va,
-                                    const bt_vel *vb, double l[2])
+static inline void bt_limit_normals(const bt_limit *limit, const bt_contact *contact, const bt_mass *m,
+                                    const bt_vel *va, const bt_vel *vb, double l[2])
 {
-    if (!(l[0] > k->flat[0] || l[1] > k->flat[1])) return;
+    if (!(l[0] > limit->flat[0] || l[1] > limit->flat[1])) return;
     double b[2] = {0};
-    for (int i = 0; i < u->n; i++)
-        b[i] = bt_normal_velocity(u, i, va, vb) + u->bias[i] - m->w[i] * u->ln[i] - m->w12 * u->ln[1 - i];
-    if (u->n == 1) l[0] = bt_limit_point(k, u, m, 0, b[0]);
-    else bt_limit_two(k, u, m, b, l);
+    for (int i = 0; i < contact->n; i++)
+        b[i] = bt_normal_velocity(contact, i, va, vb) + contact->bias[i] - m->w[i] * contact->ln[i] -
+               m->w12 * contact->ln[1 - i];
+    if (contact->n == 1) l[0] = bt_limit_point(limit, contact, m, 0, b[0]);
+    else bt_limit_two(limit, contact, m, b, l);
 }
 
 #endif

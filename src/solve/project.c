@@ -33,241 +33,251 @@ enum { LEFT = 5 }; // slops that a turn may leave as overlap: half of what a run
 
 /// May the turn of contact j in this step, whose gaps are those at its end, have left more than `least` of overlap, m?
 /// Only of pairs that touch with their outlines as they are: what has given way, as that of sheets, is no overlap.
-static bool turns(const bt_world *w, const bt_cell *cell, bt_idx j, double least)
+static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double least)
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_contact *u = &cell->contacts[j];
-    const bt_vel *va = &b->vel[u->a], *vb = &b->vel[u->b];
-    const double turn = w->par.dt * fabs(vb->w - va->w);
+    const bt_bodies *bodies = &world->bodies;
+    const bt_contact *contact = &cell->contacts[j];
+    const bt_vel *va = &bodies->vel[contact->a], *vb = &bodies->vel[contact->b];
+    const double turn = world->par.dt * fabs(vb->w - va->w);
     if (turn == 0) return false;
-    const double *g = cell->gaps[j].gap, gap = u->n > 1 ? bt_min(g[0], g[1]) : g[0];
-    const double slip = w->par.dt * fabs(bt_tangent_velocity(u, va, vb));
-    const double error = turn * (0.5 * turn * (b->radius[u->a] + b->radius[u->b]) + slip);
-    if (!(bt_max(gap, -w->par.slop) - error < -least)) return false;
+    const double *g = cell->gaps[j].gap, gap = contact->n > 1 ? bt_min(g[0], g[1]) : g[0];
+    const double slip = world->par.dt * fabs(bt_tangent_velocity(contact, va, vb));
+    const double error = turn * (0.5 * turn * (bodies->radius[contact->a] + bodies->radius[contact->b]) + slip);
+    if (!(bt_max(gap, -world->par.slop) - error < -least)) return false;
     if (!cell->laws.limits) return true;
-    const bt_limit *l = &cell->laws.limits[j];
+    const bt_limit *limit = &cell->laws.limits[j];
     for (int law = 0; law < BT_ALL_LAWS; law++)
-        if (l->record[law] >= 0) return false;
-    return l->grown[0] == 0 && l->grown[1] == 0;
+        if (limit->record[law] >= 0) return false;
+    return limit->grown[0] == 0 && limit->grown[1] == 0;
 }
 
 /// Fields are shaken plain, and keep their bits.
 static bool in_batches(const bt_cell *cell, bool plain) { return bt_batch_projects(cell) && !plain; }
 
 /// No multipliers yet.
-static void begin(const bt_world *w, bt_cell *cell)
+static void begin(const bt_world *world, bt_cell *cell)
 {
     bt_rounds_list(cell);
     bt_batch_begin(cell);
-    if (!in_batches(cell, w->par.plain_sweeps)) bt_rounds_in_place(cell, w->bodies.inv);
+    if (!in_batches(cell, world->par.plain_sweeps)) bt_rounds_in_place(cell, world->bodies.inv);
 }
 
-static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
-    bt_cell *cell = &w->cells->cell[k];
-    begin(w, cell);
+    bt_cell *cell = &world->cells->cell[k];
+    begin(world, cell);
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        const bt_contact *u = &cell->contacts[j];
-        bt_gaps *g = &cell->gaps[j];
-        for (int i = 0; i < u->n; i++) {
-            if (g->row == BT_ROW_RELEASED) { // no row
-                g->gap[i] = w->par.dt * u->bias[i];
+        const bt_contact *contact = &cell->contacts[j];
+        bt_gaps *gaps = &cell->gaps[j];
+        for (int i = 0; i < contact->n; i++) {
+            if (gaps->row == BT_ROW_RELEASED) { // no row
+                gaps->gap[i] = world->par.dt * contact->bias[i];
                 continue;
             }
-            g->gap[i] += w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-            if (cell->laws.limits) g->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
-            t->most = bt_max(t->most, -g->gap[i]);
+            gaps->gap[i] += world->par.dt * bt_normal_velocity(contact, i, &world->bodies.vel[contact->a],
+                                                               &world->bodies.vel[contact->b]);
+            if (cell->laws.limits) gaps->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
+            totals->most = bt_max(totals->most, -gaps->gap[i]);
         }
-        if (!w->par.plain_sweeps && turns(w, cell, j, LEFT * w->par.slop)) bt_sum_add(&t->sum[TURNS], 1);
+        if (!world->par.plain_sweeps && turns(world, cell, j, LEFT * world->par.slop))
+            bt_sum_add(&totals->sum[TURNS], 1);
     }
 }
 
 /// Keep contact j of cell k as it is.
-static void keep(bt_solver *s, bt_idx k, bt_idx j, const bt_contact *u)
+static void keep(bt_solver *solver, bt_idx k, bt_idx j, const bt_contact *contact)
 {
 #pragma omp critical
     {
-        if (s->n_kept == s->cap_kept)
-            s->kept = bt_realloc(s->kept, (size_t)(s->cap_kept = 2 * s->cap_kept + 8), sizeof *s->kept);
-        s->kept[s->n_kept++] = (bt_kept_rows){k, j, *u};
+        if (solver->n_kept == solver->cap_kept)
+            solver->kept = bt_realloc(solver->kept, (size_t)(solver->cap_kept = 2 * solver->cap_kept + 8),
+                                      sizeof *solver->kept);
+        solver->kept[solver->n_kept++] = (bt_kept_rows){k, j, *contact};
     }
 }
 
 /// Gaps after the first pass, and new rows of the pairs that have turned.
-static void find_left(bt_world *w, bt_idx k, const void *shifted, bt_totals *t)
+static void find_left(bt_world *world, bt_idx k, const void *shifted, bt_totals *totals)
 {
-    bt_cell *cell = &w->cells->cell[k];
-    const bt_vel *d = w->solver->shift;
+    bt_cell *cell = &world->cells->cell[k];
+    const bt_vel *d = world->solver->shift;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        bt_contact *u = &cell->contacts[j];
-        bt_gaps *g = &cell->gaps[j];
-        for (int i = 0; i < u->n; i++)
-            if (*(const bool *)shifted) g->gap[i] += bt_normal_velocity(u, i, &d[u->a], &d[u->b]);
-        if (!turns(w, cell, j, LEFT * w->par.slop)) continue;
-        bt_manifold m;
-        const bt_pair *p = &cell->search.pairs[u->pair];
-        bt_axes axes = p->axes;
-        if (!bt_contacts_parts(w, u->a, u->b, p->part, 0, (int)(g->feature[0] >> 31), &m, &axes)) continue;
-        keep(w->solver, k, j, u);
-        bt_pack_rows(w, &m, u);
-        for (int i = 0; i < m.n_points; i++) {
-            g->gap[i] = m.p[i].gap;
-            t->most = bt_max(t->most, -g->gap[i]);
+        bt_contact *contact = &cell->contacts[j];
+        bt_gaps *gaps = &cell->gaps[j];
+        for (int i = 0; i < contact->n; i++)
+            if (*(const bool *)shifted) gaps->gap[i] += bt_normal_velocity(contact, i, &d[contact->a], &d[contact->b]);
+        if (!turns(world, cell, j, LEFT * world->par.slop)) continue;
+        bt_manifold manifold;
+        const bt_pair *pair = &cell->search.pairs[contact->pair];
+        bt_axes axes = pair->axes;
+        if (!bt_contacts_parts(world, contact->a, contact->b, pair->part, 0, (int)(gaps->feature[0] >> 31), &manifold,
+                               &axes)) continue;
+        keep(world->solver, k, j, contact);
+        bt_pack_rows(world, &manifold, contact);
+        for (int i = 0; i < manifold.n_points; i++) {
+            gaps->gap[i] = manifold.p[i].gap;
+            totals->most = bt_max(totals->most, -gaps->gap[i]);
         }
     }
-    begin(w, cell); // with the new rows
+    begin(world, cell); // with the new rows
 }
 
-static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, const bt_problem *p)
+static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, const bt_problem *problem)
 {
-    bt_found f = {0};
+    bt_found found = {0};
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        const bt_contact *u = &cell->contacts[j];
-        const bt_gaps *g = &cell->gaps[j];
-        const bt_in_place *o = &cell->work.in_place[j];
+        const bt_contact *contact = &cell->contacts[j];
+        const bt_gaps *gaps = &cell->gaps[j];
+        const bt_in_place *in_place = &cell->work.in_place[j];
         double worst = 0;
-        bool on = p->plain;
-        for (int i = 0; i < u->n; i++) {
-            const double open = bt_opening(u, g, slop, i, &d[u->a], &d[u->b]), x = o->multiplier[i];
-            const double r = fabs(bt_max(0, x - open * o->mass.mn[i]) - x) * o->mass.w[i];
+        bool on = problem->plain;
+        for (int i = 0; i < contact->n; i++) {
+            const double open = bt_opening(contact, gaps, slop, i, &d[contact->a], &d[contact->b]),
+                         x = in_place->multiplier[i];
+            const double r = fabs(bt_max(0, x - open * in_place->mass.mn[i]) - x) * in_place->mass.w[i];
             worst = bt_max(worst, r);
-            f.squares += r * r;
-            on = on || x > 0 || x != o->before[i] || !(open >= 0);
+            found.squares += r * r;
+            on = on || x > 0 || x != in_place->before[i] || !(open >= 0);
         }
-        f.most = bt_max(f.most, worst);
-        f.bad += worst > BT_NEAR * p->tolerance;
-        f.rows += u->n;
+        found.most = bt_max(found.most, worst);
+        found.bad += worst > BT_NEAR * problem->tolerance;
+        found.rows += contact->n;
         if (on) cell->work.list[cell->work.n_list++] = j;
     }
-    return f;
+    return found;
 }
 
-static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)t;
-    const bt_problem *p = context;
-    bt_cell *cell = &w->cells->cell[k];
-    const bt_vel *d = w->solver->shift;
-    const double slop = w->par.slop;
+    (void)totals;
+    const bt_problem *problem = context;
+    bt_cell *cell = &world->cells->cell[k];
+    const bt_vel *d = world->solver->shift;
+    const double slop = world->par.slop;
     bt_batch_unpack(cell);
     bt_rounds_list(cell);
-    const bt_found f = in_batches(cell, p->plain) ? bt_batch_projection_residual(cell, slop, d, w->bodies.inv, p)
-                                                  : residual_in_place(cell, slop, d, p);
-    bt_rounds_found(cell, &f);
+    const bt_found found = in_batches(cell, problem->plain)
+                           ? bt_batch_projection_residual(cell, slop, d, world->bodies.inv, problem)
+                                                            : residual_in_place(cell, slop, d, problem);
+    bt_rounds_found(cell, &found);
 }
 
-static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void project_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    const bt_sweep *o = context;
-    bt_cell *cell = &w->cells->cell[k];
+    const bt_sweep *sweep = context;
+    bt_cell *cell = &world->cells->cell[k];
     if (cell->work.n_list == 0) return;
-    if (in_batches(cell, o->problem->plain)) {
+    if (in_batches(cell, sweep->problem->plain)) {
         int64_t done = 0;
         double most = 0;
-        const double against = bt_batch_project(cell, w->par.slop, w->solver->shift, w->bodies.inv, o, &done, &most);
-        t->most = bt_max(t->most, most);
-        bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
-        if (o->moves) bt_rounds_moved(cell, o, against, t);
+        const double against = bt_batch_project(cell, world->par.slop, world->solver->shift, world->bodies.inv, sweep,
+                                                &done, &most);
+        totals->most = bt_max(totals->most, most);
+        bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)done);
+        if (sweep->moves) bt_rounds_moved(cell, sweep, against, totals);
         return;
     }
     bt_moved moved;
-    if (o->moves) bt_moved_begin(&moved, cell);
-    for (bt_idx j = 0; o->moves && j < cell->work.n_list; j++) {
-        bt_in_place *u = &cell->work.in_place[cell->work.list[j]];
-        bt_rounds_move(o, u->multiplier, u->before, moved.y[j], 2);
+    if (sweep->moves) bt_moved_begin(&moved, cell);
+    for (bt_idx j = 0; sweep->moves && j < cell->work.n_list; j++) {
+        bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
+        bt_rounds_move(sweep, in_place->multiplier, in_place->before, moved.y[j], 2);
     }
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx u = cell->work.list[j];
-        bt_in_place *p = &cell->work.in_place[u];
-        t->most = bt_max(t->most, bt_project_contact(&cell->contacts[u], &p->mass, &cell->gaps[u], p->multiplier,
-                                                     w->par.slop, w->solver->shift, w->bodies.inv));
+        bt_in_place *in_place = &cell->work.in_place[u];
+        totals->most = bt_max(totals->most, bt_project_contact(&cell->contacts[u], &in_place->mass, &cell->gaps[u],
+                                                               in_place->multiplier, world->par.slop,
+                                                               world->solver->shift, world->bodies.inv));
     }
-    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->work.n_list);
-    if (!o->moves) return;
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->work.n_list);
+    if (!sweep->moves) return;
     double against = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_in_place *u = &cell->work.in_place[cell->work.list[j]];
+        const bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
         for (int i = 0; i < 2; i++)
-            against += bt_rounds_against(u->mass.w[i], u->multiplier[i], u->before[i], moved.y[j][i]);
+            against += bt_rounds_against(in_place->mass.w[i], in_place->multiplier[i], in_place->before[i],
+                                         moved.y[j][i]);
     }
-    bt_moved_end(&moved, cell, o, against, t);
+    bt_moved_end(&moved, cell, sweep, against, totals);
 }
 
-void bt_solver_make_shift(bt_world *w)
+void bt_solver_make_shift(bt_world *world)
 {
-    bt_solver *s = w->solver;
-    if (s->shift && w->bodies.n <= s->cap_bodies) return;
-    s->cap_bodies = w->bodies.n > 0 ? w->bodies.n : 1; // a rank may own nothing
-    free(s->shift);
-    s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
+    bt_solver *solver = world->solver;
+    if (solver->shift && world->bodies.n <= solver->cap_bodies) return;
+    solver->cap_bodies = world->bodies.n > 0 ? world->bodies.n : 1; // a rank may own nothing
+    free(solver->shift);
+    solver->shift = bt_alloc_aligned((size_t)solver->cap_bodies, sizeof *solver->shift);
 }
 
-static void solve_apart(bt_world *w)
+static void solve_apart(bt_world *world)
 {
-    bt_step_stats *st = &w->stats;
-    bt_problem p = {.residual = residual_of_cell,
-                    .sweep = project_cell,
-                    .vel = w->solver->shift,
-                    .tolerance = 0.1 * w->par.slop,
-                    .cap = 0.9,
-                    .length = 25,
-                    .limit = (double)w->par.position_sweeps,
-                    .plain = w->par.plain_sweeps};
-    bt_rounds_scale(&p, w->cells);
+    bt_step_stats *st = &world->stats;
+    bt_problem problem = {.residual = residual_of_cell,
+                          .sweep = project_cell,
+                          .vel = world->solver->shift,
+                          .tolerance = 0.1 * world->par.slop,
+                          .cap = 0.9,
+                          .length = 25,
+                          .limit = (double)world->par.position_sweeps,
+                          .plain = world->par.plain_sweeps};
+    bt_rounds_scale(&problem, world->cells);
     bt_work work = {0};
-    bt_rounds_residual(w, &p, BT_BEGINS, &work);
-    if (p.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates
-        while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance))
-            work.residual = bt_rounds_sweep(w, &p, &work);
-    else bt_rounds_run(w, &p, &work);
+    bt_rounds_residual(world, &problem, BT_BEGINS, &work);
+    if (problem.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates
+        while (work.sweeps < world->par.position_sweeps && (work.sweeps == 0 || work.residual > problem.tolerance))
+            work.residual = bt_rounds_sweep(world, &problem, &work);
+    else bt_rounds_run(world, &problem, &work);
     st->position_sweeps += work.sweeps;
     st->position_updates += work.updates;
-    st->projected = st->projected && work.residual <= p.tolerance;
+    st->projected = st->projected && work.residual <= problem.tolerance;
 }
 
 /// Part what overlaps by the gaps as they have been found: bt_solver.shift.
-static void part(bt_world *w)
+static void part(bt_world *world)
 {
-    const bt_cells *ts = w->cells;
-    bt_solver *s = w->solver;
-    bt_solver_make_shift(w);
+    const bt_cells *ts = world->cells;
+    bt_solver *solver = world->solver;
+    bt_solver_make_shift(world);
     for (bt_idx j = 0; j < ts->n_busy; j++) {
         const bt_idx k = ts->busy[j];
         if (k == ts->n - 1 || bt_cells_moves(ts, k))
-            memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
+            memset(solver->shift + ts->cell[k].first, 0,
+                   (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *solver->shift);
     }
-    bt_domain_solve(w, solve_apart, s->shift);
+    bt_domain_solve(world, solve_apart, solver->shift);
 }
 
-void bt_solver_project(bt_world *w)
+void bt_solver_project(bt_world *world)
 {
-    bt_solver *s = w->solver;
-    bt_step_stats *st = &w->stats;
+    bt_solver *solver = world->solver;
+    bt_step_stats *st = &world->stats;
     st->position_sweeps = st->position_updates = 0;
     st->projected = true;
-    s->n_kept = 0;
-    bt_totals t = {.n_sums = N_FOUND};
-    bt_phases_any_order(w, find_overlap, NULL, &t);
-    bt_domain_reduce(w, &t);
-    s->turned = bt_sum_value(&t.sum[TURNS]) > 0;
-    s->shifted = t.most > w->par.slop;
-    if (s->shifted) part(w);
+    solver->n_kept = 0;
+    bt_totals totals = {.n_sums = N_FOUND};
+    bt_phases_any_order(world, find_overlap, NULL, &totals);
+    bt_domain_reduce(world, &totals);
+    solver->turned = bt_sum_value(&totals.sum[TURNS]) > 0;
+    solver->shifted = totals.most > world->par.slop;
+    if (solver->shifted) part(world);
 }
 
-bool bt_solver_project_again(bt_world *w)
+bool bt_solver_project_again(bt_world *world)
 {
-    bt_solver *s = w->solver;
-    if (!s->turned) return false;
-    bt_totals t = {0};
-    bt_phases_any_order(w, find_left, &s->shifted, &t);
-    bt_domain_reduce(w, &t);
-    const bool deep = t.most > LEFT * w->par.slop;
-    if (deep) part(w);
-    for (bt_idx i = 0; i < s->n_kept; i++) {
-        const bt_kept_rows *q = &s->kept[i];
-        w->cells->cell[q->cell].contacts[q->at] = q->was;
+    bt_solver *solver = world->solver;
+    if (!solver->turned) return false;
+    bt_totals totals = {0};
+    bt_phases_any_order(world, find_left, &solver->shifted, &totals);
+    bt_domain_reduce(world, &totals);
+    const bool deep = totals.most > LEFT * world->par.slop;
+    if (deep) part(world);
+    for (bt_idx i = 0; i < solver->n_kept; i++) {
+        const bt_kept_rows *kept = &solver->kept[i];
+        world->cells->cell[kept->cell].contacts[kept->at] = kept->was;
     }
-    s->shifted = s->shifted || deep;
+    solver->shifted = solver->shifted || deep;
     return deep;
 }

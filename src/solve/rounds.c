@@ -27,14 +27,14 @@ enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MOR
 // What a cell adds ends at 2⁴⁵, some 6,000 times the tolerance, and earlier in a field of so many cells that a sum
 // would not hold them: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the
 // energy of one contact at convergence, so that 10²⁷ times that still fits.
-void bt_rounds_scale(bt_problem *p, const bt_cells *t)
+void bt_rounds_scale(bt_problem *problem, const bt_cells *t)
 {
     const double heaviest = t->heaviest, cells = (double)t->n_x * t->n_y + 1;
-    const double energy = heaviest * p->tolerance * p->tolerance;
-    p->per_square = p->tolerance > 0 ? ldexp(1, 20 - bt_ceil_2log2(p->tolerance)) : 0x1p60;
-    p->most_squares = bt_min(0x1p45, 0x1p62 / cells);
+    const double energy = heaviest * problem->tolerance * problem->tolerance;
+    problem->per_square = problem->tolerance > 0 ? ldexp(1, 20 - bt_ceil_2log2(problem->tolerance)) : 0x1p60;
+    problem->most_squares = bt_min(0x1p45, 0x1p62 / cells);
     const bool scaled = energy > 0 && isfinite(energy);
-    p->per_energy = scaled ? ldexp(1, (int)bt_max(-500, bt_min(500, -30 - bt_ceil_log2(energy)))) : 1;
+    problem->per_energy = scaled ? ldexp(1, (int)bt_max(-500, bt_min(500, -30 - bt_ceil_log2(energy)))) : 1;
 }
 
 // --- residual passes -------------------------------------------------------------------------------------------------
@@ -50,48 +50,49 @@ void bt_rounds_list(bt_cell *cell)
 
 void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
 {
-    bt_work_list *k = &cell->work;
-    k->in_place = bt_cells_after_contacts(cell, (size_t)cell->n_contacts * sizeof *k->in_place);
+    bt_work_list *work = &cell->work;
+    work->in_place = bt_cells_after_contacts(cell, (size_t)cell->n_contacts * sizeof *work->in_place);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        k->in_place[i] = (bt_in_place){.mass = bt_mass_of(&cell->contacts[i], inv)};
+        work->in_place[i] = (bt_in_place){.mass = bt_mass_of(&cell->contacts[i], inv)};
 }
 
-void bt_rounds_found(bt_cell *cell, const bt_found *f)
+void bt_rounds_found(bt_cell *cell, const bt_found *found)
 {
-    bt_work_list *o = &cell->work;
-    o->found.most = f->most, o->found.squares = f->squares, o->found.rows = f->rows, o->found.bad = f->bad;
-    o->found.listed = o->n_list;
+    bt_work_list *work = &cell->work;
+    work->found.most = found->most, work->found.squares = found->squares, work->found.rows = found->rows,
+    work->found.bad = found->bad;
+    work->found.listed = work->n_list;
 }
 
 /// The bodies of the cell of body i may be moved.
-static void mark_cell_of(bt_world *w, bt_idx i)
+static void mark_cell_of(bt_world *world, bt_idx i)
 {
-    const int32_t *at = w->bodies.cell[i];
-    if (!w->bodies.large[i]) w->cells->cell[bt_cells_at(w->cells, at[0], at[1])].work.swept = true;
+    const int32_t *at = world->bodies.cell[i];
+    if (!world->bodies.large[i]) world->cells->cell[bt_cells_at(world->cells, at[0], at[1])].work.swept = true;
 }
 
 /// Bodies of the block of cell (x, y) may be moved.
-static void mark_block(bt_cells *t, int32_t x, int32_t y, double listed)
+static void mark_block(bt_cells *cells, int32_t x, int32_t y, double listed)
 {
     for (int j = 0; listed > 0 && j < 4; j++) {
-        const bt_idx k = bt_cells_at(t, x + (j & 1), y + (j >> 1));
-        if (k >= 0) t->cell[k].work.swept = true;
+        const bt_idx k = bt_cells_at(cells, x + (j & 1), y + (j >> 1));
+        if (k >= 0) cells->cell[k].work.swept = true;
     }
 }
 
 /// Collective. Tell the value of each cell that has work, 1 or 0, to `take` on all ranks, which spreads it to the cells
 /// around.
-static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take_cell *take)
+static void spread(bt_world *world, double (*value_of)(const bt_cell *cell), bt_take_cell *take)
 {
-    bt_cells *t = w->cells;
-    double *value = w->domain ? bt_alloc((size_t)t->n, sizeof *value) : NULL;
-    for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_idx k = t->order[i];
-        const double x = value_of(&t->cell[k]);
+    bt_cells *cells = world->cells;
+    double *value = world->domain ? bt_alloc((size_t)cells->n, sizeof *value) : NULL;
+    for (bt_idx i = 0; i < cells->n_order; i++) {
+        const bt_idx k = cells->order[i];
+        const double x = value_of(&cells->cell[k]);
         if (value) value[k] = x;
-        if (k < t->n - 1) take(t, t->cell[k].x, t->cell[k].y, x);
+        if (k < cells->n - 1) take(cells, cells->cell[k].x, cells->cell[k].y, x);
     }
-    if (value) bt_domain_tell_cells(w, value, take);
+    if (value) bt_domain_tell_cells(world, value, take);
     free(value);
 }
 
@@ -101,30 +102,30 @@ static double is_bad(const bt_cell *cell) { return cell->work.found.bad > 0; }
 /// Collective. Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside
 /// a large body always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last
 /// change, and the marks must not depend on ranks.
-static void mark_swept(bt_world *w)
+static void mark_swept(bt_world *world)
 {
-    bt_cells *t = w->cells;
-    const bt_idx last = t->n - 1;
-    const bt_cell *large = &t->cell[last];
-    for (bt_idx j = 0; j < t->n_busy; j++) {
-        const bt_idx k = t->busy[j];
+    bt_cells *cells = world->cells;
+    const bt_idx last = cells->n - 1;
+    const bt_cell *large = &cells->cell[last];
+    for (bt_idx j = 0; j < cells->n_busy; j++) {
+        const bt_idx k = cells->busy[j];
         if (k == last) continue;
-        t->cell[k].work.still = !t->cell[k].work.swept;
-        t->cell[k].work.swept = false;
+        cells->cell[k].work.still = !cells->cell[k].work.swept;
+        cells->cell[k].work.swept = false;
     }
-    spread(w, has_list, mark_block);
-    t->cell[last].work.swept = large->own;
+    spread(world, has_list, mark_block);
+    cells->cell[last].work.swept = large->own;
     for (bt_idx j = 0; large->own && j < large->n_contacts; j++) {
-        mark_cell_of(w, large->contacts[j].a);
-        mark_cell_of(w, large->contacts[j].b);
+        mark_cell_of(world, large->contacts[j].a);
+        mark_cell_of(world, large->contacts[j].b);
     }
-    bt_domain_beside_large(w, mark_cell_of);
+    bt_domain_beside_large(world, mark_cell_of);
 }
 
-static void lists_are_new(bt_world *w)
+static void lists_are_new(bt_world *world)
 {
-    mark_swept(w);
-    bt_phases_distribute(w);
+    mark_swept(world);
+    bt_phases_distribute(world);
 }
 
 typedef struct {
@@ -133,74 +134,76 @@ typedef struct {
 } residual_pass;
 
 /// May sweeps over the present lists move bodies that the contacts of cell k touch?
-static bool is_touched(const bt_cells *t, bt_idx k)
+static bool is_touched(const bt_cells *cells, bt_idx k)
 {
-    const bt_cell *cell = &t->cell[k];
+    const bt_cell *cell = &cells->cell[k];
     const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
     bool any = cell->phase == BT_COLOURS;
     for (int j = 0; j < 4 && !any; j++) { // a cell without bodies may be there on some ranks only
-        const bt_cell *o = block[j] >= 0 ? &t->cell[block[j]] : NULL;
+        const bt_cell *o = block[j] >= 0 ? &cells->cell[block[j]] : NULL;
         any = o && o->end > o->first && o->work.swept;
     }
     return any;
 }
 
-static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     const residual_pass *o = context;
-    const bt_problem *p = o->problem;
-    bt_cell *cell = &w->cells->cell[k];
-    const bool looks = o->everywhere || is_touched(w->cells, k);
-    if (looks) p->residual(w, k, p, t);
+    const bt_problem *problem = o->problem;
+    bt_cell *cell = &world->cells->cell[k];
+    const bool looks = o->everywhere || is_touched(world->cells, k);
+    if (looks) problem->residual(world, k, problem, totals);
     else cell->work.n_list = cell->work.found.listed;
-    t->most = bt_max(t->most, cell->work.found.most);
-    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(cell->work.found.squares * p->per_square, p->most_squares));
-    bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)cell->work.found.rows);
-    bt_sum_add(&t->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
-    bt_sum_add(&t->sum[BT_RESIDUAL_CHECKS], looks ? cell->n_contacts : 0);
-    bt_sum_add(&t->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
-    bt_sum_add(&t->sum[BT_RESIDUAL_BAD], (double)cell->work.found.bad);
+    totals->most = bt_max(totals->most, cell->work.found.most);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_SQUARES],
+               bt_min(cell->work.found.squares * problem->per_square, problem->most_squares));
+    bt_sum_add(&totals->sum[BT_RESIDUAL_ROWS], (double)cell->work.found.rows);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_CHECKS], looks ? cell->n_contacts : 0);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_BAD], (double)cell->work.found.bad);
 }
 
-void bt_rounds_residual(bt_world *w, const bt_problem *p, bt_since since, bt_work *work)
+void bt_rounds_residual(bt_world *world, const bt_problem *problem, bt_since since, bt_work *work)
 {
-    bt_totals t = {.n_sums = BT_RESIDUAL_N};
-    const bool settles = since == BT_SETTLES && p->settle;
-    if (settles) p->settle(w);
-    bt_phases_any_order(w, residual_of_cell, &(residual_pass){p, settles || since == BT_BEGINS}, &t);
-    bt_domain_reduce(w, &t);
-    work->residual = t.most;
-    work->squares = bt_sum_value(&t.sum[BT_RESIDUAL_SQUARES]) / p->per_square;
-    work->rows = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_ROWS]);
-    work->contacts = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_CONTACTS]);
-    work->listed = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_LISTED]);
-    work->bad = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_BAD]);
-    work->checks += (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_CHECKS]) + (settles ? work->contacts : 0);
-    lists_are_new(w);
+    bt_totals totals = {.n_sums = BT_RESIDUAL_N};
+    const bool settles = since == BT_SETTLES && problem->settle;
+    if (settles) problem->settle(world);
+    bt_phases_any_order(world, residual_of_cell, &(residual_pass){problem, settles || since == BT_BEGINS}, &totals);
+    bt_domain_reduce(world, &totals);
+    work->residual = totals.most;
+    work->squares = bt_sum_value(&totals.sum[BT_RESIDUAL_SQUARES]) / problem->per_square;
+    work->rows = (int64_t)bt_sum_value(&totals.sum[BT_RESIDUAL_ROWS]);
+    work->contacts = (int64_t)bt_sum_value(&totals.sum[BT_RESIDUAL_CONTACTS]);
+    work->listed = (int64_t)bt_sum_value(&totals.sum[BT_RESIDUAL_LISTED]);
+    work->bad = (int64_t)bt_sum_value(&totals.sum[BT_RESIDUAL_BAD]);
+    work->checks += (int64_t)bt_sum_value(&totals.sum[BT_RESIDUAL_CHECKS]) + (settles ? work->contacts : 0);
+    lists_are_new(world);
 }
 
 // --- rounds over a part of the field --------------------------------------------------------------------------------
 
 /// The cell at (x, y) is bad: its list and those beside it stay.
-static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
+static void keep_beside(bt_cells *cells, int32_t x, int32_t y, double bad)
 {
     for (int32_t dy = -1; bad > 0 && dy <= 1; dy++)
         for (int32_t dx = -1; dx <= 1; dx++) {
-            const bt_idx k = bt_cells_at(t, x + dx, y + dy);
-            if (k >= 0) t->cell[k].work.kept = true;
+            const bt_idx k = bt_cells_at(cells, x + dx, y + dy);
+            if (k >= 0) cells->cell[k].work.kept = true;
         }
 }
 
 /// Collective. Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach
 /// anywhere and stay.
-static void keep_near_bad(bt_world *w)
+static void keep_near_bad(bt_world *world)
 {
-    bt_cells *t = w->cells;
-    for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].work.kept = t->order[i] == t->n - 1;
-    spread(w, is_bad, keep_beside);
-    for (bt_idx i = 0; i < t->n_order; i++)
-        if (!t->cell[t->order[i]].work.kept) t->cell[t->order[i]].work.n_list = 0;
-    lists_are_new(w);
+    bt_cells *cells = world->cells;
+    for (bt_idx i = 0; i < cells->n_order; i++)
+        cells->cell[cells->order[i]].work.kept = cells->order[i] == cells->n - 1;
+    spread(world, is_bad, keep_beside);
+    for (bt_idx i = 0; i < cells->n_order; i++)
+        if (!cells->cell[cells->order[i]].work.kept) cells->cell[cells->order[i]].work.n_list = 0;
+    lists_are_new(world);
 }
 
 // --- sweeps ----------------------------------------------------------------------------------------------------------
@@ -230,11 +233,11 @@ static void move_on_bodies(bt_vel *vel, bt_vel *before, bt_idx n, double beta)
     }
 }
 
-static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void move_bodies(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)t;
+    (void)totals;
     const body_move *m = context;
-    bt_cell *cell = &w->cells->cell[k];
+    bt_cell *cell = &world->cells->cell[k];
     if (!cell->work.swept) return;
     const double beta = cell->work.still ? 0 : m->beta;
     cell->work.still = false;
@@ -242,31 +245,31 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
 }
 
 /// Returns the largest update. `first` moves the bodies on.
-static double sweep(bt_world *w, const bt_problem *p, const bt_before *first, bool moves, double beta, bt_work *work,
-                    double *against)
+static double sweep(bt_world *world, const bt_problem *problem, const bt_before *first, bool moves, double beta,
+                    bt_work *work, double *against)
 {
-    bt_totals t = {.n_sums = BT_SWEEP_N};
-    const bt_sweep s = {.problem = p, .moves = moves, .beta = beta};
-    bt_phases_run(w, first, p->sweep, &s, p->vel, &t);
-    bt_domain_reduce(w, &t);
+    bt_totals totals = {.n_sums = BT_SWEEP_N};
+    const bt_sweep sweep = {.problem = problem, .moves = moves, .beta = beta};
+    bt_phases_run(world, first, problem->sweep, &sweep, problem->vel, &totals);
+    bt_domain_reduce(world, &totals);
     work->sweeps++;
-    work->updates += (int64_t)bt_sum_value(&t.sum[BT_SWEEP_UPDATES]);
-    work->moves += (int64_t)bt_sum_value(&t.sum[BT_SWEEP_MOVED]);
-    *against = bt_sum_value(&t.sum[BT_SWEEP_AGAINST]);
-    return t.most;
+    work->updates += (int64_t)bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]);
+    work->moves += (int64_t)bt_sum_value(&totals.sum[BT_SWEEP_MOVED]);
+    *against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
+    return totals.most;
 }
 
-double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work)
+double bt_rounds_sweep(bt_world *world, const bt_problem *problem, bt_work *work)
 {
     double against;
-    return sweep(w, p, NULL, false, 0, work, &against);
+    return sweep(world, problem, NULL, false, 0, work, &against);
 }
 
 /// What counts against the limit.
-static double spent(const bt_problem *p, const bt_work *k)
+static double spent(const bt_problem *problem, const bt_work *work)
 {
-    if (p->plain) return (double)k->sweeps;
-    return (double)(k->updates + k->checks) + (1 + LEAST_SWEEP * (double)k->contacts) * (double)k->sweeps;
+    if (problem->plain) return (double)work->sweeps;
+    return (double)(work->updates + work->checks) + (1 + LEAST_SWEEP * (double)work->contacts) * (double)work->sweeps;
 }
 
 typedef struct {
@@ -287,17 +290,18 @@ static void gather(double cap, momentum *m)
 }
 
 /// With `on`, the momentum of the round before goes on. Returns true when the last update was small.
-static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, bool on, double limit, momentum *m,
-                      bt_work *work)
+static bool run_round(bt_world *world, const bt_problem *problem, int length, double cap, bool on, double limit,
+                      momentum *m, bt_work *work)
 {
-    const double small = p->plain ? p->tolerance : BT_NEAR * p->tolerance;
+    const double small = problem->plain ? problem->tolerance : BT_NEAR * problem->tolerance;
     if (!on) *m = (momentum){.theta = 1};
     for (int n = 0;; n++) {
-        const bool moves_on = !p->plain && (n > 0 || on);
+        const bool moves_on = !problem->plain && (n > 0 || on);
         if (moves_on) gather(cap, m);
-        const bt_before move = {move_bodies, &(body_move){p->vel, w->solver->before, m->beta}};
-        if (sweep(w, p, moves_on ? &move : NULL, !p->plain, m->beta, work, &m->against) <= small) return true;
-        if (n + 1 == length || spent(p, work) >= limit) return false;
+        const bt_before move = {move_bodies, &(body_move){problem->vel, world->solver->before, m->beta}};
+        if (sweep(world, problem, moves_on ? &move : NULL, !problem->plain, m->beta, work, &m->against) <= small)
+            return true;
+        if (n + 1 == length || spent(problem, work) >= limit) return false;
     }
 }
 
@@ -308,13 +312,13 @@ typedef struct {
 } pace;
 
 /// The sum of squares, or the largest where the part of a cell is cut off (bt_rounds_scale): that sum shows no gain.
-static double misfit_of(const bt_problem *p, const bt_work *work)
+static double misfit_of(const bt_problem *problem, const bt_work *work)
 {
     const double largest = work->residual * work->residual;
-    return largest * p->per_square > p->most_squares ? largest : work->squares;
+    return largest * problem->per_square > problem->most_squares ? largest : work->squares;
 }
 
-static void adapt(pace *a, const bt_problem *p, double misfit)
+static void adapt(pace *a, const bt_problem *problem, double misfit)
 {
     const bool gained = !(misfit > GAIN * a->mark), first = isinf(a->mark);
     a->mark = misfit;
@@ -324,72 +328,74 @@ static void adapt(pace *a, const bt_problem *p, double misfit)
         a->length = (int)bt_min(MOST_LENGTH, NARROWER * a->length);
         return;
     }
-    a->length = p->length;
+    a->length = problem->length;
     if (a->cap == 0) a->cap = 1, a->length = FREE_LENGTH;
-    else if (a->cap == 1) a->cap = p->cap;
+    else if (a->cap == 1) a->cap = problem->cap;
     else a->cap = 1 - WIDER * (1 - a->cap);
     if (a->cap < LEAST_CAP) a->cap = 0;
 }
 
 /// Keep the unknowns of a hard problem when they are the best so far; `best`: the residual of those kept, INFINITY =
 /// none.
-static void keep_better(bt_world *w, const bt_problem *p, const bt_work *work, double *best)
+static void keep_better(bt_world *world, const bt_problem *problem, const bt_work *work, double *best)
 {
     if (!(work->residual < *best)) return;
     *best = work->residual;
-    bt_phases_any_order(w, p->keep, &(bt_keeping){BT_KEEP}, &(bt_totals){0});
+    bt_phases_any_order(world, problem->keep, &(bt_keeping){BT_KEEP}, &(bt_totals){0});
 }
 
 /// Back to the best unknowns where they are better than the present ones. True: the velocities are theirs.
-static bool back_to_best(bt_world *w, const bt_problem *p, bt_work *work, double best)
+static bool back_to_best(bt_world *world, const bt_problem *problem, bt_work *work, double best)
 {
-    if (!(work->residual > p->tolerance && best < work->residual)) return false;
-    bt_phases_any_order(w, p->keep, &(bt_keeping){BT_PUT_BACK}, &(bt_totals){0});
-    bt_rounds_residual(w, p, BT_SETTLES, work);
+    if (!(work->residual > problem->tolerance && best < work->residual)) return false;
+    bt_phases_any_order(world, problem->keep, &(bt_keeping){BT_PUT_BACK}, &(bt_totals){0});
+    bt_rounds_residual(world, problem, BT_SETTLES, work);
     return true;
 }
 
-void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
+void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
 {
-    bt_solver *s = w->solver;
-    if (w->bodies.n > s->cap_before) {
-        s->cap_before = w->bodies.n;
-        free(s->before);
-        s->before = bt_alloc_aligned((size_t)s->cap_before, sizeof *s->before);
+    bt_solver *solver = world->solver;
+    if (world->bodies.n > solver->cap_before) {
+        solver->cap_before = world->bodies.n;
+        free(solver->before);
+        solver->before = bt_alloc_aligned((size_t)solver->cap_before, sizeof *solver->before);
     }
-    pace a = {.cap = p->cap, .mark = INFINITY, .length = p->plain ? INT_MAX : p->length};
+    pace a = {.cap = problem->cap, .mark = INFINITY, .length = problem->plain ? INT_MAX : problem->length};
     momentum m = {.theta = 1};
     double best = INFINITY;
-    const double all_work = p->limit * (p->plain ? 1 : (double)(work->contacts + 1));
+    const double all_work = problem->limit * (problem->plain ? 1 : (double)(work->contacts + 1));
     // between the two no momentum
-    double fast = spent(p, work) + all_work, limit = fast + (p->plain ? 0 : NO_MOMENTUM * all_work);
+    double fast = spent(problem, work) + all_work, limit = fast + (problem->plain ? 0 : NO_MOMENTUM * all_work);
     int more = 0; // further attempts
     bool settled = true; // velocities, and the residual, are those of the impulses
     bool all = false;    // the last round was over the whole field
-    for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {
-        const bool last = !p->plain && spent(p, work) >= fast;
+    for (int n = 0; work->residual > problem->tolerance && spent(problem, work) < limit; n++) {
+        const bool last = !problem->plain && spent(problem, work) >= fast;
         if (last) {
             // from where momentum came nearest
-            if (a.cap > 0 && back_to_best(w, p, work, best)) settled = true, all = false;
-            a.cap = 0, a.length = p->length;
-        } else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, misfit_of(p, work));
-        const bool part = !p->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed, on = all && !part && !settled;
-        if (part) keep_near_bad(w);
-        settled = run_round(w, p, a.length, a.cap, on, last ? limit : fast, &m, work) && !part;
+            if (a.cap > 0 && back_to_best(world, problem, work, best)) settled = true, all = false;
+            a.cap = 0, a.length = problem->length;
+        } else if (n % ROUNDS == 0 && !problem->plain) adapt(&a, problem, misfit_of(problem, work));
+        const bool part = !problem->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed,
+                   on = all && !part && !settled;
+        if (part) keep_near_bad(world);
+        settled = run_round(world, problem, a.length, a.cap, on, last ? limit : fast, &m, work) && !part;
         all = !part;
-        bt_rounds_residual(w, p, settled ? BT_SETTLES : BT_SWEPT, work);
-        if (p->keep && !p->plain && spent(p, work) > fast - HARD * all_work) keep_better(w, p, work, &best);
-        if (!settled && work->residual <= p->tolerance) {
-            bt_rounds_residual(w, p, BT_SETTLES, work);
+        bt_rounds_residual(world, problem, settled ? BT_SETTLES : BT_SWEPT, work);
+        if (problem->keep && !problem->plain && spent(problem, work) > fast - HARD * all_work)
+            keep_better(world, problem, work, &best);
+        if (!settled && work->residual <= problem->tolerance) {
+            bt_rounds_residual(world, problem, BT_SETTLES, work);
             settled = true;
         }
-        if (spent(p, work) < limit || bt_min(best, work->residual) <= FAR * p->tolerance) continue;
-        if (p->plain || !p->keep || more++ == MOST_MORE) continue;
-        a = (pace){.cap = p->cap, .mark = INFINITY, .length = p->length};
+        if (spent(problem, work) < limit || bt_min(best, work->residual) <= FAR * problem->tolerance) continue;
+        if (problem->plain || !problem->keep || more++ == MOST_MORE) continue;
+        a = (pace){.cap = problem->cap, .mark = INFINITY, .length = problem->length};
         all = false;
-        fast = spent(p, work) + HARD * all_work, limit = fast + NO_MOMENTUM * all_work;
+        fast = spent(problem, work) + HARD * all_work, limit = fast + NO_MOMENTUM * all_work;
     }
-    if (!settled) bt_rounds_residual(w, p, BT_SETTLES, work);
-    back_to_best(w, p, work, best);
-    if (!isinf(best)) bt_phases_any_order(w, p->keep, &(bt_keeping){BT_FORGET}, &(bt_totals){0});
+    if (!settled) bt_rounds_residual(world, problem, BT_SETTLES, work);
+    back_to_best(world, problem, work, best);
+    if (!isinf(best)) bt_phases_any_order(world, problem->keep, &(bt_keeping){BT_FORGET}, &(bt_totals){0});
 }

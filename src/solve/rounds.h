@@ -82,7 +82,7 @@ typedef struct bt_problem {
     bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list), tell what is left (_found); context: this
     bt_visit *sweep;      ///< sweep the list of a cell, after its move; context: bt_sweep
     bt_visit *keep;       ///< keep the unknowns of a cell, put them back, or forget them; context: bt_keeping. Or NULL
-    void (*settle)(bt_world *w); ///< velocities anew from the impulses, or NULL
+    void (*settle)(bt_world *world); ///< velocities anew from the impulses, or NULL
     bt_vel *vel;          ///< [n bodies] moved by the sweeps
     double tolerance;     ///< of the residual
     double per_square;    ///< factor on sums of squares, see bt_sum
@@ -114,7 +114,7 @@ typedef struct bt_work {
 } bt_work;
 
 /// Scales of the exact sums for a tolerance of the residual, the largest mass and the number of cells.
-void bt_rounds_scale(bt_problem *p, const bt_cells *t);
+void bt_rounds_scale(bt_problem *problem, const bt_cells *t);
 
 /// What a contact needs that is swept where it is, and not in a batch.
 typedef struct bt_in_place {
@@ -130,14 +130,14 @@ void bt_rounds_list(bt_cell *cell);
 void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv);
 
 /// Collective. What the residual of all contacts is now, into *work.
-void bt_rounds_residual(bt_world *w, const bt_problem *p, bt_since since, bt_work *work);
+void bt_rounds_residual(bt_world *world, const bt_problem *problem, bt_since since, bt_work *work);
 
 /// Collective. One sweep over the lists, without momentum; returns the largest update.
-double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work);
+double bt_rounds_sweep(bt_world *world, const bt_problem *problem, bt_work *work);
 
 /// Collective. Rounds until the residual is within the tolerance, or the limit of work is reached; after a residual
 /// pass that found it not to be.
-void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work);
+void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work);
 
 /// What a residual pass finds in a cell.
 typedef struct bt_found {
@@ -146,7 +146,7 @@ typedef struct bt_found {
 } bt_found;
 
 /// What a residual pass has found in a cell, into its work list.
-void bt_rounds_found(bt_cell *cell, const bt_found *f);
+void bt_rounds_found(bt_cell *cell, const bt_found *found);
 
 enum { BT_MOVED_FEW = 192 };
 /// Unknowns of the listed contacts of a cell after their move.
@@ -155,30 +155,31 @@ typedef struct bt_moved {
     double (*y)[3];       ///< [n_list]
 } bt_moved;
 
-static inline void bt_moved_begin(bt_moved *m, const bt_cell *cell)
+static inline void bt_moved_begin(bt_moved *moved, const bt_cell *cell)
 {
-    m->y = cell->work.n_list > BT_MOVED_FEW ? bt_alloc((size_t)cell->work.n_list, sizeof *m->y) : m->few;
+    moved->y = cell->work.n_list > BT_MOVED_FEW ? bt_alloc((size_t)cell->work.n_list, sizeof *moved->y) : moved->few;
 }
 
 /// Into the totals of the sweep: what the cell turned against its move, J, and how many contacts were moved.
-static inline void bt_rounds_moved(const bt_cell *cell, const bt_sweep *s, double against, bt_totals *t)
+static inline void bt_rounds_moved(const bt_cell *cell, const bt_sweep *sweep, double against, bt_totals *totals)
 {
-    bt_sum_add(&t->sum[BT_SWEEP_AGAINST], bt_max(-0x1p60, bt_min(0x1p60, against * s->problem->per_energy)));
-    if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], cell->work.n_list);
+    bt_sum_add(&totals->sum[BT_SWEEP_AGAINST], bt_max(-0x1p60, bt_min(0x1p60, against * sweep->problem->per_energy)));
+    if (sweep->beta > 0) bt_sum_add(&totals->sum[BT_SWEEP_MOVED], cell->work.n_list);
 }
 
-static inline void bt_moved_end(bt_moved *m, const bt_cell *cell, const bt_sweep *s, double against, bt_totals *t)
+static inline void bt_moved_end(bt_moved *moved, const bt_cell *cell, const bt_sweep *sweep, double against,
+                                bt_totals *totals)
 {
-    bt_rounds_moved(cell, s, against, t);
-    if (m->y != m->few) free(m->y);
+    bt_rounds_moved(cell, sweep, against, totals);
+    if (moved->y != moved->few) free(moved->y);
 }
 
 /// Move n unknowns along their last change before a sweep: x to y, kept in `y`, and x kept in `before`.
-static inline void bt_rounds_move(const bt_sweep *s, double *x, double *before, double *y, int n)
+static inline void bt_rounds_move(const bt_sweep *sweep, double *x, double *before, double *y, int n)
 {
     for (int i = 0; i < n; i++) {
         const double now = x[i];
-        if (s->beta > 0) x[i] = now + s->beta * (now - before[i]);
+        if (sweep->beta > 0) x[i] = now + sweep->beta * (now - before[i]);
         before[i] = now;
         y[i] = x[i];
     }

@@ -68,25 +68,26 @@ BT_INLINE bt_invs bt_take_inv(const bt_inv *inv, const bt_idx *body)
 }
 
 /// Line `line` of four records.
-BT_INLINE bt_motions bt_take_line(const bt_contact *const u[BT_LANES], size_t line)
+BT_INLINE bt_motions bt_take_line(const bt_contact *const contact[BT_LANES], size_t line)
 {
     bt_motions m;
-    memcpy(&m.x, (const char *)u[0] + line * sizeof m.x, sizeof m.x);
-    memcpy(&m.y, (const char *)u[1] + line * sizeof m.x, sizeof m.x);
-    memcpy(&m.w, (const char *)u[2] + line * sizeof m.x, sizeof m.x);
-    memcpy(&m.unused, (const char *)u[3] + line * sizeof m.x, sizeof m.x);
+    memcpy(&m.x, (const char *)contact[0] + line * sizeof m.x, sizeof m.x);
+    memcpy(&m.y, (const char *)contact[1] + line * sizeof m.x, sizeof m.x);
+    memcpy(&m.w, (const char *)contact[2] + line * sizeof m.x, sizeof m.x);
+    memcpy(&m.unused, (const char *)contact[3] + line * sizeof m.x, sizeof m.x);
     bt_transpose(&m);
     return m;
 }
 
-BT_INLINE bt_four_rows bt_rows_of(const bt_contact *const u[BT_LANES])
+BT_INLINE bt_four_rows bt_rows_of(const bt_contact *const contact[BT_LANES])
 {
     _Static_assert(offsetof(bt_contact, nx) == 0 && offsetof(bt_contact, rbt) == 24, "first line");
     _Static_assert(offsetof(bt_contact, ran) == 32 && offsetof(bt_contact, rbn) == 48, "second line");
     _Static_assert(offsetof(bt_contact, bias) == 64 && offsetof(bt_contact, mu) == 80, "third line");
     _Static_assert(offsetof(bt_contact, ln) == 96 && offsetof(bt_contact, lt) == 112, "fourth line");
-    const bt_motions p = bt_take_line(u, 0), q = bt_take_line(u, 1), r = bt_take_line(u, 2), s = bt_take_line(u, 3);
-    const bt_mask n = {u[0]->n, u[1]->n, u[2]->n, u[3]->n}, none = {0};
+    const bt_motions p = bt_take_line(contact, 0), q = bt_take_line(contact, 1), r = bt_take_line(contact, 2),
+                     s = bt_take_line(contact, 3);
+    const bt_mask n = {contact[0]->n, contact[1]->n, contact[2]->n, contact[3]->n}, none = {0};
     return (bt_four_rows){.nx = p.x, .ny = p.y, .rat = p.w, .rbt = p.unused,
                      .ran = {q.x, q.y}, .rbn = {q.w, q.unused},
                      .bias = {r.x, r.y}, .mu = r.w,
@@ -98,21 +99,21 @@ BT_INLINE bt_four_rows bt_rows_of(const bt_contact *const u[BT_LANES])
 BT_INLINE bt_vec bt_only(bt_mask m, bt_vec x) { return (bt_vec)((bt_mask)x & m); }
 
 /// As bt_mass_of for contacts with points; 0 of others.
-BT_INLINE bt_masses bt_masses_of(const bt_four_rows *u, bt_invs a, bt_invs b)
+BT_INLINE bt_masses bt_masses_of(const bt_four_rows *rows, bt_invs a, bt_invs b)
 {
     const bt_vec free = a.m + b.m, one = {1, 1, 1, 1}, none = {0};
     bt_vec w[2];
-    for (int i = 0; i < 2; i++) w[i] = free + a.i * u->ran[i] * u->ran[i] + b.i * u->rbn[i] * u->rbn[i];
-    const bt_vec w12 = free + a.i * u->ran[0] * u->ran[1] + b.i * u->rbn[0] * u->rbn[1];
-    const bt_vec wt = free + a.i * u->rat * u->rat + b.i * u->rbt * u->rbt;
+    for (int i = 0; i < 2; i++) w[i] = free + a.i * rows->ran[i] * rows->ran[i] + b.i * rows->rbn[i] * rows->rbn[i];
+    const bt_vec w12 = free + a.i * rows->ran[0] * rows->ran[1] + b.i * rows->rbn[0] * rows->rbn[1];
+    const bt_vec wt = free + a.i * rows->rat * rows->rat + b.i * rows->rbt * rows->rbt;
     const bt_vec det = w[0] * w[1] - w12 * w12;
     const bt_vec per_det = bt_choose(det > 1e-9 * w[0] * w[1], one / det, none);
-    return (bt_masses){.w = {bt_only(u->one, w[0]), bt_only(u->two, w[1])},
-                       .w12 = bt_only(u->two, w12),
-                       .mn = {bt_only(u->one, one / w[0]), bt_only(u->two, one / w[1])},
-                       .per_det = bt_only(u->two, per_det),
-                       .wt = bt_only(u->one, wt),
-                       .mt = bt_only(u->one, one / wt)};
+    return (bt_masses){.w = {bt_only(rows->one, w[0]), bt_only(rows->two, w[1])},
+                       .w12 = bt_only(rows->two, w12),
+                       .mn = {bt_only(rows->one, one / w[0]), bt_only(rows->two, one / w[1])},
+                       .per_det = bt_only(rows->two, per_det),
+                       .wt = bt_only(rows->one, wt),
+                       .mt = bt_only(rows->one, one / wt)};
 }
 
 #endif

@@ -23,57 +23,58 @@
 // The work of each island's contacts, and what of its restitution is left.
 
 /// With the restitution of the bodies, whatever an earlier solution of this step has left of it.
-static void restore(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void restore(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
-    const bt_cell *cell = &w->cells->cell[k];
+    const bt_cell *cell = &world->cells->cell[k];
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        bt_contact *u = &cell->contacts[j];
-        t->most = bt_max(t->most, bt_pair_restitution(&w->bodies, u->a, u->b));
-        bt_pack_bias(w, u, &cell->gaps[j], 1);
+        bt_contact *contact = &cell->contacts[j];
+        totals->most = bt_max(totals->most, bt_pair_restitution(&world->bodies, contact->a, contact->b));
+        bt_pack_bias(world, contact, &cell->gaps[j], 1);
     }
 }
 
-bool bt_restitution_begin(bt_world *w)
+bool bt_restitution_begin(bt_world *world)
 {
-    if (!w->cells->rebounds) return false;
-    bt_totals t = {0};
-    bt_phases_any_order(w, restore, NULL, &t);
-    bt_domain_maxima(w, &t.most, 1);
-    if (t.most == 0) return false;
-    bt_islands_make(w, w->solver->islands, NULL);
+    if (!world->cells->rebounds) return false;
+    bt_totals totals = {0};
+    bt_phases_any_order(world, restore, NULL, &totals);
+    bt_domain_maxima(world, &totals.most, 1);
+    if (totals.most == 0) return false;
+    bt_islands_make(world, world->solver->islands, NULL);
     return true;
 }
 
-bool bt_restitution_lower(bt_world *w)
+bool bt_restitution_lower(bt_world *world)
 {
-    const bt_cells *ts = w->cells;
-    bt_islands *s = w->solver->islands;
-    bt_islands_clear(w, s);
+    const bt_cells *ts = world->cells;
+    bt_islands *islands = world->solver->islands;
+    bt_islands_clear(world, islands);
     for (bt_idx i = 0; i < ts->n_order; i++) {
         const bt_cell *cell = &ts->cell[ts->order[i]];
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            const bt_contact *u = &cell->contacts[j];
-            if (u->ln[0] + u->ln[1] == 0 || u->n == 0) continue; // what sheets take must not cover what rebounds give
-            bt_sum_add(&s->sum[bt_islands_of(w, s, u)],
-                       bt_contacts_work(w, u) - bt_contacts_unsolved_work(u, w->stats.residual));
+            const bt_contact *contact = &cell->contacts[j];
+            // what sheets take must not cover what rebounds give
+            if (contact->ln[0] + contact->ln[1] == 0 || contact->n == 0) continue;
+            bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
+                       bt_contacts_work(world, contact) - bt_contacts_unsolved_work(contact, world->stats.residual));
         }
     }
-    bt_islands_add(w, s);
+    bt_islands_add(world, islands);
     double any = 0;
-    for (bt_idx i = 0; i < w->bodies.n; i++) {
-        if (s->root[i] != i || s->share[i] == 0 || !(bt_sum_value(&s->sum[i]) > 0)) continue;
-        s->share[i] = s->share[i] > 0.2 ? 0.5 * s->share[i] : 0;
+    for (bt_idx i = 0; i < world->bodies.n; i++) {
+        if (islands->root[i] != i || islands->share[i] == 0 || !(bt_sum_value(&islands->sum[i]) > 0)) continue;
+        islands->share[i] = islands->share[i] > 0.2 ? 0.5 * islands->share[i] : 0;
         any = 1;
     }
-    bt_domain_maxima(w, &any, 1);
+    bt_domain_maxima(world, &any, 1);
     if (any == 0) return false;
     for (bt_idx i = 0; i < ts->n_order; i++) {
         bt_cell *cell = &ts->cell[ts->order[i]];
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            bt_contact *u = &cell->contacts[j];
-            const double share = s->share[bt_islands_of(w, s, u)];
-            if (share < 1) bt_pack_bias(w, u, &cell->gaps[j], share);
+            bt_contact *contact = &cell->contacts[j];
+            const double share = islands->share[bt_islands_of(world, islands, contact)];
+            if (share < 1) bt_pack_bias(world, contact, &cell->gaps[j], share);
         }
     }
     return true;
@@ -90,33 +91,33 @@ bool bt_restitution_lower(bt_world *w)
 
 bt_solver *bt_solver_create(void)
 {
-    bt_solver *s = bt_alloc(1, sizeof *s);
-    s->islands = bt_islands_create();
-    return s;
+    bt_solver *solver = bt_alloc(1, sizeof *solver);
+    solver->islands = bt_islands_create();
+    return solver;
 }
 
-static void give_back(bt_solver *s)
+static void give_back(bt_solver *solver)
 {
-    free(s->before);
-    free(s->shift);
-    free(s->kept);
-    s->before = s->shift = NULL;
-    s->kept = NULL;
-    s->cap_before = s->cap_bodies = s->cap_kept = 0;
+    free(solver->before);
+    free(solver->shift);
+    free(solver->kept);
+    solver->before = solver->shift = NULL;
+    solver->kept = NULL;
+    solver->cap_before = solver->cap_bodies = solver->cap_kept = 0;
 }
 
-void bt_solver_free(bt_solver *s)
+void bt_solver_free(bt_solver *solver)
 {
-    if (!s) return;
-    bt_islands_free(s->islands);
-    give_back(s);
-    free(s);
+    if (!solver) return;
+    bt_islands_free(solver->islands);
+    give_back(solver);
+    free(solver);
 }
 
-void bt_solver_rest(bt_world *w)
+void bt_solver_rest(bt_world *world)
 {
-    give_back(w->solver);
-    bt_cells_rest(w->cells);
+    give_back(world->solver);
+    bt_cells_rest(world->cells);
 #ifdef __GLIBC__
     // Free pieces of some kilobytes between pieces in use are of no use to arrays of all floes, and would stay.
     malloc_trim(0);
@@ -124,9 +125,9 @@ void bt_solver_rest(bt_world *w)
 }
 
 /// The line, in the pass of the last cell on the rank that owns the large bodies.
-static bt_tow *line_of(const bt_world *w, bt_idx cell)
+static bt_tow *line_of(const bt_world *world, bt_idx cell)
 {
-    return cell == w->cells->n - 1 && bt_tow_has_line(w->tow) ? w->tow : NULL;
+    return cell == world->cells->n - 1 && bt_tow_has_line(world->tow) ? world->tow : NULL;
 }
 
 // --- velocities from impulses, and what they leave of the contact law ------------------------------------------------
@@ -139,39 +140,41 @@ static void start_impulses(bt_cell *cell, const bt_inv *inv)
     bt_batch_begin(cell);
     if (in_place) bt_rounds_in_place(cell, inv);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        bt_contact *u = &cell->contacts[i];
-        for (int j = 0; cell->laws.limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], cell->laws.limits[i].most[j]);
-        if (u->n > 0) u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
-        else bt_onto_sheets(&cell->laws.limits[i], &u->ln[0], &u->lt);
+        bt_contact *contact = &cell->contacts[i];
+        for (int j = 0; cell->laws.limits && j < contact->n; j++)
+            contact->ln[j] = bt_min(contact->ln[j], cell->laws.limits[i].most[j]);
+        if (contact->n > 0) contact->lt = bt_clamp(contact->lt, contact->mu * (contact->ln[0] + contact->ln[1]));
+        else bt_onto_sheets(&cell->laws.limits[i], &contact->ln[0], &contact->lt);
         if (!in_place) continue;
         double *x = cell->work.in_place[i].before;
-        x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
+        x[0] = contact->ln[0], x[1] = contact->ln[1], x[2] = contact->lt;
     }
 }
 
-static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     const bool warm = *(const bool *)context; // impulses are those of the last step
-    bt_cell *cell = &w->cells->cell[k];
-    bt_vel *v = w->bodies.vel;
-    const bt_inv *inv = w->bodies.inv;
+    bt_cell *cell = &world->cells->cell[k];
+    bt_vel *v = world->bodies.vel;
+    const bt_inv *inv = world->bodies.inv;
     bt_batch_unpack(cell);
     if (warm) start_impulses(cell, inv);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        const bt_contact *u = &cell->contacts[i];
-        const double total = u->ln[0] + u->ln[1];
-        if (total == 0 && u->lt == 0) continue;
-        t->most = 1;
-        bt_vel va = v[u->a], vb = v[u->b];
-        bt_apply(u, total, u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1], u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1],
-                 u->lt, inv[u->a], inv[u->b], &va, &vb);
-        bt_store(&v[u->a], inv[u->a], &va);
-        bt_store(&v[u->b], inv[u->b], &vb);
+        const bt_contact *contact = &cell->contacts[i];
+        const double total = contact->ln[0] + contact->ln[1];
+        if (total == 0 && contact->lt == 0) continue;
+        totals->most = 1;
+        bt_vel va = v[contact->a], vb = v[contact->b];
+        bt_apply(contact, total, contact->ln[0] * contact->ran[0] + contact->ln[1] * contact->ran[1],
+                 contact->ln[0] * contact->rbn[0] + contact->ln[1] * contact->rbn[1], contact->lt, inv[contact->a],
+                 inv[contact->b], &va, &vb);
+        bt_store(&v[contact->a], inv[contact->a], &va);
+        bt_store(&v[contact->b], inv[contact->b], &vb);
     }
-    bt_tow *line = line_of(w, k);
+    bt_tow *line = line_of(world, k);
     if (!line) return;
-    bt_vel *towed = &v[bt_world_towed(w)];
-    const bt_inv by = inv[bt_world_towed(w)];
+    bt_vel *towed = &v[bt_world_towed(world)];
+    const bt_inv by = inv[bt_world_towed(world)];
     bt_tow_apply(line, towed, by);
     // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first
     // sweep. So the line has its exact update in every step, not only in steps with sweeps.
@@ -179,70 +182,74 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
 }
 
 /// Of the contacts of a cell that is swept in place.
-static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_problem *p)
+static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_problem *problem)
 {
-    const double near = BT_NEAR * p->tolerance;
-    bt_found f = {0};
+    const double near = BT_NEAR * problem->tolerance;
+    bt_found found = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        const bt_contact *u = &cell->contacts[i];
+        const bt_contact *contact = &cell->contacts[i];
         const bt_mass *m = &cell->work.in_place[i].mass;
         const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
-        const double r = limit ? bt_contact_residual(u, m, limit, v, p->tolerance, &f.squares)
-                               : bt_contact_residual(u, m, NULL, v, p->tolerance, &f.squares);
-        f.most = bt_max(f.most, r);
-        f.bad += r > near;
-        f.rows += u->n + 1 + (u->n == 0);
+        const double r = limit ? bt_contact_residual(contact, m, limit, v, problem->tolerance, &found.squares)
+                               : bt_contact_residual(contact, m, NULL, v, problem->tolerance, &found.squares);
+        found.most = bt_max(found.most, r);
+        found.bad += r > near;
+        found.rows += contact->n + 1 + (contact->n == 0);
         const double *x = cell->work.in_place[i].before;
         // or did before the last sweep
         bool on =
-            p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt;
-        if (limit && u->n == 0) on = on || r > 0;
-        for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
+            problem->plain || contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || x[0] != contact->ln[0] ||
+            x[1] != contact->ln[1] || x[2] != contact->lt;
+        if (limit && contact->n == 0) on = on || r > 0;
+        for (int c = 0; !on && c < contact->n; c++)
+            on = !(bt_normal_velocity(contact, c, &v[contact->a], &v[contact->b]) + contact->bias[c] >= 0);
         if (on) cell->work.list[cell->work.n_list++] = i;
     }
-    return f;
+    return found;
 }
 
 /// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
-static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)t;
-    const bt_problem *p = context;
-    bt_cell *cell = &w->cells->cell[k];
-    const bt_vel *v = w->bodies.vel;
+    (void)totals;
+    const bt_problem *problem = context;
+    bt_cell *cell = &world->cells->cell[k];
+    const bt_vel *v = world->bodies.vel;
     bt_batch_unpack(cell);
     bt_rounds_list(cell);
-    bt_found f = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, w->bodies.inv, p) : residual_in_place(cell, v, p);
-    const bt_tow *line = line_of(w, k);
+    bt_found found = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, world->bodies.inv, problem)
+                                           : residual_in_place(cell, v, problem);
+    const bt_tow *line = line_of(world, k);
     if (line) {
-        const double r = bt_tow_residual(line, &v[bt_world_towed(w)]);
-        f.most = bt_max(f.most, r);
-        f.squares += r * r;
-        f.rows++;
-        f.bad += r > BT_NEAR * p->tolerance;
+        const double r = bt_tow_residual(line, &v[bt_world_towed(world)]);
+        found.most = bt_max(found.most, r);
+        found.squares += r * r;
+        found.rows++;
+        found.bad += r > BT_NEAR * problem->tolerance;
     }
-    bt_rounds_found(cell, &f);
+    bt_rounds_found(cell, &found);
 }
 
-static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void free_velocities(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)context, (void)t;
-    const bt_cell *cell = &w->cells->cell[k];
-    bt_bodies *b = &w->bodies;
-    if (k == w->cells->n - 1 || w->cells->awake[k])
-        memcpy(b->vel + cell->first, b->vel_free + cell->first, (size_t)(cell->end - cell->first) * sizeof *b->vel);
+    (void)context, (void)totals;
+    const bt_cell *cell = &world->cells->cell[k];
+    bt_bodies *bodies = &world->bodies;
+    if (k == world->cells->n - 1 || world->cells->awake[k])
+        memcpy(bodies->vel + cell->first, bodies->vel_free + cell->first,
+               (size_t)(cell->end - cell->first) * sizeof *bodies->vel);
 }
 
 /// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up. True when some
 /// impulse on this rank is not zero.
-static bool form_velocities(bt_world *w, bool warm)
+static bool form_velocities(bt_world *world, bool warm)
 {
-    bt_totals t = {0};
-    bt_phases_run(w, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, w->bodies.vel, &t);
-    return t.most > 0;
+    bt_totals totals = {0};
+    bt_phases_run(world, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, world->bodies.vel, &totals);
+    return totals.most > 0;
 }
 
-static void settle(bt_world *w) { form_velocities(w, false); }
+static void settle(bt_world *world) { form_velocities(world, false); }
 
 // --- sweeps ----------------------------------------------------------------------------------------------------------
 
@@ -262,19 +269,19 @@ static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
         fetch_ahead(cell, j + AHEAD);
-        const bt_limit *k = cell->laws.limits ? &cell->laws.limits[i] : NULL;
-        most = bt_max(most, bt_update_contact(&cell->contacts[i], &cell->work.in_place[i].mass, k, v, inv));
+        const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
+        most = bt_max(most, bt_update_contact(&cell->contacts[i], &cell->work.in_place[i].mass, limit, v, inv));
     }
     return most;
 }
 
-static void move_contacts(const bt_sweep *o, bt_cell *cell, double (*y)[3])
+static void move_contacts(const bt_sweep *sweep, bt_cell *cell, double (*y)[3])
 {
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        bt_contact *u = &cell->contacts[cell->work.list[j]];
+        bt_contact *contact = &cell->contacts[cell->work.list[j]];
         double *x = cell->work.in_place[cell->work.list[j]].before;
-        bt_rounds_move(o, u->ln, x, y[j], 2);
-        bt_rounds_move(o, &u->lt, x + 2, y[j] + 2, 1);
+        bt_rounds_move(sweep, contact->ln, x, y[j], 2);
+        bt_rounds_move(sweep, &contact->lt, x + 2, y[j] + 2, 1);
     }
 }
 
@@ -282,71 +289,73 @@ static double contacts_against(const bt_cell *cell, double (*y)[3])
 {
     double sum = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_contact *u = &cell->contacts[cell->work.list[j]];
-        const bt_in_place *o = &cell->work.in_place[cell->work.list[j]];
-        const bt_mass *m = &o->mass;
-        const double *x = o->before;
-        sum += bt_rounds_against(m->w[0], u->ln[0], x[0], y[j][0]) +
-               bt_rounds_against(m->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(m->wt, u->lt, x[2], y[j][2]);
+        const bt_contact *contact = &cell->contacts[cell->work.list[j]];
+        const bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
+        const bt_mass *m = &in_place->mass;
+        const double *x = in_place->before;
+        sum += bt_rounds_against(m->w[0], contact->ln[0], x[0], y[j][0]) +
+               bt_rounds_against(m->w[1], contact->ln[1], x[1], y[j][1]) +
+               bt_rounds_against(m->wt, contact->lt, x[2], y[j][2]);
     }
     return sum;
 }
 
-static void sweep_in_batches(bt_world *w, bt_cell *cell, const bt_sweep *o, bt_totals *t)
+static void sweep_in_batches(bt_world *world, bt_cell *cell, const bt_sweep *sweep, bt_totals *totals)
 {
     int64_t done = 0;
     double most = 0;
-    const double against = bt_batch_sweep(cell, w->bodies.vel, w->bodies.inv, o, w->par.inner_sweeps,
-                                          ENOUGH * o->problem->tolerance, &done, &most);
-    t->most = bt_max(t->most, most);
+    const double against = bt_batch_sweep(cell, world->bodies.vel, world->bodies.inv, sweep, world->par.inner_sweeps,
+                                          ENOUGH * sweep->problem->tolerance, &done, &most);
+    totals->most = bt_max(totals->most, most);
     cell->work.updates += done;
-    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
-    if (o->moves) bt_rounds_moved(cell, o, against, t);
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)done);
+    if (sweep->moves) bt_rounds_moved(cell, sweep, against, totals);
 }
 
-static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void sweep_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    const bt_sweep *o = context;
-    bt_cell *cell = &w->cells->cell[k];
-    bt_tow *line = line_of(w, k);
+    const bt_sweep *sweep = context;
+    bt_cell *cell = &world->cells->cell[k];
+    bt_tow *line = line_of(world, k);
     if (cell->work.n_list == 0 && !line) return;
     if (bt_batch_is_for(cell)) {
-        sweep_in_batches(w, cell, o, t);
+        sweep_in_batches(world, cell, sweep, totals);
         return;
     }
-    bt_vel *v = w->bodies.vel, *towed = line ? &v[bt_world_towed(w)] : NULL;
+    bt_vel *v = world->bodies.vel, *towed = line ? &v[bt_world_towed(world)] : NULL;
     double line_y[BT_MAX_BRANCHES] = {0};
     bt_moved moved;
-    if (o->moves) {
+    if (sweep->moves) {
         bt_moved_begin(&moved, cell);
-        move_contacts(o, cell, moved.y);
+        move_contacts(sweep, cell, moved.y);
         for (int c = 0; line && c < line->n_branches; c++)
-            bt_rounds_move(o, &line->branch[c].lambda, &w->solver->line_before[c], &line_y[c], 1);
+            bt_rounds_move(sweep, &line->branch[c].lambda, &world->solver->line_before[c], &line_y[c], 1);
     }
     int64_t times = 0;
     double most = INFINITY;
-    for (; times < w->par.inner_sweeps || times == 0; times++) {
+    for (; times < world->par.inner_sweeps || times == 0; times++) {
         // more would be for nothing until the neighbours have changed
-        if (most <= ENOUGH * o->problem->tolerance) break;
-        most = update_list(cell, v, w->bodies.inv);
-        if (line) most = bt_max(most, bt_tow_update(line, towed, w->bodies.inv[bt_world_towed(w)]));
-        if (times == 0) t->most = bt_max(t->most, most);
+        if (most <= ENOUGH * sweep->problem->tolerance) break;
+        most = update_list(cell, v, world->bodies.inv);
+        if (line) most = bt_max(most, bt_tow_update(line, towed, world->bodies.inv[bt_world_towed(world)]));
+        if (times == 0) totals->most = bt_max(totals->most, most);
     }
     cell->work.updates += times * cell->work.n_list;
-    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)(times * cell->work.n_list));
-    if (!o->moves) return;
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)(times * cell->work.n_list));
+    if (!sweep->moves) return;
     double against = contacts_against(cell, moved.y);
     for (int c = 0; line && c < line->n_branches; c++)
-        against += bt_rounds_against(line->branch[c].w, line->branch[c].lambda, w->solver->line_before[c], line_y[c]);
-    bt_moved_end(&moved, cell, o, against, t);
+        against += bt_rounds_against(line->branch[c].w, line->branch[c].lambda, world->solver->line_before[c],
+                                     line_y[c]);
+    bt_moved_end(&moved, cell, sweep, against, totals);
 }
 
-static void keep_impulses(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void keep_impulses(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    (void)t;
+    (void)totals;
     const bt_keeping what = *(const bt_keeping *)context;
-    bt_cell *cell = &w->cells->cell[k];
-    bt_tow *line = line_of(w, k);
+    bt_cell *cell = &world->cells->cell[k];
+    bt_tow *line = line_of(world, k);
     if (what == BT_FORGET) {
         free(cell->work.best);
         cell->work.best = NULL;
@@ -355,116 +364,116 @@ static void keep_impulses(bt_world *w, bt_idx k, const void *context, bt_totals 
     bt_batch_unpack(cell);
     if (!cell->work.best) cell->work.best = bt_alloc((size_t)cell->n_contacts + 1, sizeof *cell->work.best);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        bt_contact *u = &cell->contacts[i];
+        bt_contact *contact = &cell->contacts[i];
         double *x = cell->work.best[i];
-        if (what == BT_PUT_BACK) u->ln[0] = x[0], u->ln[1] = x[1], u->lt = x[2];
-        else x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
+        if (what == BT_PUT_BACK) contact->ln[0] = x[0], contact->ln[1] = x[1], contact->lt = x[2];
+        else x[0] = contact->ln[0], x[1] = contact->ln[1], x[2] = contact->lt;
     }
     for (int c = 0; line && c < line->n_branches; c++) {
-        double *x = &w->solver->line_best[c], *now = &line->branch[c].lambda;
+        double *x = &world->solver->line_best[c], *now = &line->branch[c].lambda;
         if (what == BT_PUT_BACK) *now = *x;
         else *x = *now;
     }
 }
 
-static bt_problem contact_problem(const bt_world *w)
+static bt_problem contact_problem(const bt_world *world)
 {
-    bt_problem p = {
+    bt_problem problem = {
         .residual = residual_of_cell,
         .sweep = sweep_cell,
         .keep = keep_impulses,
         .settle = settle,
-        .vel = w->bodies.vel,
-        .tolerance = w->par.tolerance,
+        .vel = world->bodies.vel,
+        .tolerance = world->par.tolerance,
         .cap = 0.9,
         .length = 20,
-        .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES),
-        .plain = w->par.plain_sweeps,
+        .limit = (double)world->par.max_sweeps * (world->par.plain_sweeps ? 1 : UPDATES),
+        .plain = world->par.plain_sweeps,
     };
-    bt_rounds_scale(&p, w->cells);
-    return p;
+    bt_rounds_scale(&problem, world->cells);
+    return problem;
 }
 
 /// Start from the impulses of the step before. True when there are any.
-static bool warm_start(bt_world *w)
+static bool warm_start(bt_world *world)
 {
-    bt_tow *line = w->cells->cell[w->cells->n - 1].own ? line_of(w, w->cells->n - 1) : NULL;
-    if (line) bt_tow_warm_start(line, w->par.warm_start);
-    double pressed = form_velocities(w, true);
-    bt_domain_maxima(w, &pressed, 1);
+    bt_tow *line = world->cells->cell[world->cells->n - 1].own ? line_of(world, world->cells->n - 1) : NULL;
+    if (line) bt_tow_warm_start(line, world->par.warm_start);
+    double pressed = form_velocities(world, true);
+    bt_domain_maxima(world, &pressed, 1);
     return pressed > 0;
 }
 
-static void residual_of_more(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    bt_cell *cell = &w->cells->cell[k];
+    bt_cell *cell = &world->cells->cell[k];
     if (cell->news == BT_SAME_CONTACTS) return;
-    start_impulses(cell, w->bodies.inv);
-    residual_of_cell(w, k, context, t);
-    t->most = bt_max(t->most, cell->news == BT_MORE_CONTACTS ? cell->work.found.most : INFINITY);
-    bt_sum_add(&t->sum[0], cell->n_contacts);
+    start_impulses(cell, world->bodies.inv);
+    residual_of_cell(world, k, context, totals);
+    totals->most = bt_max(totals->most, cell->news == BT_MORE_CONTACTS ? cell->work.found.most : INFINITY);
+    bt_sum_add(&totals->sum[0], cell->n_contacts);
 }
 
 /// Does the solution at hand hold with the contacts that have been added to it? They bear no load, so that it has the
 /// velocities of all impulses still, and the residual elsewhere is as it was.
-static bool holds_with_more(bt_world *w)
+static bool holds_with_more(bt_world *world)
 {
-    bt_step_stats *st = &w->stats;
-    const bt_problem p = contact_problem(w);
-    bt_totals t = {.n_sums = 1};
-    bt_phases_any_order(w, residual_of_more, &p, &t);
-    bt_domain_reduce(w, &t);
-    st->residual_checks += (int64_t)bt_sum_value(&t.sum[0]);
-    if (!(t.most <= p.tolerance)) return false;
-    st->residual = bt_max(st->residual, t.most);
+    bt_step_stats *st = &world->stats;
+    const bt_problem problem = contact_problem(world);
+    bt_totals totals = {.n_sums = 1};
+    bt_phases_any_order(world, residual_of_more, &problem, &totals);
+    bt_domain_reduce(world, &totals);
+    st->residual_checks += (int64_t)bt_sum_value(&totals.sum[0]);
+    if (!(totals.most <= problem.tolerance)) return false;
+    st->residual = bt_max(st->residual, totals.most);
     return true;
 }
 
-static void sweep_to_tolerance(bt_world *w)
+static void sweep_to_tolerance(bt_world *world)
 {
-    bt_step_stats *st = &w->stats;
-    const bt_problem p = contact_problem(w);
+    bt_step_stats *st = &world->stats;
+    const bt_problem problem = contact_problem(world);
     bt_work work = {0};
-    const bool pressed = warm_start(w);
-    bt_rounds_residual(w, &p, BT_BEGINS, &work);
+    const bool pressed = warm_start(world);
+    bt_rounds_residual(world, &problem, BT_BEGINS, &work);
     // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
-    if (pressed && work.residual <= p.tolerance) {
-        bt_rounds_sweep(w, &p, &work);
-        bt_rounds_residual(w, &p, BT_SWEPT, &work);
+    if (pressed && work.residual <= problem.tolerance) {
+        bt_rounds_sweep(world, &problem, &work);
+        bt_rounds_residual(world, &problem, BT_SWEPT, &work);
     }
-    if (work.residual > p.tolerance) bt_rounds_run(w, &p, &work);
+    if (work.residual > problem.tolerance) bt_rounds_run(world, &problem, &work);
     st->sweeps += work.sweeps;
     st->contact_updates += work.updates;
     st->contact_moves += work.moves;
     st->residual_checks += work.checks;
     st->residual = work.residual;
     st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
-    st->converged = work.residual <= p.tolerance;
+    st->converged = work.residual <= problem.tolerance;
 }
 
-static void solve(bt_world *w)
+static void solve(bt_world *world)
 {
-    bt_solver *s = w->solver;
-    if (s->extends && holds_with_more(w)) return;
-    s->rebounds = bt_restitution_begin(w);
+    bt_solver *solver = world->solver;
+    if (solver->extends && holds_with_more(world)) return;
+    solver->rebounds = bt_restitution_begin(world);
     for (;;) {
-        sweep_to_tolerance(w);
-        if (!s->rebounds) break;
-        bt_domain_settle(w, NULL);
-        if (!bt_restitution_lower(w)) break;
-        w->stats.restitution_cut = true;
+        sweep_to_tolerance(world);
+        if (!solver->rebounds) break;
+        bt_domain_settle(world, NULL);
+        if (!bt_restitution_lower(world)) break;
+        world->stats.restitution_cut = true;
     }
 }
 
-void bt_solver_solve(bt_world *w, bool extends)
+void bt_solver_solve(bt_world *world, bool extends)
 {
-    bt_solver *s = w->solver;
-    s->extends = extends && !s->rebounds && !w->par.plain_sweeps;
-    bt_step_stats *st = &w->stats;
+    bt_solver *solver = world->solver;
+    solver->extends = extends && !solver->rebounds && !world->par.plain_sweeps;
+    bt_step_stats *st = &world->stats;
     st->restitution_cut = false;
     // the displacements of the last step are over, and their array is of the bodies that were here then
-    s->shifted = false;
+    solver->shifted = false;
     st->sweeps = st->contact_updates = st->contact_moves = st->residual_checks = 0;
-    if (bt_domain_is_idle(w)) settle(w);
-    bt_domain_solve(w, solve, NULL);
+    if (bt_domain_is_idle(world)) settle(world);
+    bt_domain_solve(world, solve, NULL);
 }

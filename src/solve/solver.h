@@ -55,11 +55,11 @@
 // again with the restitution of that island halved, and again, at last with none, where the work is never positive.
 
 /// Collective. Full restitution for every island; false (and nothing to do) when no contact of this step has any.
-bool bt_restitution_begin(bt_world *w);
+bool bt_restitution_begin(bt_world *world);
 
 /// Collective. Lower the restitution, and the biases, of every island whose contacts did positive work, beyond what
 /// rows solved to the residual may do (λ times the residual, and rounding). True when there was one.
-bool bt_restitution_lower(bt_world *w);
+bool bt_restitution_lower(bt_world *world);
 
 /// A contact that has other rows for a moment (src/solve/project.c).
 typedef struct bt_kept_rows {
@@ -84,7 +84,7 @@ typedef struct bt_solver {
 } bt_solver;
 
 bt_solver *bt_solver_create(void);
-void bt_solver_free(bt_solver *s);
+void bt_solver_free(bt_solver *solver);
 
 /// Collective. Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes U2,
 /// contacts get their impulses, stats the counts. Newton's law of restitution can add energy when several
@@ -92,20 +92,20 @@ void bt_solver_free(bt_solver *s);
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
 /// halved, and again, at last with none, where the work is never positive. `extends`: vel is a solution of this step
 /// before its last detection, which stays where the contacts that were added allow it.
-void bt_solver_solve(bt_world *w, bool extends);
+void bt_solver_solve(bt_world *world, bool extends);
 
 /// Memory that the next step takes anew goes back, for what is written between steps.
-void bt_solver_rest(bt_world *w);
+void bt_solver_rest(bt_world *world);
 
 /// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
-void bt_solver_make_shift(bt_world *w);
+void bt_solver_make_shift(bt_world *world);
 
 /// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
 /// same rows without friction; they move poses and never touch velocities.
-void bt_solver_project(bt_world *w);
+void bt_solver_project(bt_world *world);
 
 /// Collective. After the poses have moved: a second pass where turns have left overlap (solve/project.c). True: there
 /// are displacements, by which alone the poses move once more.
-bool bt_solver_project_again(bt_world *w);
+bool bt_solver_project_again(bt_world *world);
 
 #endif

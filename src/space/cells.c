@@ -11,7 +11,7 @@
 #include "body/bodies.h"
 #include "space/exchange.h"
 
-double bt_margin_most(const bt_world *w) { return 16 * w->par.size; }
+double bt_margin_most(const bt_world *world) { return 16 * world->par.size; }
 
 // Contacts make floes faster within the step. With a fifth more than the speeds before the solve, the margin holds for
 // the solution nearly wherever that matters: of 300 steps of full-scale tows in 80 and 90 % ice, 6 and 8 take sweeps
@@ -20,20 +20,23 @@ double bt_margin_most(const bt_world *w) { return 16 * w->par.size; }
 #define FASTER 1.2
 
 /// The way, m, rounded up to a power of √2, between the slop and the largest margin.
-static double round_up(const bt_world *w, double least)
+static double round_up(const bt_world *world, double least)
 {
-    if (!(least < bt_margin_most(w)) && w->par.size > 0) return bt_margin_most(w);
-    if (!(least > w->par.slop)) return w->par.slop;
+    if (!(least < bt_margin_most(world)) && world->par.size > 0) return bt_margin_most(world);
+    if (!(least > world->par.slop)) return world->par.slop;
     const int k = bt_ceil_2log2(least); // 2^(k/2)
     return ldexp(k & 1 ? 0.70710678118654752440 : 1, (k + (k & 1)) / 2);
 }
 
-double bt_margin_for(const bt_world *w, double s)
+double bt_margin_for(const bt_world *world, double s)
 {
-    return round_up(w, (w->par.plain_sweeps ? 1 : FASTER) * (2 * w->par.dt * s));
+    return round_up(world, (world->par.plain_sweeps ? 1 : FASTER) * (2 * world->par.dt * s));
 }
 
-bool bt_margin_holds(const bt_world *w, double margin, double s) { return round_up(w, 2 * w->par.dt * s) <= margin; }
+bool bt_margin_holds(const bt_world *world, double margin, double s)
+{
+    return round_up(world, 2 * world->par.dt * s) <= margin;
+}
 
 // --- the cells -------------------------------------------------------------------------------------------------------
 
@@ -41,86 +44,86 @@ bool bt_margin_holds(const bt_world *w, double margin, double s) { return round_
 
 bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 
-static void free_work(bt_work_list *k)
+static void free_work(bt_work_list *work)
 {
-    free(k->list);
-    k->list = NULL;
-    k->in_place = NULL;
-    k->n_list = k->cap_list = k->n_last = 0;
+    free(work->list);
+    work->list = NULL;
+    work->in_place = NULL;
+    work->n_list = work->cap_list = work->n_last = 0;
 }
 
-void bt_cells_make_room(bt_cell *t, size_t bytes)
+void bt_cells_make_room(bt_cell *cell, size_t bytes)
 {
-    if (bytes <= t->contact_bytes) return;
-    free(t->contacts);
-    t->contact_bytes = bytes + bytes / 32;
-    t->contacts = bt_alloc_aligned(t->contact_bytes, 1);
+    if (bytes <= cell->contact_bytes) return;
+    free(cell->contacts);
+    cell->contact_bytes = bytes + bytes / 32;
+    cell->contacts = bt_alloc_aligned(cell->contact_bytes, 1);
 }
 
 /// The contacts into memory of their own.
-static void move_contacts(bt_cell *t, size_t bytes)
+static void move_contacts(bt_cell *cell, size_t bytes)
 {
     bt_contact *contacts = bt_alloc_aligned(bytes, 1);
-    if (t->n_contacts > 0) memcpy(contacts, t->contacts, (size_t)t->n_contacts * sizeof *contacts);
-    free(t->contacts);
-    t->contacts = contacts;
-    t->contact_bytes = bytes;
+    if (cell->n_contacts > 0) memcpy(contacts, cell->contacts, (size_t)cell->n_contacts * sizeof *contacts);
+    free(cell->contacts);
+    cell->contacts = contacts;
+    cell->contact_bytes = bytes;
 }
 
-void *bt_cells_after_contacts(bt_cell *t, size_t bytes)
+void *bt_cells_after_contacts(bt_cell *cell, size_t bytes)
 {
-    const size_t own = (size_t)t->n_contacts * sizeof *t->contacts;
-    if (own + bytes > t->contact_bytes) move_contacts(t, own + bytes + (own + bytes) / 32);
-    return (char *)t->contacts + own;
+    const size_t own = (size_t)cell->n_contacts * sizeof *cell->contacts;
+    if (own + bytes > cell->contact_bytes) move_contacts(cell, own + bytes + (own + bytes) / 32);
+    return (char *)cell->contacts + own;
 }
 
 /// Only the contacts stay.
-static void rest(bt_cell *t)
+static void rest(bt_cell *cell)
 {
-    assert(!t->work.packed);
-    free_work(&t->work);
-    const size_t bytes = (size_t)t->n_contacts * sizeof *t->contacts;
-    if (t->contact_bytes - t->contact_bytes / 8 > bytes) move_contacts(t, bytes);
+    assert(!cell->work.packed);
+    free_work(&cell->work);
+    const size_t bytes = (size_t)cell->n_contacts * sizeof *cell->contacts;
+    if (cell->contact_bytes - cell->contact_bytes / 8 > bytes) move_contacts(cell, bytes);
 }
 
-void bt_cells_rest(bt_cells *t)
+void bt_cells_rest(bt_cells *cells)
 {
-    for (bt_idx k = 0; k < t->n; k++) rest(&t->cell[k]);
+    for (bt_idx k = 0; k < cells->n; k++) rest(&cells->cell[k]);
 }
 
-void bt_cells_idle(bt_cell *t)
+void bt_cells_idle(bt_cell *cell)
 {
-    free(t->search.pairs);
-    free(t->search.near);
-    free(t->contacts);
-    free(t->gaps);
-    free(t->laws.limits);
-    free(t->laws.rises);
-    free_work(&t->work);
-    t->search = (bt_pair_search){0};
-    t->contacts = NULL;
-    t->gaps = NULL;
-    t->laws.limits = NULL;
-    t->laws.rises = NULL;
-    t->contact_bytes = 0;
-    t->n_contacts = t->cap_contacts = t->laws.cap_limits = 0;
-    t->n_points = 0;
-    t->overlap = 0;
+    free(cell->search.pairs);
+    free(cell->search.near);
+    free(cell->contacts);
+    free(cell->gaps);
+    free(cell->laws.limits);
+    free(cell->laws.rises);
+    free_work(&cell->work);
+    cell->search = (bt_pair_search){0};
+    cell->contacts = NULL;
+    cell->gaps = NULL;
+    cell->laws.limits = NULL;
+    cell->laws.rises = NULL;
+    cell->contact_bytes = 0;
+    cell->n_contacts = cell->cap_contacts = cell->laws.cap_limits = 0;
+    cell->n_points = 0;
+    cell->overlap = 0;
 }
 
-static void free_cell(bt_cell *t)
+static void free_cell(bt_cell *cell)
 {
-    bt_cells_idle(t);
-    free(t->laws.memory);
-    *t = (bt_cell){0};
+    bt_cells_idle(cell);
+    free(cell->laws.memory);
+    *cell = (bt_cell){0};
 }
 
-void bt_cells_free(bt_cells *t)
+void bt_cells_free(bt_cells *cells)
 {
-    if (!t) return;
-    for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
-    void *arrays[] = {t->at,   t->speed,   t->bound, t->moved, t->asleep, t->awake,
-                      t->busy, t->is_busy, t->order, t->turn,  t->share,  t->cell,  t};
+    if (!cells) return;
+    for (bt_idx k = 0; k < cells->n; k++) free_cell(&cells->cell[k]);
+    void *arrays[] = {cells->at,   cells->speed,   cells->bound, cells->moved, cells->asleep, cells->awake,
+                      cells->busy, cells->is_busy, cells->order, cells->turn,  cells->share,  cells->cell,  cells};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -131,31 +134,31 @@ static int32_t lower(int32_t p, int32_t q, int32_t n)
     return p < q ? p : q;
 }
 
-void bt_cells_owner(const bt_cells *t, const int32_t p[2], const int32_t q[2], int32_t out[2])
+void bt_cells_owner(const bt_cells *cells, const int32_t p[2], const int32_t q[2], int32_t out[2])
 {
-    out[0] = lower(p[0], q[0], t->wrap_x);
-    out[1] = lower(p[1], q[1], t->wrap_y);
+    out[0] = lower(p[0], q[0], cells->wrap_x);
+    out[1] = lower(p[1], q[1], cells->wrap_y);
 }
 
 // --- busy cells ------------------------------------------------------------------------------------------------------
 
-void bt_cells_wake(bt_cells *t, bt_idx k)
+void bt_cells_wake(bt_cells *cells, bt_idx k)
 {
-    if (t->is_busy[k]) return;
-    t->is_busy[k] = 1;
-    t->busy_sorted = false;
-    t->busy[t->n_busy++] = k;
+    if (cells->is_busy[k]) return;
+    cells->is_busy[k] = 1;
+    cells->busy_sorted = false;
+    cells->busy[cells->n_busy++] = k;
 }
 
-void bt_cells_wake_all(bt_cells *t)
+void bt_cells_wake_all(bt_cells *cells)
 {
-    if (t->n_busy == t->n) return;
-    for (bt_idx k = 0; k < t->n; k++) {
-        t->busy[k] = k;
-        t->is_busy[k] = 1;
+    if (cells->n_busy == cells->n) return;
+    for (bt_idx k = 0; k < cells->n; k++) {
+        cells->busy[k] = k;
+        cells->is_busy[k] = 1;
     }
-    t->n_busy = t->n;
-    t->busy_sorted = true;
+    cells->n_busy = cells->n;
+    cells->busy_sorted = true;
 }
 
 static int ascending(const void *p, const void *q)
@@ -164,39 +167,41 @@ static int ascending(const void *p, const void *q)
     return (a > b) - (a < b);
 }
 
-void bt_cells_sort_busy(bt_cells *t)
+void bt_cells_sort_busy(bt_cells *cells)
 {
-    if (!t->busy_sorted) qsort(t->busy, (size_t)t->n_busy, sizeof *t->busy, ascending);
-    t->busy_sorted = true;
+    if (!cells->busy_sorted) qsort(cells->busy, (size_t)cells->n_busy, sizeof *cells->busy, ascending);
+    cells->busy_sorted = true;
 }
 
-void bt_cells_leave(bt_cells *t)
+void bt_cells_leave(bt_cells *cells)
 {
-    if (!t->still) return;
+    if (!cells->still) return;
     bt_idx kept = 0;
-    for (bt_idx i = 0; i < t->n_busy; i++) {
-        const bt_idx k = t->busy[i];
-        if (k == t->n - 1 || t->asleep[k] != BT_ASLEEP || t->awake[k] || t->bound[k] > 0) {
-            t->busy[kept++] = k;
+    for (bt_idx i = 0; i < cells->n_busy; i++) {
+        const bt_idx k = cells->busy[i];
+        if (k == cells->n - 1 || cells->asleep[k] != BT_ASLEEP || cells->awake[k] || cells->bound[k] > 0) {
+            cells->busy[kept++] = k;
         } else {
-            t->is_busy[k] = 0;
-            t->cell[k].work.swept = false; // as a residual pass would have it: nothing here moved on
+            cells->is_busy[k] = 0;
+            cells->cell[k].work.swept = false; // as a residual pass would have it: nothing here moved on
         }
     }
-    t->n_busy = kept;
+    cells->n_busy = kept;
 }
 
-double bt_cells_outside(const bt_world *w, bt_idx i)
+double bt_cells_outside(const bt_world *world, bt_idx i)
 {
-    const bt_cells *t = w->cells;
+    const bt_cells *cells = world->cells;
     double out = 0;
-    if (t->wrap_x != 1) {
-        const double middle = t->x0 + (w->bodies.cell[i][0] + 0.5) * t->side_x;
-        out = bt_max(out, fabs(bt_nearest_image(w->bodies.pose[i].x - middle, w->par.period_x)) - 0.5 * t->side_x);
+    if (cells->wrap_x != 1) {
+        const double middle = cells->x0 + (world->bodies.cell[i][0] + 0.5) * cells->side_x;
+        out = bt_max(out, fabs(bt_nearest_image(world->bodies.pose[i].x - middle, world->par.period_x)) -
+                     0.5 * cells->side_x);
     }
-    if (t->wrap_y != 1) {
-        const double middle = t->y0 + (w->bodies.cell[i][1] + 0.5) * t->side_y;
-        out = bt_max(out, fabs(bt_nearest_image(w->bodies.pose[i].y - middle, w->par.period_y)) - 0.5 * t->side_y);
+    if (cells->wrap_y != 1) {
+        const double middle = cells->y0 + (world->bodies.cell[i][1] + 0.5) * cells->side_y;
+        out = bt_max(out, fabs(bt_nearest_image(world->bodies.pose[i].y - middle, world->par.period_y)) -
+                     0.5 * cells->side_y);
     }
     return out;
 }
@@ -223,68 +228,70 @@ static int32_t coordinate(double x, double x0, double side, int32_t wrap)
 }
 
 /// Choose the cells for the poses of now and margins up to twice the present one.
-static void choose(bt_world *w, double margin)
+static void choose(bt_world *world, double margin)
 {
-    bt_cells *t = w->cells;
-    const bt_bodies *b = &w->bodies;
+    bt_cells *cells = world->cells;
+    const bt_bodies *bodies = &world->bodies;
     // Box of the floes [0..3], largest radius [4], mass [5], restitution [6] and speed [7], as maxima.
     double most[8] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, 0, 0, 0, 0};
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] == BT_DYNAMIC) most[5] = bt_max(most[5], b->mass[i]);
-        most[6] = bt_max(most[6], b->restitution[i]);
-        most[7] = bt_max(most[7], bt_bodies_speed(w, i, &b->vel[i]));
-        if (b->large[i] || !isfinite(b->pose[i].x + b->pose[i].y)) continue;
-        most[0] = bt_max(most[0], -b->pose[i].x);
-        most[1] = bt_max(most[1], -b->pose[i].y);
-        most[2] = bt_max(most[2], b->pose[i].x);
-        most[3] = bt_max(most[3], b->pose[i].y);
-        most[4] = bt_max(most[4], b->radius[i]);
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (bodies->motion[i] == BT_DYNAMIC) most[5] = bt_max(most[5], bodies->mass[i]);
+        most[6] = bt_max(most[6], bodies->restitution[i]);
+        most[7] = bt_max(most[7], bt_bodies_speed(world, i, &bodies->vel[i]));
+        if (bodies->large[i] || !isfinite(bodies->pose[i].x + bodies->pose[i].y)) continue;
+        most[0] = bt_max(most[0], -bodies->pose[i].x);
+        most[1] = bt_max(most[1], -bodies->pose[i].y);
+        most[2] = bt_max(most[2], bodies->pose[i].x);
+        most[3] = bt_max(most[3], bodies->pose[i].y);
+        most[4] = bt_max(most[4], bodies->radius[i]);
     }
-    if (w->exchange) w->exchange->maxima(w, most, 8);
-    t->reach = most[4];
-    t->heaviest = most[5];
-    t->rebounds = most[6] > 0;
-    t->margin_max = bt_max(2 * bt_max(margin, bt_margin_for(w, most[7])), 0.25 * w->par.size);
+    if (world->exchange) world->exchange->maxima(world, most, 8);
+    cells->reach = most[4];
+    cells->heaviest = most[5];
+    cells->rebounds = most[6] > 0;
+    cells->margin_max = bt_max(2 * bt_max(margin, bt_margin_for(world, most[7])), 0.25 * world->par.size);
     const bool any = most[0] + most[2] >= 0;
-    t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
-    t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);
-    double side = bt_max((w->par.cell > 0 ? w->par.cell : CELL_DIAMETERS) * w->par.size,
-                         2 * t->reach + t->margin_max + 0.5 * w->par.size);
+    cells->x0 = world->par.x0 + (world->par.period_x > 0 ? 0 : world->drift_x);
+    cells->y0 = world->par.y0 + (world->par.period_y > 0 ? 0 : world->drift_y);
+    double side = bt_max((world->par.cell > 0 ? world->par.cell : CELL_DIAMETERS) * world->par.size,
+                         2 * cells->reach + cells->margin_max + 0.5 * world->par.size);
     if (!(side > 0)) side = 1;
     for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 cells a floe, by larger cells
-        t->side_x = side_along(side, w->par.period_x, &t->wrap_x);
-        t->side_y = side_along(side, w->par.period_y, &t->wrap_y);
+        cells->side_x = side_along(side, world->par.period_x, &cells->wrap_x);
+        cells->side_y = side_along(side, world->par.period_y, &cells->wrap_y);
         int32_t low[2] = {0, 0}, high[2] = {0, 0};
         if (any) {
-            low[0] = t->wrap_x ? 0 : coordinate(-most[0], t->x0, t->side_x, 0);
-            low[1] = t->wrap_y ? 0 : coordinate(-most[1], t->y0, t->side_y, 0);
-            high[0] = t->wrap_x ? t->wrap_x - 1 : coordinate(most[2], t->x0, t->side_x, 0);
-            high[1] = t->wrap_y ? t->wrap_y - 1 : coordinate(most[3], t->y0, t->side_y, 0);
+            low[0] = cells->wrap_x ? 0 : coordinate(-most[0], cells->x0, cells->side_x, 0);
+            low[1] = cells->wrap_y ? 0 : coordinate(-most[1], cells->y0, cells->side_y, 0);
+            high[0] = cells->wrap_x ? cells->wrap_x - 1 : coordinate(most[2], cells->x0, cells->side_x, 0);
+            high[1] = cells->wrap_y ? cells->wrap_y - 1 : coordinate(most[3], cells->y0, cells->side_y, 0);
         }
         const double n_x = (double)high[0] - low[0] + 1, n_y = (double)high[1] - low[1] + 1;
-        if (n_x * n_y > 4 * (double)(b->n_global - b->n_kept) + 1024) continue;
-        t->low_x = low[0], t->low_y = low[1];
-        t->n_x = (int32_t)n_x, t->n_y = (int32_t)n_y;
+        if (n_x * n_y > 4 * (double)(bodies->n_global - bodies->n_kept) + 1024) continue;
+        cells->low_x = low[0], cells->low_y = low[1];
+        cells->n_x = (int32_t)n_x, cells->n_y = (int32_t)n_y;
         break;
     }
     // A direction that one cell spans has no neighbours, and no bound on where a centroid stands.
     double slack = INFINITY;
-    if (t->wrap_x != 1) slack = bt_min(slack, t->side_x - 2 * t->reach - t->margin_max);
-    if (t->wrap_y != 1) slack = bt_min(slack, t->side_y - 2 * t->reach - t->margin_max);
-    t->allowance = 0.5 * slack;
+    if (cells->wrap_x != 1) slack = bt_min(slack, cells->side_x - 2 * cells->reach - cells->margin_max);
+    if (cells->wrap_y != 1) slack = bt_min(slack, cells->side_y - 2 * cells->reach - cells->margin_max);
+    cells->allowance = 0.5 * slack;
 }
 
 /// Only a pose that is not a number lies outside the box of the floes.
 static int32_t within(int32_t c, int32_t low, int32_t n) { return c < low ? low : c >= low + n ? low + n - 1 : c; }
 
-static void label(bt_world *w)
+static void label(bt_world *world)
 {
-    const bt_cells *t = w->cells;
-    bt_bodies *b = &w->bodies;
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->large[i]) continue;
-        b->cell[i][0] = within(coordinate(b->pose[i].x, t->x0, t->side_x, t->wrap_x), t->low_x, t->n_x);
-        b->cell[i][1] = within(coordinate(b->pose[i].y, t->y0, t->side_y, t->wrap_y), t->low_y, t->n_y);
+    const bt_cells *cells = world->cells;
+    bt_bodies *bodies = &world->bodies;
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (bodies->large[i]) continue;
+        bodies->cell[i][0] = within(coordinate(bodies->pose[i].x, cells->x0, cells->side_x, cells->wrap_x),
+                                    cells->low_x, cells->n_x);
+        bodies->cell[i][1] = within(coordinate(bodies->pose[i].y, cells->y0, cells->side_y, cells->wrap_y),
+                                    cells->low_y, cells->n_y);
     }
 }
 
@@ -303,124 +310,127 @@ static int by_cell(const void *p, const void *q)
     return a->gid < b->gid ? -1 : a->gid > b->gid;
 }
 
-static void **array_of(bt_bodies *b, int k) { return (void **)((char *)b + bt_body_fields[k].array); }
+static void **array_of(bt_bodies *bodies, int k) { return (void **)((char *)bodies + bt_body_fields[k].array); }
 
 /// Bodies in the order of `from`; vertices, whose number differs, follow.
-static void permute(bt_bodies *b, const sort_key *key)
+static void permute(bt_bodies *bodies, const sort_key *key)
 {
-    const size_t n = (size_t)b->n;
-    for (int k = 0; k < bt_bodies_n_fields(b); k++) {
+    const size_t n = (size_t)bodies->n;
+    for (int k = 0; k < bt_bodies_n_fields(bodies); k++) {
         const size_t size = bt_body_fields[k].size;
-        char *old = *array_of(b, k), *new = bt_alloc_aligned((size_t)b->cap, size);
+        char *old = *array_of(bodies, k), *new = bt_alloc_aligned((size_t)bodies->cap, size);
         for (size_t i = 0; i < n; i++) memcpy(new + i * size, old + (size_t)key[i].from * size, size);
         free(old);
-        *array_of(b, k) = new;
+        *array_of(bodies, k) = new;
     }
-    int64_t *offset = bt_realloc(NULL, (size_t)b->cap + 1, sizeof *offset);
+    int64_t *offset = bt_realloc(NULL, (size_t)bodies->cap + 1, sizeof *offset);
     offset[0] = 0;
-    for (size_t i = 0; i < n; i++) offset[i + 1] = offset[i] + (b->offset[key[i].from + 1] - b->offset[key[i].from]);
+    for (size_t i = 0; i < n; i++)
+        offset[i + 1] = offset[i] + (bodies->offset[key[i].from + 1] - bodies->offset[key[i].from]);
     for (int k = 0; k < bt_n_vertex_fields; k++) {
         const size_t size = bt_vertex_fields[k].size;
-        char **array = (char **)((char *)b + bt_vertex_fields[k].array),
-             *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
+        char **array = (char **)((char *)bodies + bt_vertex_fields[k].array),
+             *new = bt_realloc(NULL, (size_t)bodies->cap_vertices, size);
         for (size_t i = 0; i < n; i++)
-            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size,
+            memcpy(new + (size_t)offset[i] * size, *array + (size_t)bodies->offset[key[i].from] * size,
                    size * (size_t)(offset[i + 1] - offset[i]));
         free(*array);
         *array = new;
     }
-    free(b->offset);
-    b->offset = offset;
+    free(bodies->offset);
+    bodies->offset = offset;
 }
 
-static void sort_bodies(bt_world *w)
+static void sort_bodies(bt_world *world)
 {
-    bt_bodies *b = &w->bodies;
-    bt_cells *t = w->cells;
-    sort_key *key = bt_alloc((size_t)b->n, sizeof *key);
+    bt_bodies *bodies = &world->bodies;
+    bt_cells *cells = world->cells;
+    sort_key *key = bt_alloc((size_t)bodies->n, sizeof *key);
     bool sorted = true;
-    t->n_in_cells = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        key[i] = (sort_key){INT64_MAX, b->gid[i], i};
-        if (!b->large[i]) {
-            key[i].cell = (int64_t)(b->cell[i][1] - t->low_y) * t->n_x + (b->cell[i][0] - t->low_x);
-            t->n_in_cells++;
+    cells->n_in_cells = 0;
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        key[i] = (sort_key){INT64_MAX, bodies->gid[i], i};
+        if (!bodies->large[i]) {
+            key[i].cell = (int64_t)(bodies->cell[i][1] - cells->low_y) * cells->n_x +
+                          (bodies->cell[i][0] - cells->low_x);
+            cells->n_in_cells++;
         }
         sorted = sorted && (i == 0 || by_cell(&key[i - 1], &key[i]) < 0);
     }
     if (!sorted) {
-        qsort(key, (size_t)b->n, sizeof *key, by_cell);
-        permute(b, key);
+        qsort(key, (size_t)bodies->n, sizeof *key, by_cell);
+        permute(bodies, key);
     }
-    for (bt_idx i = 0; i < b->n; i++) b->index_of[b->gid[i]] = i;
+    for (bt_idx i = 0; i < bodies->n; i++) bodies->index_of[bodies->gid[i]] = i;
     free(key);
 }
 
 // --- cells ---------------------------------------------------------------------------------------------------------
 
-static bt_cell *new_cell(bt_cells *t, int32_t x, int32_t y)
+static bt_cell *new_cell(bt_cells *cells, int32_t x, int32_t y)
 {
-    if (t->n == t->cap) {
-        t->cap = t->cap ? t->cap + t->cap / 2 : 64;
-        t->cell = bt_realloc(t->cell, (size_t)t->cap, sizeof *t->cell);
+    if (cells->n == cells->cap) {
+        cells->cap = cells->cap ? cells->cap + cells->cap / 2 : 64;
+        cells->cell = bt_realloc(cells->cell, (size_t)cells->cap, sizeof *cells->cell);
     }
-    bt_cell *cell = &t->cell[t->n++];
+    bt_cell *cell = &cells->cell[cells->n++];
     *cell = (bt_cell){.x = x, .y = y, .right = -1, .above = -1, .diagonal = -1};
     cell->phase = (int8_t)((x & 1) | (y & 1) << 1);
     return cell;
 }
 
 /// A cell for every place of the box that this rank owns or whose bodies it holds; the last one for the large bodies.
-static void make_cells(bt_world *w)
+static void make_cells(bt_world *world)
 {
-    bt_cells *t = w->cells;
-    const bt_bodies *b = &w->bodies;
-    const int64_t n_at = (int64_t)t->n_x * t->n_y;
-    if (n_at > t->cap_at) {
-        t->cap_at = n_at;
-        t->at = bt_realloc(t->at, (size_t)n_at, sizeof *t->at);
+    bt_cells *cells = world->cells;
+    const bt_bodies *bodies = &world->bodies;
+    const int64_t n_at = (int64_t)cells->n_x * cells->n_y;
+    if (n_at > cells->cap_at) {
+        cells->cap_at = n_at;
+        cells->at = bt_realloc(cells->at, (size_t)n_at, sizeof *cells->at);
     }
     bt_idx i = 0;
-    for (int32_t y = 0; y < t->n_y; y++)
-        for (int32_t x = 0; x < t->n_x; x++) {
-            const int32_t tx = x + t->low_x, ty = y + t->low_y;
+    for (int32_t y = 0; y < cells->n_y; y++)
+        for (int32_t x = 0; x < cells->n_x; x++) {
+            const int32_t tx = x + cells->low_x, ty = y + cells->low_y;
             const bt_idx first = i;
-            while (i < t->n_in_cells && b->cell[i][0] == tx && b->cell[i][1] == ty) i++;
-            const bool own = !w->exchange || w->exchange->owns_cell(w, tx, ty);
-            t->at[(int64_t)y * t->n_x + x] = own || i > first ? t->n : -1;
+            while (i < cells->n_in_cells && bodies->cell[i][0] == tx && bodies->cell[i][1] == ty) i++;
+            const bool own = !world->exchange || world->exchange->owns_cell(world, tx, ty);
+            cells->at[(int64_t)y * cells->n_x + x] = own || i > first ? cells->n : -1;
             if (!own && i == first) continue;
-            bt_cell *cell = new_cell(t, tx, ty);
+            bt_cell *cell = new_cell(cells, tx, ty);
             cell->first = first;
             cell->end = i;
             cell->own = own;
         }
-    assert(i == t->n_in_cells);
-    for (bt_idx k = 0; k < t->n; k++) {
-        bt_cell *cell = &t->cell[k];
-        cell->right = bt_cells_at(t, cell->x + 1, cell->y);
-        cell->above = bt_cells_at(t, cell->x, cell->y + 1);
-        cell->diagonal = bt_cells_at(t, cell->x + 1, cell->y + 1);
+    assert(i == cells->n_in_cells);
+    for (bt_idx k = 0; k < cells->n; k++) {
+        bt_cell *cell = &cells->cell[k];
+        cell->right = bt_cells_at(cells, cell->x + 1, cell->y);
+        cell->above = bt_cells_at(cells, cell->x, cell->y + 1);
+        cell->diagonal = bt_cells_at(cells, cell->x + 1, cell->y + 1);
     }
-    bt_cell *large = new_cell(t, 0, 0);
-    large->first = t->n_in_cells;
-    large->end = b->n;
+    bt_cell *large = new_cell(cells, 0, 0);
+    large->first = cells->n_in_cells;
+    large->end = bodies->n;
     large->phase = BT_COLOURS;
-    large->own = !w->exchange || w->exchange->owns_large(w);
-    const size_t n = (size_t)t->n;
-    t->speed = bt_realloc(t->speed, n, sizeof *t->speed);
-    t->bound = bt_realloc(t->bound, n, sizeof *t->bound);
-    t->moved = bt_realloc(t->moved, n, sizeof *t->moved);
-    t->asleep = bt_realloc(t->asleep, n, sizeof *t->asleep);
-    t->awake = bt_realloc(t->awake, n, sizeof *t->awake);
-    t->order = bt_realloc(t->order, n, sizeof *t->order);
-    free(t->turn);
-    t->turn = bt_alloc_aligned(n, sizeof *t->turn);
-    t->n_passes = 0;
-    t->busy = bt_realloc(t->busy, n, sizeof *t->busy);
-    t->is_busy = bt_realloc(t->is_busy, n, sizeof *t->is_busy);
-    for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->asleep[k] = t->awake[k] = 0;
-    t->n_busy = 0;
-    bt_cells_wake_all(t);
+    large->own = !world->exchange || world->exchange->owns_large(world);
+    const size_t n = (size_t)cells->n;
+    cells->speed = bt_realloc(cells->speed, n, sizeof *cells->speed);
+    cells->bound = bt_realloc(cells->bound, n, sizeof *cells->bound);
+    cells->moved = bt_realloc(cells->moved, n, sizeof *cells->moved);
+    cells->asleep = bt_realloc(cells->asleep, n, sizeof *cells->asleep);
+    cells->awake = bt_realloc(cells->awake, n, sizeof *cells->awake);
+    cells->order = bt_realloc(cells->order, n, sizeof *cells->order);
+    free(cells->turn);
+    cells->turn = bt_alloc_aligned(n, sizeof *cells->turn);
+    cells->n_passes = 0;
+    cells->busy = bt_realloc(cells->busy, n, sizeof *cells->busy);
+    cells->is_busy = bt_realloc(cells->is_busy, n, sizeof *cells->is_busy);
+    for (size_t k = 0; k < n; k++)
+        cells->speed[k] = cells->bound[k] = cells->moved[k] = cells->asleep[k] = cells->awake[k] = 0;
+    cells->n_busy = 0;
+    bt_cells_wake_all(cells);
 }
 
 // --- what the contacts were ------------------------------------------------------------------------------------------
@@ -435,83 +445,88 @@ int bt_memory_by_names(const void *p, const void *q)
     return a->law - b->law;
 }
 
-void bt_cells_remember(bt_cell *t, const bt_memory *r)
+void bt_cells_remember(bt_cell *cell, const bt_memory *memory)
 {
-    if (t->laws.n_memory == t->laws.cap_memory) {
-        t->laws.cap_memory = t->laws.cap_memory ? 2 * t->laws.cap_memory : 8;
-        t->laws.memory = bt_realloc(t->laws.memory, (size_t)t->laws.cap_memory, sizeof *t->laws.memory);
+    if (cell->laws.n_memory == cell->laws.cap_memory) {
+        cell->laws.cap_memory = cell->laws.cap_memory ? 2 * cell->laws.cap_memory : 8;
+        cell->laws.memory = bt_realloc(cell->laws.memory, (size_t)cell->laws.cap_memory, sizeof *cell->laws.memory);
     }
-    t->laws.memory[t->laws.n_memory++] = *r;
+    cell->laws.memory[cell->laws.n_memory++] = *memory;
 }
 
-static bt_memory memory_of(const bt_gid *gid, const bt_cell *t, const bt_pair *p)
+static bt_memory memory_of(const bt_gid *gid, const bt_cell *cell, const bt_pair *pair)
 {
-    const bt_contact *u = &t->contacts[p->contact];
-    const bt_gaps *g = &t->gaps[p->contact];
-    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = u->n,
-                      .feature = {g->feature[0], g->feature[1]}, .value = {u->ln[0], u->ln[1], u->lt}};
+    const bt_contact *contact = &cell->contacts[pair->contact];
+    const bt_gaps *gaps = &cell->gaps[pair->contact];
+    return (bt_memory){.a = gid[pair->a], .b = gid[pair->b], .part = {pair->part[0], pair->part[1]},
+                       .n_points = contact->n,
+                      .feature = {gaps->feature[0], gaps->feature[1]},
+                      .value = {contact->ln[0], contact->ln[1], contact->lt}};
 }
 
-bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
+bt_memory *bt_cells_take_memory(const bt_world *world, int64_t *n)
 {
-    const bt_cells *t = w->cells;
+    const bt_cells *cells = world->cells;
     int64_t cap = 0;
-    for (bt_idx k = 0; k < t->n; k++) {
-        for (bt_idx i = 0; t->cell[k].own && i < t->cell[k].search.n_pairs; i++)
-            cap += t->cell[k].search.pairs[i].contact >= 0;
-        if (t->cell[k].own) cap += t->cell[k].laws.n_memory;
+    for (bt_idx k = 0; k < cells->n; k++) {
+        for (bt_idx i = 0; cells->cell[k].own && i < cells->cell[k].search.n_pairs; i++)
+            cap += cells->cell[k].search.pairs[i].contact >= 0;
+        if (cells->cell[k].own) cap += cells->cell[k].laws.n_memory;
     }
     bt_memory *memory = bt_alloc((size_t)cap, sizeof *memory);
     *n = 0;
-    for (bt_idx k = 0; k < t->n; k++) {
-        const bt_cell *cell = &t->cell[k];
+    for (bt_idx k = 0; k < cells->n; k++) {
+        const bt_cell *cell = &cells->cell[k];
         for (bt_idx i = 0; cell->own && i < cell->laws.n_memory; i++) memory[(*n)++] = cell->laws.memory[i];
         for (bt_idx i = 0; cell->own && i < cell->search.n_pairs; i++)
             if (cell->search.pairs[i].contact >= 0)
-                memory[(*n)++] = memory_of(w->bodies.gid, cell, &cell->search.pairs[i]);
+                memory[(*n)++] = memory_of(world->bodies.gid, cell, &cell->search.pairs[i]);
     }
     return memory;
 }
 
-bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b)
+bt_idx bt_cells_of_pair(const bt_world *world, bt_idx a, bt_idx b)
 {
-    const bt_cells *t = w->cells;
-    const bt_bodies *s = &w->bodies;
-    const bool large_a = s->large[a], large_b = s->large[b];
-    if ((large_a && s->motion[a] == BT_DYNAMIC) || (large_b && s->motion[b] == BT_DYNAMIC)) return t->n - 1;
+    const bt_cells *cells = world->cells;
+    const bt_bodies *bodies = &world->bodies;
+    const bool large_a = bodies->large[a], large_b = bodies->large[b];
+    if ((large_a && bodies->motion[a] == BT_DYNAMIC) || (large_b && bodies->motion[b] == BT_DYNAMIC))
+        return cells->n - 1;
     const bt_idx one = large_a ? b : a, other = large_b ? a : b;
     int32_t at[2];
-    bt_cells_owner(t, s->cell[one], s->cell[other], at);
-    return bt_cells_at(t, at[0], at[1]);
+    bt_cells_owner(cells, bodies->cell[one], bodies->cell[other], at);
+    return bt_cells_at(cells, at[0], at[1]);
 }
 
 /// A pair that was in contact into the list of a cell that has had no detection yet.
-static void put_pair(bt_cell *t, bt_idx a, bt_idx b, const bt_memory *r)
+static void put_pair(bt_cell *cell, bt_idx a, bt_idx b, const bt_memory *memory)
 {
-    bt_pair_search *s = &t->search;
-    if (s->n_pairs == s->cap_pairs) {
-        t->cap_contacts = s->cap_pairs = s->cap_pairs ? 2 * s->cap_pairs : 16;
-        s->pairs = bt_realloc(s->pairs, (size_t)s->cap_pairs, sizeof *s->pairs);
-        t->contacts = bt_realloc(t->contacts, (size_t)s->cap_pairs, sizeof *t->contacts); // not aligned: no room here
-        t->gaps = bt_realloc(t->gaps, (size_t)s->cap_pairs, sizeof *t->gaps);
+    bt_pair_search *search = &cell->search;
+    if (search->n_pairs == search->cap_pairs) {
+        cell->cap_contacts = search->cap_pairs = search->cap_pairs ? 2 * search->cap_pairs : 16;
+        search->pairs = bt_realloc(search->pairs, (size_t)search->cap_pairs, sizeof *search->pairs);
+        // not aligned: no room here
+        cell->contacts = bt_realloc(cell->contacts, (size_t)search->cap_pairs, sizeof *cell->contacts);
+        cell->gaps = bt_realloc(cell->gaps, (size_t)search->cap_pairs, sizeof *cell->gaps);
     }
-    const bt_idx at = s->n_pairs++;
-    s->pairs[at] = (bt_pair){.a = a, .b = b, .contact = at, .part = {r->part[0], r->part[1]},
-                             .axes = BT_NO_AXES};
-    t->contacts[at] = (bt_contact){.n = r->n_points, .ln = {r->value[0], r->value[1]}, .lt = r->value[2]};
-    t->gaps[at] = (bt_gaps){.feature = {r->feature[0], r->feature[1]}};
+    const bt_idx at = search->n_pairs++;
+    search->pairs[at] = (bt_pair){.a = a, .b = b, .contact = at, .part = {memory->part[0], memory->part[1]},
+                                  .axes = BT_NO_AXES};
+    cell->contacts[at] = (bt_contact){.n = memory->n_points, .ln = {memory->value[0], memory->value[1]},
+                                      .lt = memory->value[2]};
+    cell->gaps[at] = (bt_gaps){.feature = {memory->feature[0], memory->feature[1]}};
 }
 
 /// Put memory, in any order, into empty cells.
-static void put_memory(bt_world *w, bt_memory *memory, int64_t n)
+static void put_memory(bt_world *world, bt_memory *memory, int64_t n)
 {
-    bt_cells *t = w->cells;
+    bt_cells *cells = world->cells;
     if (n > 0) qsort(memory, (size_t)n, sizeof *memory, bt_memory_by_names);
     for (int64_t k = 0; k < n; k++) {
-        const bt_idx a = bt_world_index(w, memory[k].a), b = bt_world_index(w, memory[k].b);
+        const bt_idx a = bt_world_index(world, memory[k].a), b = bt_world_index(world, memory[k].b);
         // a floe that has shot so far away from a large body that its rank does not hold it any more
         if (a < 0 || b < 0) continue;
-        bt_cell *cell = &t->cell[bt_cells_of_pair(w, a, b)];
+        bt_cell *cell = &cells->cell[bt_cells_of_pair(world, a, b)];
         if (memory[k].law != 0) bt_cells_remember(cell, &memory[k]);
         else put_pair(cell, a, b, &memory[k]);
     }
@@ -523,95 +538,96 @@ static bool adjacent(int32_t p, int32_t q, int32_t n)
     return d <= 1 || n == 1 || (n > 1 && d == n - 1);
 }
 
-bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2])
+bool bt_cells_adjacent(const bt_cells *cells, const int32_t p[2], const int32_t q[2])
 {
-    return adjacent(p[0], q[0], t->wrap_x) && adjacent(p[1], q[1], t->wrap_y);
+    return adjacent(p[0], q[0], cells->wrap_x) && adjacent(p[1], q[1], cells->wrap_y);
 }
 
 /// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the
 /// margin they had (the last solution may be one that did not converge). No cell has both in its block, and no rank may
 /// hold both.
-static void drop_parted(const bt_world *w, bt_memory *memory, int64_t *n)
+static void drop_parted(const bt_world *world, bt_memory *memory, int64_t *n)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     int64_t kept = 0;
     for (int64_t k = 0; k < *n; k++) {
-        const bt_idx i = bt_world_index(w, memory[k].a), j = bt_world_index(w, memory[k].b);
-        const bool one_large = b->large[i] || b->large[j];
-        if (one_large || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j])) memory[kept++] = memory[k];
+        const bt_idx i = bt_world_index(world, memory[k].a), j = bt_world_index(world, memory[k].b);
+        const bool one_large = bodies->large[i] || bodies->large[j];
+        if (one_large || bt_cells_adjacent(world->cells, bodies->cell[i], bodies->cell[j])) memory[kept++] = memory[k];
     }
     *n = kept;
 }
 
 /// Bodies to their ranks and places under the labels they have, and cells around them with this memory, which is
 /// released.
-static void place(bt_world *w, bt_memory *memory, int64_t n)
+static void place(bt_world *world, bt_memory *memory, int64_t n)
 {
-    bt_cells *t = w->cells;
-    for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
-    t->n = 0;
-    if (w->exchange) memory = w->exchange->migrate(w, memory, &n);
-    sort_bodies(w);
-    make_cells(w);
-    put_memory(w, memory, n);
-    if (w->exchange) w->exchange->connect(w);
+    bt_cells *cells = world->cells;
+    for (bt_idx k = 0; k < cells->n; k++) free_cell(&cells->cell[k]);
+    cells->n = 0;
+    if (world->exchange) memory = world->exchange->migrate(world, memory, &n);
+    sort_bodies(world);
+    make_cells(world);
+    put_memory(world, memory, n);
+    if (world->exchange) world->exchange->connect(world);
     free(memory);
-    t->labelled = true;
+    cells->labelled = true;
 }
 
 /// New cells and labels, for this memory, which is released.
-static void renew(bt_world *w, double margin, bt_memory *memory, int64_t n)
+static void renew(bt_world *world, double margin, bt_memory *memory, int64_t n)
 {
-    choose(w, margin);
-    label(w);
-    w->cells->n_labellings++;
-    drop_parted(w, memory, &n);
-    place(w, memory, n);
-    w->cells->relabel = false;
+    choose(world, margin);
+    label(world);
+    world->cells->n_labellings++;
+    drop_parted(world, memory, &n);
+    place(world, memory, n);
+    world->cells->relabel = false;
 }
 
-static void relabel(bt_world *w, double margin)
+static void relabel(bt_world *world, double margin)
 {
     int64_t n;
-    bt_memory *memory = bt_cells_take_memory(w, &n);
-    renew(w, margin, memory, n);
+    bt_memory *memory = bt_cells_take_memory(world, &n);
+    renew(world, margin, memory, n);
 }
 
 /// New owners of the cells there are.
-static void hand_on(bt_world *w)
+static void hand_on(bt_world *world)
 {
     int64_t n;
-    bt_memory *memory = bt_cells_take_memory(w, &n);
-    place(w, memory, n);
-    w->cells->relabel = false;
+    bt_memory *memory = bt_cells_take_memory(world, &n);
+    place(world, memory, n);
+    world->cells->relabel = false;
 }
 
-void bt_cells_change(bt_world *w, bt_bodies_change *change, const void *context)
+void bt_cells_change(bt_world *world, bt_bodies_change *change, const void *context)
 {
     int64_t n;
-    bt_memory *memory = bt_cells_take_memory(w, &n);
-    memory = change(w, memory, &n, context);
-    renew(w, w->par.slop, memory, n);
+    bt_memory *memory = bt_cells_take_memory(world, &n);
+    memory = change(world, memory, &n, context);
+    renew(world, world->par.slop, memory, n);
 }
 
-void bt_cells_restore(bt_world *w, bt_memory *memory, int64_t n) { place(w, memory, n); }
+void bt_cells_restore(bt_world *world, bt_memory *memory, int64_t n) { place(world, memory, n); }
 
-void bt_cells_begin(bt_world *w)
+void bt_cells_begin(bt_world *world)
 {
-    bt_cells *t = w->cells;
-    if (!t->labelled || t->relabel) {
-        if (w->towed >= 0) w->bodies.large[bt_world_towed(w)] = 1; // it has a place of its own, whatever its size
-        relabel(w, w->par.slop);
-    } else if (w->exchange && w->exchange->due(w)) {
-        hand_on(w);
+    bt_cells *cells = world->cells;
+    if (!cells->labelled || cells->relabel) {
+        // it has a place of its own, whatever its size
+        if (world->towed >= 0) world->bodies.large[bt_world_towed(world)] = 1;
+        relabel(world, world->par.slop);
+    } else if (world->exchange && world->exchange->due(world)) {
+        hand_on(world);
     }
-    t->still = w->par.water_u == 0 && w->par.water_v == 0;
-    if (!t->still) bt_cells_wake_all(t);
+    cells->still = world->par.water_u == 0 && world->par.water_v == 0;
+    if (!cells->still) bt_cells_wake_all(cells);
 }
 
-bool bt_cells_update(bt_world *w, double margin)
+bool bt_cells_update(bt_world *world, double margin)
 {
-    if (margin <= w->cells->margin_max) return false;
-    relabel(w, margin);
+    if (margin <= world->cells->margin_max) return false;
+    relabel(world, margin);
     return true;
 }

@@ -48,14 +48,14 @@
 
 /// A floe that crosses more than this in a step is no longer looked ahead for (it is reported as outrun), m: a solution
 /// that flies apart must not ask for cells, and pair lists, of the whole field.
-double bt_margin_most(const bt_world *w);
+double bt_margin_most(const bt_world *world);
 
 /// Margin for bodies whose speed is s before contacts are solved: 2 Δt s and a fifth more, rounded up to a power of √2
 /// so that pair lists stay valid while speeds wander; at least the slop. m
-double bt_margin_for(const bt_world *w, double s);
+double bt_margin_for(const bt_world *world, double s);
 
 /// Is a margin enough for a solution of speed s?
-bool bt_margin_holds(const bt_world *w, double margin, double s);
+bool bt_margin_holds(const bt_world *world, double margin, double s);
 
 /// the fifth phase is the cell of the large movable bodies
 enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
@@ -265,48 +265,48 @@ typedef struct bt_cells {
 } bt_cells;
 
 bt_cells *bt_cells_create(void);
-void bt_cells_free(bt_cells *t);
+void bt_cells_free(bt_cells *cells);
 
 /// Collective. At the start of a step: renew labels, storage and cells if some floe has left its cell too far.
-void bt_cells_begin(bt_world *w);
+void bt_cells_begin(bt_world *world);
 
 /// Collective. The same if the cells are too small for this margin, m. True when renewed: every index of a body has
 /// changed.
-bool bt_cells_update(bt_world *w, double margin);
+bool bt_cells_update(bt_world *world, double margin);
 
 /// What is done to the bodies that this rank holds, and to its memory of contacts [*n], which it takes and returns.
-typedef bt_memory *bt_bodies_change(bt_world *w, bt_memory *memory, int64_t *n, const void *context);
+typedef bt_memory *bt_bodies_change(bt_world *world, bt_memory *memory, int64_t *n, const void *context);
 /// Collective. New labels, storage and cells after bodies have been put in the place of others. Indices change.
-void bt_cells_change(bt_world *w, bt_bodies_change *change, const void *context);
+void bt_cells_change(bt_world *world, bt_bodies_change *change, const void *context);
 
 /// Cell k, or every cell, is looked at from now on.
-void bt_cells_wake(bt_cells *t, bt_idx k);
-void bt_cells_wake_all(bt_cells *t);
+void bt_cells_wake(bt_cells *cells, bt_idx k);
+void bt_cells_wake_all(bt_cells *cells);
 /// The list of busy cells in its order, after some have been woken.
-void bt_cells_sort_busy(bt_cells *t);
+void bt_cells_sort_busy(bt_cells *cells);
 /// Leave out of the list what is at rest, idle, and not moved by contacts.
-void bt_cells_leave(bt_cells *t);
+void bt_cells_leave(bt_cells *cells);
 
 /// Room for so many bytes where the contacts are; what was there is lost when there was less.
-void bt_cells_make_room(bt_cell *t, size_t bytes);
+void bt_cells_make_room(bt_cell *cell, size_t bytes);
 
 /// Room for so many bytes after the contacts, which stay but may be moved; returns where it begins.
-void *bt_cells_after_contacts(bt_cell *t, size_t bytes);
+void *bt_cells_after_contacts(bt_cell *cell, size_t bytes);
 
 /// Give back what sweeps take anew in the next step.
-void bt_cells_rest(bt_cells *t);
+void bt_cells_rest(bt_cells *cells);
 
 /// Take from a cell whose bodies rest what a step needs for its contacts; what contact laws remember stays.
-void bt_cells_idle(bt_cell *t);
+void bt_cells_idle(bt_cell *cell);
 
 /// How far the centroid of body i stands outside its cell, m.
-double bt_cells_outside(const bt_world *w, bt_idx i);
+double bt_cells_outside(const bt_world *world, bt_idx i);
 
 /// Coordinates of the cell that owns the contacts between bodies of cells p and q.
-void bt_cells_owner(const bt_cells *t, const int32_t p[2], const int32_t q[2], int32_t out[2]);
+void bt_cells_owner(const bt_cells *cells, const int32_t p[2], const int32_t q[2], int32_t out[2]);
 
 /// Are cells p and q the same or side by side, around periods too?
-bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2]);
+bool bt_cells_adjacent(const bt_cells *cells, const int32_t p[2], const int32_t q[2]);
 
 /// Coordinate c around a periodic direction of n cells.
 static inline int32_t bt_cells_wrapped(int32_t c, int32_t n) { return ((c % n) + n) % n; }
@@ -316,33 +316,33 @@ static inline int32_t bt_cells_wrapped(int32_t c, int32_t n) { return ((c % n) +
 static inline bt_idx bt_cells_room(bt_idx n) { return n + n / 32 + 1; }
 
 /// Index of the cell at (x, y), −1 = not here.
-static inline bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y)
+static inline bt_idx bt_cells_at(const bt_cells *cells, int32_t x, int32_t y)
 {
-    if ((t->wrap_x == 1 && x != 0) || (t->wrap_y == 1 && y != 0)) return -1;
-    if (t->wrap_x) x = bt_cells_wrapped(x, t->wrap_x);
-    if (t->wrap_y) y = bt_cells_wrapped(y, t->wrap_y);
-    x -= t->low_x, y -= t->low_y;
-    if (x < 0 || y < 0 || x >= t->n_x || y >= t->n_y) return -1;
-    return t->at[(int64_t)y * t->n_x + x];
+    if ((cells->wrap_x == 1 && x != 0) || (cells->wrap_y == 1 && y != 0)) return -1;
+    if (cells->wrap_x) x = bt_cells_wrapped(x, cells->wrap_x);
+    if (cells->wrap_y) y = bt_cells_wrapped(y, cells->wrap_y);
+    x -= cells->low_x, y -= cells->low_y;
+    if (x < 0 || y < 0 || x >= cells->n_x || y >= cells->n_y) return -1;
+    return cells->at[(int64_t)y * cells->n_x + x];
 }
 
 /// May the bodies of cell k have another velocity, or pose, than by drifting with the water?
-static inline bool bt_cells_moves(const bt_cells *t, bt_idx k) { return !t->asleep[k] || t->awake[k]; }
+static inline bool bt_cells_moves(const bt_cells *cells, bt_idx k) { return !cells->asleep[k] || cells->awake[k]; }
 
 /// In the order of (a, b, part, law).
 int bt_memory_by_names(const void *p, const void *q);
 /// Append a record to the memory of a cell.
-void bt_cells_remember(bt_cell *t, const bt_memory *r);
+void bt_cells_remember(bt_cell *cell, const bt_memory *memory);
 
 /// Impulses of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller
 /// frees.
-bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n);
+bt_memory *bt_cells_take_memory(const bt_world *world, int64_t *n);
 /// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds,
 /// have been set, and the memory [n], which is released, is that of all ranks. A domain has been created, but
 /// nothing is distributed yet.
-void bt_cells_restore(bt_world *w, bt_memory *memory, int64_t n);
+void bt_cells_restore(bt_world *world, bt_memory *memory, int64_t n);
 
 /// Cell that owns the contacts of bodies a and b, −1 = not here.
-bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b);
+bt_idx bt_cells_of_pair(const bt_world *world, bt_idx a, bt_idx b);
 
 #endif

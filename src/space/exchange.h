@@ -10,20 +10,20 @@
 
 typedef struct bt_exchange {
     /// Collective. Maxima of x [n] over the ranks.
-    void (*maxima)(const bt_world *w, double *x, int n);
+    void (*maxima)(const bt_world *world, double *x, int n);
     /// Does this rank answer for the contacts of cell (x, y); for those of the large movable bodies?
-    bool (*owns_cell)(const bt_world *w, int32_t x, int32_t y);
-    bool (*owns_large)(const bt_world *w);
+    bool (*owns_cell)(const bt_world *world, int32_t x, int32_t y);
+    bool (*owns_large)(const bt_world *world);
     /// Is a new division due?
-    bool (*due)(const bt_world *w);
+    bool (*due)(const bt_world *world);
     /// Collective. After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they
     /// belong now. Takes and returns the memory.
-    bt_memory *(*migrate)(bt_world *w, bt_memory *memory, int64_t *n);
+    bt_memory *(*migrate)(bt_world *world, bt_memory *memory, int64_t *n);
     /// Collective. After the cells have been made: what is exchanged with whom.
-    void (*connect)(bt_world *w);
+    void (*connect)(bt_world *world);
     /// After a phase: send what its border cells changed in v (an array over the bodies), and receive what others did.
-    void (*send)(bt_world *w, int phase, bt_vel *v);
-    void (*receive)(bt_world *w, int phase, bt_vel *v);
+    void (*send)(bt_world *world, int phase, bt_vel *v);
+    void (*receive)(bt_world *world, int phase, bt_vel *v);
 } bt_exchange;
 
 #endif

@@ -20,25 +20,25 @@
 
 enum { X, Y, LOW_X, LOW_Y, HIGH_X, HIGH_Y, N_BOX };
 
-void bt_pair_scratch_free(bt_pair_scratch *s)
+void bt_pair_scratch_free(bt_pair_scratch *scratch)
 {
-    free(s->box);
-    free(s->body);
-    free(s->found);
-    free(s->name);
-    free(s->shore.found);
-    *s = (bt_pair_scratch){0};
+    free(scratch->box);
+    free(scratch->body);
+    free(scratch->found);
+    free(scratch->name);
+    free(scratch->shore.found);
+    *scratch = (bt_pair_scratch){0};
 }
 
 /// Box of n vertices of body i, from its vertex `part` on.
-static void box_of_part(const bt_bodies *b, bt_idx i, int part, int n, double box[N_BOX])
+static void box_of_part(const bt_bodies *bodies, bt_idx i, int part, int n, double box[N_BOX])
 {
-    box[X] = b->pose[i].x;
-    box[Y] = b->pose[i].y;
+    box[X] = bodies->pose[i].x;
+    box[Y] = bodies->pose[i].y;
     box[LOW_X] = box[LOW_Y] = INFINITY;
     box[HIGH_X] = box[HIGH_Y] = -INFINITY;
     for (int k = part; k < part + n; k++) {
-        const double *v = b->outline + 2 * (b->offset[i] + k);
+        const double *v = bodies->outline + 2 * (bodies->offset[i] + k);
         box[LOW_X] = bt_min(box[LOW_X], v[0]);
         box[LOW_Y] = bt_min(box[LOW_Y], v[1]);
         box[HIGH_X] = bt_max(box[HIGH_X], v[0]);
@@ -46,39 +46,40 @@ static void box_of_part(const bt_bodies *b, bt_idx i, int part, int n, double bo
     }
 }
 
-static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX])
+static void box_of(const bt_bodies *bodies, bt_idx i, double box[N_BOX])
 {
-    box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box);
+    box_of_part(bodies, i, 0, (int)(bodies->offset[i + 1] - bodies->offset[i]), box);
 }
 
 /// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the
 /// nearest image of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole
 /// period.
-static inline bool near(const bt_params *p, const double *a, const double *b, double clearance)
+static inline bool near(const bt_params *par, const double *a, const double *b, double clearance)
 {
-    const double dx = bt_nearest_image(b[X] - a[X], p->period_x), dy = bt_nearest_image(b[Y] - a[Y], p->period_y);
+    const double dx = bt_nearest_image(b[X] - a[X], par->period_x), dy = bt_nearest_image(b[Y] - a[Y], par->period_y);
     return (b[LOW_X] + dx - a[HIGH_X] <= clearance) & (a[LOW_X] - b[HIGH_X] - dx <= clearance) &
            (b[LOW_Y] + dy - a[HIGH_Y] <= clearance) & (a[LOW_Y] - b[HIGH_Y] - dy <= clearance);
 }
 
-static void append_parts(bt_pair_scratch *s, size_t *n, bt_idx a, bt_idx b, int part_a, int part_b)
+static void append_parts(bt_pair_scratch *scratch, size_t *n, bt_idx a, bt_idx b, int part_a, int part_b)
 {
-    if (*n == s->cap_found)
-        s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
-    s->found[(*n)++] = (bt_pair){.a = a, .b = b, .contact = -1, .part = {(uint16_t)part_a, (uint16_t)part_b},
-                                 .axes = BT_NO_AXES};
+    if (*n == scratch->cap_found)
+        scratch->found = bt_realloc(scratch->found, scratch->cap_found = scratch->cap_found
+                                    ? 2 * scratch->cap_found : 256, sizeof *scratch->found);
+    scratch->found[(*n)++] = (bt_pair){.a = a, .b = b, .contact = -1, .part = {(uint16_t)part_a, (uint16_t)part_b},
+                                       .axes = BT_NO_AXES};
 }
 
 /// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.
-static void append(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, bt_idx j, double clearance)
+static void append(const bt_world *world, bt_pair_scratch *scratch, size_t *n, bt_idx i, bt_idx j, double clearance)
 {
-    const bt_bodies *bd = &w->bodies;
+    const bt_bodies *bd = &world->bodies;
     if (bd->motion[i] != BT_DYNAMIC && bd->motion[j] != BT_DYNAMIC) return;
     const bool ordered = bd->gid[i] < bd->gid[j];
     const bt_idx a = ordered ? i : j, b = ordered ? j : i;
     const int first_a = bt_part_first(bd, a), first_b = bt_part_first(bd, b);
     if (first_a == 0 && first_b == 0) {
-        append_parts(s, n, a, b, 0, 0);
+        append_parts(scratch, n, a, b, 0, 0);
         return;
     }
     for (int p = first_a; p >= 0; p = bt_part_next(bd, a, p)) {
@@ -87,49 +88,50 @@ static void append(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, b
         for (int q = first_b; q >= 0; q = bt_part_next(bd, b, q)) {
             double other[N_BOX];
             box_of_part(bd, b, q, bd->mark[bd->offset[b] + q].count, other);
-            if (near(&w->par, box, other, clearance)) append_parts(s, n, a, b, p, q);
+            if (near(&world->par, box, other, clearance)) append_parts(scratch, n, a, b, p, q);
         }
     }
 }
 
 /// Body i, whose box this is, and the polygons of shores whose boxes come within clearance of it.
-static void append_shore(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, const double *box,
+static void append_shore(const bt_world *world, bt_pair_scratch *scratch, size_t *n, bt_idx i, const double *box,
                          double clearance)
 {
-    const bt_bodies *b = &w->bodies;
-    if (!w->shore || b->motion[i] != BT_DYNAMIC) return;
+    const bt_bodies *bodies = &world->bodies;
+    if (!world->shore || bodies->motion[i] != BT_DYNAMIC) return;
     const double low[2] = {box[X] + box[LOW_X] - clearance, box[Y] + box[LOW_Y] - clearance},
                  high[2] = {box[X] + box[HIGH_X] + clearance, box[Y] + box[HIGH_Y] + clearance};
-    bt_shore_near(w, box[X], box[Y], low, high, &s->shore);
-    for (size_t k = 0; k < s->shore.n; k++) {
-        const bt_shore_polygon *p = &s->shore.found[k];
-        const bt_idx l = bt_world_index(w, p->gid);
-        const bool first = b->gid[i] < p->gid;
+    bt_shore_near(world, box[X], box[Y], low, high, &scratch->shore);
+    for (size_t k = 0; k < scratch->shore.n; k++) {
+        const bt_shore_polygon *polygon = &scratch->shore.found[k];
+        const bt_idx l = bt_world_index(world, polygon->gid);
+        const bool first = bodies->gid[i] < polygon->gid;
         double other[N_BOX];
-        box_of_part(b, l, p->part, p->count, other);
-        for (int q = bt_part_first(b, i); q >= 0; q = bt_part_next(b, i, q)) {
+        box_of_part(bodies, l, polygon->part, polygon->count, other);
+        for (int q = bt_part_first(bodies, i); q >= 0; q = bt_part_next(bodies, i, q)) {
             double own[N_BOX];
-            box_of_part(b, i, q, b->mark[b->offset[i] + q].count, own);
-            if (!near(&w->par, own, other, clearance)) continue;
-            append_parts(s, n, first ? i : l, first ? l : i, first ? q : p->part, first ? p->part : q);
+            box_of_part(bodies, i, q, bodies->mark[bodies->offset[i] + q].count, own);
+            if (!near(&world->par, own, other, clearance)) continue;
+            append_parts(scratch, n, first ? i : l, first ? l : i, first ? q : polygon->part,
+                         first ? polygon->part : q);
         }
     }
 }
 
 /// Boxes of the bodies of cell k, after those there are; returns their number then.
-static size_t add_boxes(const bt_world *w, bt_idx k, bt_pair_scratch *s, size_t n)
+static size_t add_boxes(const bt_world *world, bt_idx k, bt_pair_scratch *scratch, size_t n)
 {
     if (k < 0) return n;
-    const bt_cell *t = &w->cells->cell[k];
-    const size_t most = n + (size_t)(t->end - t->first);
-    if (most > s->cap_boxes) {
-        s->cap_boxes = 2 * most;
-        s->box = bt_realloc(s->box, N_BOX * s->cap_boxes, sizeof *s->box);
-        s->body = bt_realloc(s->body, s->cap_boxes, sizeof *s->body);
+    const bt_cell *cell = &world->cells->cell[k];
+    const size_t most = n + (size_t)(cell->end - cell->first);
+    if (most > scratch->cap_boxes) {
+        scratch->cap_boxes = 2 * most;
+        scratch->box = bt_realloc(scratch->box, N_BOX * scratch->cap_boxes, sizeof *scratch->box);
+        scratch->body = bt_realloc(scratch->body, scratch->cap_boxes, sizeof *scratch->body);
     }
-    for (bt_idx i = t->first; i < t->end; i++, n++) {
-        s->body[n] = i;
-        box_of(&w->bodies, i, s->box + N_BOX * n);
+    for (bt_idx i = cell->first; i < cell->end; i++, n++) {
+        scratch->body[n] = i;
+        box_of(&world->bodies, i, scratch->box + N_BOX * n);
     }
     return n;
 }
@@ -138,16 +140,16 @@ static size_t add_boxes(const bt_world *w, bt_idx k, bt_pair_scratch *s, size_t 
 typedef struct { size_t begin, end; } boxes;
 
 /// Box about several boxes, and about the centroid of the first.
-static void box_about(const bt_params *p, const bt_pair_scratch *s, boxes r, double box[N_BOX])
+static void box_about(const bt_params *par, const bt_pair_scratch *scratch, boxes group, double box[N_BOX])
 {
-    const double *first = s->box + N_BOX * r.begin;
+    const double *first = scratch->box + N_BOX * group.begin;
     box[X] = first[X], box[Y] = first[Y];
     box[LOW_X] = box[LOW_Y] = INFINITY;
     box[HIGH_X] = box[HIGH_Y] = -INFINITY;
-    for (size_t i = r.begin; i < r.end; i++) {
-        const double *b = s->box + N_BOX * i;
-        const double dx = bt_nearest_image(b[X] - box[X], p->period_x),
-                     dy = bt_nearest_image(b[Y] - box[Y], p->period_y);
+    for (size_t i = group.begin; i < group.end; i++) {
+        const double *b = scratch->box + N_BOX * i;
+        const double dx = bt_nearest_image(b[X] - box[X], par->period_x),
+                     dy = bt_nearest_image(b[Y] - box[Y], par->period_y);
         box[LOW_X] = bt_min(dx + b[LOW_X], box[LOW_X]); // passes over a NaN
         box[LOW_Y] = bt_min(dy + b[LOW_Y], box[LOW_Y]);
         box[HIGH_X] = bt_max(dx + b[HIGH_X], box[HIGH_X]);
@@ -155,32 +157,32 @@ static void box_about(const bt_params *p, const bt_pair_scratch *s, boxes r, dou
     }
 }
 
-static void swap_boxes(bt_pair_scratch *s, size_t i, size_t j)
+static void swap_boxes(bt_pair_scratch *scratch, size_t i, size_t j)
 {
-    const bt_idx body = s->body[i];
-    s->body[i] = s->body[j], s->body[j] = body;
+    const bt_idx body = scratch->body[i];
+    scratch->body[i] = scratch->body[j], scratch->body[j] = body;
     for (int k = 0; k < N_BOX; k++) {
-        const double x = s->box[N_BOX * i + (size_t)k];
-        s->box[N_BOX * i + (size_t)k] = s->box[N_BOX * j + (size_t)k];
-        s->box[N_BOX * j + (size_t)k] = x;
+        const double x = scratch->box[N_BOX * i + (size_t)k];
+        scratch->box[N_BOX * i + (size_t)k] = scratch->box[N_BOX * j + (size_t)k];
+        scratch->box[N_BOX * j + (size_t)k] = x;
     }
 }
 
-/// Those of r whose boxes come within clearance of another box, which are put in front of the others.
-static boxes in_front(const bt_params *p, bt_pair_scratch *s, boxes r, const double *box, double clearance)
+/// Those of `group` whose boxes come within clearance of another box, which are put in front of the others.
+static boxes in_front(const bt_params *par, bt_pair_scratch *scratch, boxes group, const double *box, double clearance)
 {
-    size_t end = r.begin;
-    for (size_t i = r.begin; i < r.end; i++)
-        if (near(p, box, s->box + N_BOX * i, clearance)) swap_boxes(s, end++, i);
-    return (boxes){r.begin, end};
+    size_t end = group.begin;
+    for (size_t i = group.begin; i < group.end; i++)
+        if (near(par, box, scratch->box + N_BOX * i, clearance)) swap_boxes(scratch, end++, i);
+    return (boxes){group.begin, end};
 }
 
-static void among(const bt_world *w, bt_pair_scratch *s, boxes r, double clearance, size_t *n)
+static void among(const bt_world *world, bt_pair_scratch *scratch, boxes group, double clearance, size_t *n)
 {
-    for (size_t i = r.begin; i < r.end; i++)
-        for (size_t j = i + 1; j < r.end; j++)
-            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance))
-                append(w, s, n, s->body[i], s->body[j], clearance);
+    for (size_t i = group.begin; i < group.end; i++)
+        for (size_t j = i + 1; j < group.end; j++)
+            if (near(&world->par, scratch->box + N_BOX * i, scratch->box + N_BOX * j, clearance))
+                append(world, scratch, n, scratch->body[i], scratch->body[j], clearance);
 }
 
 /// Do bodies of cells side by side, at most three sides apart with what they stand outside, have one nearest image?
@@ -188,49 +190,50 @@ static bool one_image(int32_t wrap) { return wrap == 0 || wrap >= 8; }
 
 /// Pairs of a body of one cell and one of the other. Few of either are near the border: first those are found that come
 /// near the box about all of the other cell, with some room for the rounding of that box.
-static void between(const bt_world *w, bt_pair_scratch *s, boxes p, boxes q, double clearance, size_t *n)
+static void between(const bt_world *world, bt_pair_scratch *scratch, boxes p, boxes q, double clearance, size_t *n)
 {
-    const bt_cells *ts = w->cells;
+    const bt_cells *ts = world->cells;
     if (p.begin == p.end || q.begin == q.end) return;
     if (one_image(ts->wrap_x) && one_image(ts->wrap_y)) {
-        const double wide = clearance + 0.05 * w->par.size;
+        const double wide = clearance + 0.05 * world->par.size;
         double box[N_BOX];
-        box_about(&w->par, s, p, box);
-        q = in_front(&w->par, s, q, box, wide);
+        box_about(&world->par, scratch, p, box);
+        q = in_front(&world->par, scratch, q, box, wide);
         if (q.begin == q.end) return;
-        box_about(&w->par, s, q, box);
-        p = in_front(&w->par, s, p, box, wide);
+        box_about(&world->par, scratch, q, box);
+        p = in_front(&world->par, scratch, p, box, wide);
     }
     for (size_t i = p.begin; i < p.end; i++)
         for (size_t j = q.begin; j < q.end; j++)
-            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance))
-                append(w, s, n, s->body[i], s->body[j], clearance);
+            if (near(&world->par, scratch->box + N_BOX * i, scratch->box + N_BOX * j, clearance))
+                append(world, scratch, n, scratch->body[i], scratch->body[j], clearance);
 }
 
-static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, double clearance, double clearance_large,
-                             bt_pair_scratch *s)
+static size_t pairs_of_block(const bt_world *world, const bt_cell *cell, bt_idx k, double clearance,
+                             double clearance_large, bt_pair_scratch *scratch)
 {
-    const bt_cells *ts = w->cells;
-    const bt_bodies *b = &w->bodies;
+    const bt_cells *ts = world->cells;
+    const bt_bodies *bodies = &world->bodies;
     size_t n = 0;
-    const boxes own = {0, add_boxes(w, k, s, 0)}, right = {own.end, add_boxes(w, t->right, s, own.end)},
-                above = {right.end, add_boxes(w, t->above, s, right.end)},
-                diagonal = {above.end, add_boxes(w, t->diagonal, s, above.end)};
-    among(w, s, own, clearance, &n);
-    between(w, s, own, right, clearance, &n);
-    between(w, s, own, above, clearance, &n);
-    between(w, s, own, diagonal, clearance, &n);
-    between(w, s, right, above, clearance, &n);
-    for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
-        if (b->motion[l] == BT_DYNAMIC || bt_shore_holds(w, l)) continue;
+    const boxes own = {0, add_boxes(world, k, scratch, 0)},
+                right = {own.end, add_boxes(world, cell->right, scratch, own.end)},
+                above = {right.end, add_boxes(world, cell->above, scratch, right.end)},
+                diagonal = {above.end, add_boxes(world, cell->diagonal, scratch, above.end)};
+    among(world, scratch, own, clearance, &n);
+    between(world, scratch, own, right, clearance, &n);
+    between(world, scratch, own, above, clearance, &n);
+    between(world, scratch, own, diagonal, clearance, &n);
+    between(world, scratch, right, above, clearance, &n);
+    for (bt_idx l = ts->n_in_cells; l < bodies->n; l++) {
+        if (bodies->motion[l] == BT_DYNAMIC || bt_shore_holds(world, l)) continue;
         double box[N_BOX];
-        box_of(b, l, box);
+        box_of(bodies, l, box);
         for (size_t i = own.begin; i < own.end; i++)
-            if (near(&w->par, box, s->box + N_BOX * i, clearance_large))
-                append(w, s, &n, l, s->body[i], clearance_large);
+            if (near(&world->par, box, scratch->box + N_BOX * i, clearance_large))
+                append(world, scratch, &n, l, scratch->body[i], clearance_large);
     }
     for (size_t i = own.begin; i < own.end; i++)
-        append_shore(w, s, &n, s->body[i], s->box + N_BOX * i, clearance_large);
+        append_shore(world, scratch, &n, scratch->body[i], scratch->box + N_BOX * i, clearance_large);
     return n;
 }
 
@@ -241,81 +244,83 @@ static int32_t line_at(double distance, double side)
     return (int32_t)bt_max(-fence, bt_min(fence, floor(distance / side)));
 }
 
-bt_cell_range bt_pairs_range(const bt_world *w, bt_idx i, double pad)
+bt_cell_range bt_pairs_range(const bt_world *world, bt_idx i, double pad)
 {
-    const bt_cells *t = w->cells;
+    const bt_cells *cells = world->cells;
     double box[N_BOX];
-    box_of(&w->bodies, i, box);
-    const double x = box[X] - t->x0, y = box[Y] - t->y0;
-    bt_cell_range r = {
-        .x0 = line_at(x + box[LOW_X] - pad, t->side_x), .x1 = line_at(x + box[HIGH_X] + pad, t->side_x),
-        .y0 = line_at(y + box[LOW_Y] - pad, t->side_y), .y1 = line_at(y + box[HIGH_Y] + pad, t->side_y),
+    box_of(&world->bodies, i, box);
+    const double x = box[X] - cells->x0, y = box[Y] - cells->y0;
+    bt_cell_range range = {
+        .x0 = line_at(x + box[LOW_X] - pad, cells->side_x), .x1 = line_at(x + box[HIGH_X] + pad, cells->side_x),
+        .y0 = line_at(y + box[LOW_Y] - pad, cells->side_y), .y1 = line_at(y + box[HIGH_Y] + pad, cells->side_y),
     };
     // Within the cells there are, and each of them once.
-    if (t->wrap_x && r.x1 - r.x0 >= t->wrap_x - 1) r.x0 = 0, r.x1 = t->wrap_x - 1;
-    if (t->wrap_y && r.y1 - r.y0 >= t->wrap_y - 1) r.y0 = 0, r.y1 = t->wrap_y - 1;
-    if (t->wrap_x == 1) r.x0 = r.x1 = 0;
-    if (t->wrap_y == 1) r.y0 = r.y1 = 0;
-    if (!t->wrap_x)
-        r.x0 = r.x0 > t->low_x - 2 ? r.x0 : t->low_x - 2,
-        r.x1 = r.x1 < t->low_x + t->n_x + 1 ? r.x1 : t->low_x + t->n_x + 1;
-    if (!t->wrap_y)
-        r.y0 = r.y0 > t->low_y - 2 ? r.y0 : t->low_y - 2,
-        r.y1 = r.y1 < t->low_y + t->n_y + 1 ? r.y1 : t->low_y + t->n_y + 1;
-    return r;
+    if (cells->wrap_x && range.x1 - range.x0 >= cells->wrap_x - 1) range.x0 = 0, range.x1 = cells->wrap_x - 1;
+    if (cells->wrap_y && range.y1 - range.y0 >= cells->wrap_y - 1) range.y0 = 0, range.y1 = cells->wrap_y - 1;
+    if (cells->wrap_x == 1) range.x0 = range.x1 = 0;
+    if (cells->wrap_y == 1) range.y0 = range.y1 = 0;
+    if (!cells->wrap_x)
+        range.x0 = range.x0 > cells->low_x - 2 ? range.x0 : cells->low_x - 2,
+        range.x1 = range.x1 < cells->low_x + cells->n_x + 1 ? range.x1 : cells->low_x + cells->n_x + 1;
+    if (!cells->wrap_y)
+        range.y0 = range.y0 > cells->low_y - 2 ? range.y0 : cells->low_y - 2,
+        range.y1 = range.y1 < cells->low_y + cells->n_y + 1 ? range.y1 : cells->low_y + cells->n_y + 1;
+    return range;
 }
 
-static size_t pairs_of_large(const bt_world *w, double clearance_small, double clearance_large, bt_pair_scratch *s)
+static size_t pairs_of_large(const bt_world *world, double clearance_small, double clearance_large,
+                             bt_pair_scratch *scratch)
 {
-    const bt_cells *ts = w->cells;
-    const bt_bodies *b = &w->bodies;
+    const bt_cells *ts = world->cells;
+    const bt_bodies *bodies = &world->bodies;
     size_t n = 0;
-    for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
-        if (bt_shore_holds(w, l)) continue;
+    for (bt_idx l = ts->n_in_cells; l < bodies->n; l++) {
+        if (bt_shore_holds(world, l)) continue;
         double box[N_BOX];
-        box_of(b, l, box);
-        append_shore(w, s, &n, l, box, clearance_large);
-        for (bt_idx o = l + 1; o < b->n; o++) {
-            if (bt_shore_holds(w, o)) continue;
+        box_of(bodies, l, box);
+        append_shore(world, scratch, &n, l, box, clearance_large);
+        for (bt_idx o = l + 1; o < bodies->n; o++) {
+            if (bt_shore_holds(world, o)) continue;
             double other[N_BOX];
-            box_of(b, o, other);
-            if (near(&w->par, box, other, clearance_large)) append(w, s, &n, l, o, clearance_large);
+            box_of(bodies, o, other);
+            if (near(&world->par, box, other, clearance_large)) append(world, scratch, &n, l, o, clearance_large);
         }
-        if (b->motion[l] != BT_DYNAMIC) continue;
-        const bt_cell_range r = bt_pairs_range(w, l, clearance_small + ts->reach + ts->allowance);
-        for (int32_t y = r.y0; y <= r.y1; y++)
-            for (int32_t x = r.x0; x <= r.x1; x++) {
+        if (bodies->motion[l] != BT_DYNAMIC) continue;
+        const bt_cell_range range = bt_pairs_range(world, l, clearance_small + ts->reach + ts->allowance);
+        for (int32_t y = range.y0; y <= range.y1; y++)
+            for (int32_t x = range.x0; x <= range.x1; x++) {
                 const bt_idx k = bt_cells_at(ts, x, y);
                 if (k < 0) continue;
-                const size_t end = add_boxes(w, k, s, 0);
+                const size_t end = add_boxes(world, k, scratch, 0);
                 for (size_t i = 0; i < end; i++)
-                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small))
-                        append(w, s, &n, l, s->body[i], clearance_small);
+                    if (near(&world->par, box, scratch->box + N_BOX * i, clearance_small))
+                        append(world, scratch, &n, l, scratch->body[i], clearance_small);
             }
     }
     return n;
 }
 
-static bt_named name_of(const bt_gid *gid, const bt_pair *p, size_t at)
+static bt_named name_of(const bt_gid *gid, const bt_pair *pair, size_t at)
 {
-    return (bt_named){gid[p->a], gid[p->b], (uint32_t)p->part[0] << 16 | p->part[1], (uint32_t)at};
+    return (bt_named){gid[pair->a], gid[pair->b], (uint32_t)pair->part[0] << 16 | pair->part[1], (uint32_t)at};
 }
 
 /// What the old list knew of the pairs that stay: both lists are sorted, one walk matches them.
-static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
+static void replace(bt_world *world, bt_cell *cell, bt_pair_scratch *scratch, size_t n)
 {
-    const bt_gid *gid = w->bodies.gid;
-    bt_pair_search *of = &t->search;
-    if (n > s->cap_names) s->name = bt_realloc(s->name, 2 * (s->cap_names = 2 * n), sizeof *s->name);
-    for (size_t i = 0; i < n; i++) s->name[i] = name_of(gid, &s->found[i], i);
-    bt_named_sort(s->name, s->name + s->cap_names, n);
+    const bt_gid *gid = world->bodies.gid;
+    bt_pair_search *of = &cell->search;
+    if (n > scratch->cap_names)
+        scratch->name = bt_realloc(scratch->name, 2 * (scratch->cap_names = 2 * n), sizeof *scratch->name);
+    for (size_t i = 0; i < n; i++) scratch->name[i] = name_of(gid, &scratch->found[i], i);
+    bt_named_sort(scratch->name, scratch->name + scratch->cap_names, n);
     bt_pair *list = bt_realloc(NULL, n, sizeof *list);
     bt_idx k = 0;
     for (size_t i = 0; i < n; i++) {
         bt_named old = {0};
-        while (k < of->n_pairs && (old = name_of(gid, &of->pairs[k], 0), bt_named_before(&old, &s->name[i]))) k++;
-        const bool stays = k < of->n_pairs && !bt_named_before(&s->name[i], &old);
-        list[i] = stays ? of->pairs[k] : s->found[s->name[i].at];
+        while (k < of->n_pairs && (old = name_of(gid, &of->pairs[k], 0), bt_named_before(&old, &scratch->name[i]))) k++;
+        const bool stays = k < of->n_pairs && !bt_named_before(&scratch->name[i], &old);
+        list[i] = stays ? of->pairs[k] : scratch->found[scratch->name[i].at];
     }
     free(of->pairs);
     of->pairs = list;
@@ -323,60 +328,62 @@ static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
 }
 
 /// What moves the bodies of the pairs of cell k, m: of its four cells, or of any for the last one; and large bodies.
-static void paths_of(const bt_world *w, bt_idx k, const bt_cell *t, double moved[4], double *large)
+static void paths_of(const bt_world *world, bt_idx k, const bt_cell *cell, double moved[4], double *large)
 {
-    const bt_cells *ts = w->cells;
+    const bt_cells *ts = world->cells;
     const bool last = k == ts->n - 1;
-    const bt_idx block[4] = {k, t->right, t->above, t->diagonal};
+    const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
     for (int i = 0; i < 4; i++) moved[i] = last ? ts->moved_any : block[i] >= 0 ? ts->moved[block[i]] : 0;
     *large = ts->moved[ts->n - 1];
 }
 
-double bt_pairs_near_gap(const bt_world *w) { return 0.05 * w->par.size; }
+double bt_pairs_near_gap(const bt_world *world) { return 0.05 * world->par.size; }
 
-bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin)
+bool bt_pairs_near(const bt_world *world, bt_idx k, bt_cell *cell, double margin)
 {
     double moved[4], large, most;
-    paths_of(w, k, t, moved, &large);
-    most = large - t->search.large_near;
-    for (int i = 0; i < 4; i++) most = bt_max(most, moved[i] - t->search.moved_near[i]);
+    paths_of(world, k, cell, moved, &large);
+    most = large - cell->search.large_near;
+    for (int i = 0; i < 4; i++) most = bt_max(most, moved[i] - cell->search.moved_near[i]);
     // A hundredth is for the rounding of sums of paths.
-    if (t->search.near_known && 2 * most + margin - t->search.margin_near <= 0.99 * bt_pairs_near_gap(w)) return true;
-    memcpy(t->search.moved_near, moved, sizeof moved);
-    t->search.large_near = large;
-    t->search.margin_near = margin;
-    t->search.n_near = 0;
-    t->search.near_known = true;
+    if (cell->search.near_known && 2 * most + margin - cell->search.margin_near <= 0.99 * bt_pairs_near_gap(world))
+        return true;
+    memcpy(cell->search.moved_near, moved, sizeof moved);
+    cell->search.large_near = large;
+    cell->search.margin_near = margin;
+    cell->search.n_near = 0;
+    cell->search.near_known = true;
     return false;
 }
 
-void bt_pairs_add_near(bt_cell *t, bt_idx i)
+void bt_pairs_add_near(bt_cell *cell, bt_idx i)
 {
-    if (t->search.n_near == t->search.cap_near) {
-        t->search.cap_near += t->search.cap_near / 8 + 4;
-        t->search.near = bt_realloc(t->search.near, (size_t)t->search.cap_near, sizeof *t->search.near);
+    if (cell->search.n_near == cell->search.cap_near) {
+        cell->search.cap_near += cell->search.cap_near / 8 + 4;
+        cell->search.near = bt_realloc(cell->search.near, (size_t)cell->search.cap_near, sizeof *cell->search.near);
     }
-    t->search.near[t->search.n_near++] = i;
+    cell->search.near[cell->search.n_near++] = i;
 }
 
-void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_scratch *s)
+void bt_pairs_update(bt_world *world, bt_idx k, bt_cell *cell, double margin, bt_pair_scratch *scratch)
 {
-    bt_cells *ts = w->cells;
+    bt_cells *ts = world->cells;
     const bool last = k == ts->n - 1;
-    const double skin = 0.2 * w->par.size, skin_large = w->par.size;
+    const double skin = 0.2 * world->par.size, skin_large = world->par.size;
     double moved[4], large_moved;
-    paths_of(w, k, t, moved, &large_moved);
-    bool stale = !t->search.listed || margin > t->search.margin_listed ||
-                 large_moved - t->search.large_listed > 0.5 * skin_large;
-    for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - t->search.moved_listed[i] > 0.5 * skin;
+    paths_of(world, k, cell, moved, &large_moved);
+    bool stale = !cell->search.listed || margin > cell->search.margin_listed ||
+                 large_moved - cell->search.large_listed > 0.5 * skin_large;
+    for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - cell->search.moved_listed[i] > 0.5 * skin;
     if (!stale) return;
     const double large = margin + 0.5 * skin + 0.5 * skin_large;
     const size_t n =
-        last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
-    replace(w, t, s, n);
-    t->search.listed = true;
-    t->search.margin_listed = margin;
-    t->search.near_known = false;
-    t->search.large_listed = large_moved;
-    memcpy(t->search.moved_listed, moved, sizeof moved);
+        last ? pairs_of_large(world, large, margin + skin_large, scratch)
+             : pairs_of_block(world, cell, k, margin + skin, large, scratch);
+    replace(world, cell, scratch, n);
+    cell->search.listed = true;
+    cell->search.margin_listed = margin;
+    cell->search.near_known = false;
+    cell->search.large_listed = large_moved;
+    memcpy(cell->search.moved_listed, moved, sizeof moved);
 }

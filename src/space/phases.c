@@ -22,89 +22,91 @@ static void totals_merge(bt_totals *into, const bt_totals *from)
 // --- who does what ---------------------------------------------------------------------------------------------------
 
 /// Has this rank work in cell k?
-static bool has_work(const bt_world *w, bt_idx k)
+static bool has_work(const bt_world *world, bt_idx k)
 {
-    const bt_cells *t = w->cells;
-    return t->cell[k].own && (t->cell[k].n_contacts > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
+    const bt_cells *cells = world->cells;
+    return cells->cell[k].own && (cells->cell[k].n_contacts > 0 || (k == cells->n - 1 && bt_tow_has_line(world->tow)));
 }
 
 /// Stretches of cells [begin, end) of the order with equal parts of the listed contacts, one a share. A cell itself
 /// costs something, too.
-static void deal_stretch(bt_cells *t, bt_idx begin, bt_idx end, bt_share *share)
+static void deal_stretch(bt_cells *cells, bt_idx begin, bt_idx end, bt_share *share)
 {
     enum { CELL = 4 }; // contacts
     int64_t all = 0, before = 0;
-    for (bt_idx i = begin; i < end; i++) all += CELL + t->cell[t->order[i]].work.n_list;
+    for (bt_idx i = begin; i < end; i++) all += CELL + cells->cell[cells->order[i]].work.n_list;
     bt_idx i = begin;
-    for (bt_idx s = 0; s < t->n_shares; s++) {
+    for (bt_idx s = 0; s < cells->n_shares; s++) {
         share[s].begin = i;
-        for (; i < end && before * t->n_shares < all * (s + 1); i++) before += CELL + t->cell[t->order[i]].work.n_list;
+        for (; i < end && before * cells->n_shares < all * (s + 1); i++)
+            before += CELL + cells->cell[cells->order[i]].work.n_list;
         share[s].end = i;
     }
-    share[t->n_shares - 1].end = end;
+    share[cells->n_shares - 1].end = end;
 }
 
-void bt_phases_distribute(bt_world *w)
+void bt_phases_distribute(bt_world *world)
 {
-    bt_cells *t = w->cells;
+    bt_cells *cells = world->cells;
     int64_t listed = 0;
-    for (bt_idx i = 0; i < t->n_order; i++) listed += t->cell[t->order[i]].work.n_list;
+    for (bt_idx i = 0; i < cells->n_order; i++) listed += cells->cell[cells->order[i]].work.n_list;
     const bt_idx n = BT_MANY(listed, BT_FEW_CONTACTS) ? omp_get_max_threads() : 1;
-    if (n > t->cap_shares) {
-        free(t->share);
-        t->share = bt_alloc_aligned(BT_STRETCHES * (size_t)n, sizeof *t->share);
-        t->cap_shares = n;
+    if (n > cells->cap_shares) {
+        free(cells->share);
+        cells->share = bt_alloc_aligned(BT_STRETCHES * (size_t)n, sizeof *cells->share);
+        cells->cap_shares = n;
     }
-    t->n_shares = n;
+    cells->n_shares = n;
     for (int p = 0; p < BT_PHASES; p++) {
-        const bt_idx middle = t->start[p] + t->n_border[p];
-        deal_stretch(t, t->start[p], middle, &t->share[2 * p * n]);
-        deal_stretch(t, middle, t->start[p + 1], &t->share[(2 * p + 1) * n]);
+        const bt_idx middle = cells->start[p] + cells->n_border[p];
+        deal_stretch(cells, cells->start[p], middle, &cells->share[2 * p * n]);
+        deal_stretch(cells, middle, cells->start[p + 1], &cells->share[(2 * p + 1) * n]);
     }
 }
 
 /// Stretch of the order that cell k belongs to: of each phase first the cells at the border of the rank.
-static int stretch_of(const bt_world *w, bt_idx k)
+static int stretch_of(const bt_world *world, bt_idx k)
 {
-    const bt_cell *cell = &w->cells->cell[k];
-    return 2 * cell->phase + !(w->exchange && cell->border);
+    const bt_cell *cell = &world->cells->cell[k];
+    return 2 * cell->phase + !(world->exchange && cell->border);
 }
 
 /// List the cells around cell k that share bodies with it and are visited before it.
-static void find_before(const bt_world *w, bt_idx k)
+static void find_before(const bt_world *world, bt_idx k)
 {
-    const bt_cells *t = w->cells;
-    const bt_cell *cell = &t->cell[k];
-    bt_turn *turn = &t->turn[k];
+    const bt_cells *cells = world->cells;
+    const bt_cell *cell = &cells->cell[k];
+    bt_turn *turn = &cells->turn[k];
     turn->n_before = 0;
-    for (int j = 0; j < 9 && k < t->n - 1; j++) {
-        const bt_idx o = bt_cells_at(t, cell->x + j % 3 - 1, cell->y + j / 3 - 1);
-        if (o < 0 || !t->is_busy[o] || !has_work(w, o) || t->cell[o].phase >= cell->phase) continue;
+    for (int j = 0; j < 9 && k < cells->n - 1; j++) {
+        const bt_idx o = bt_cells_at(cells, cell->x + j % 3 - 1, cell->y + j / 3 - 1);
+        if (o < 0 || !cells->is_busy[o] || !has_work(world, o) || cells->cell[o].phase >= cell->phase) continue;
         turn->before[turn->n_before++] = o;
     }
 }
 
-void bt_phases_order(bt_world *w)
+void bt_phases_order(bt_world *world)
 {
-    bt_cells *t = w->cells;
+    bt_cells *cells = world->cells;
     bt_idx at[BT_STRETCHES + 1] = {0};
-    t->n_contacts = 0;
-    for (bt_idx j = 0; j < t->n_busy; j++) at[stretch_of(w, t->busy[j]) + 1] += has_work(w, t->busy[j]);
+    cells->n_contacts = 0;
+    for (bt_idx j = 0; j < cells->n_busy; j++)
+        at[stretch_of(world, cells->busy[j]) + 1] += has_work(world, cells->busy[j]);
     for (int s = 0; s < BT_STRETCHES; s++) at[s + 1] += at[s];
     for (int p = 0; p < BT_PHASES; p++) {
-        t->start[p] = at[2 * p];
-        t->n_border[p] = at[2 * p + 1] - at[2 * p];
+        cells->start[p] = at[2 * p];
+        cells->n_border[p] = at[2 * p + 1] - at[2 * p];
     }
-    t->start[BT_PHASES] = t->n_order = at[BT_STRETCHES];
-    for (bt_idx j = 0; j < t->n_busy; j++) {
-        const bt_idx k = t->busy[j];
-        if (!has_work(w, k)) continue;
-        t->order[at[stretch_of(w, k)]++] = k;
-        find_before(w, k);
-        t->n_contacts += t->cell[k].n_contacts;
-        t->cell[k].work.n_list = t->cell[k].n_contacts; // until they are listed
+    cells->start[BT_PHASES] = cells->n_order = at[BT_STRETCHES];
+    for (bt_idx j = 0; j < cells->n_busy; j++) {
+        const bt_idx k = cells->busy[j];
+        if (!has_work(world, k)) continue;
+        cells->order[at[stretch_of(world, k)]++] = k;
+        find_before(world, k);
+        cells->n_contacts += cells->cell[k].n_contacts;
+        cells->cell[k].work.n_list = cells->cell[k].n_contacts; // until they are listed
     }
-    bt_phases_distribute(w);
+    bt_phases_distribute(world);
 }
 
 // --- passes ----------------------------------------------------------------------------------------------------------
@@ -126,173 +128,173 @@ typedef struct pass {
 } pass;
 
 /// A pass over the cells with work.
-static pass in_order(bt_world *w, bt_visit *visit, const void *context)
+static pass in_order(bt_world *world, bt_visit *visit, const void *context)
 {
-    bt_cells *t = w->cells;
-    return (pass){.w = w,
-                  .list = t->order,
-                  .share = t->share,
+    bt_cells *cells = world->cells;
+    return (pass){.w = world,
+                  .list = cells->order,
+                  .share = cells->share,
                   .n_stretches = BT_STRETCHES,
-                  .n_shares = t->n_shares,
+                  .n_shares = cells->n_shares,
                   .visit = visit,
                   .context = context,
                   .team = 1};
 }
 
 /// Waits until cell k has been visited in this pass.
-static void wait_for_cell(const pass *o, bt_idx k)
+static void wait_for_cell(const pass *mine, bt_idx k)
 {
     enum { TURNS = 2000 }; // some 50 µs: longer than a cell takes, unless its thread has lost its processor
-    for (int n = 0; atomic_load_explicit(&o->w->cells->turn[k].done, memory_order_acquire) != o->number; n++)
+    for (int n = 0; atomic_load_explicit(&mine->w->cells->turn[k].done, memory_order_acquire) != mine->number; n++)
         if (n > TURNS) sched_yield();
 }
 
-static void visit_cell(const pass *o, bt_idx k)
+static void visit_cell(const pass *mine, bt_idx k)
 {
-    bt_turn *turn = &o->w->cells->turn[k];
-    const bool waits = o->team > 1 && o->number;
-    for (bt_idx j = 0; waits && j < turn->n_before; j++) wait_for_cell(o, turn->before[j]);
-    o->visit(o->w, k, o->context, o->own);
-    if (waits) atomic_store_explicit(&turn->done, o->number, memory_order_release);
+    bt_turn *turn = &mine->w->cells->turn[k];
+    const bool waits = mine->team > 1 && mine->number;
+    for (bt_idx j = 0; waits && j < turn->n_before; j++) wait_for_cell(mine, turn->before[j]);
+    mine->visit(mine->w, k, mine->context, mine->own);
+    if (waits) atomic_store_explicit(&turn->done, mine->number, memory_order_release);
 }
 
 /// Cells of one stretch of the list: first those of this thread's share, then what others have
 /// not yet taken.
-static void visit_stretch(pass *o, int stretch)
+static void visit_stretch(pass *mine, int stretch)
 {
-    bt_share *share = &o->share[stretch * o->n_shares];
-    for (bt_idx n = 0; n < o->n_shares; n++) {
-        bt_share *s = &share[(o->me + n) % o->n_shares];
+    bt_share *share = &mine->share[stretch * mine->n_shares];
+    for (bt_idx n = 0; n < mine->n_shares; n++) {
+        bt_share *s = &share[(mine->me + n) % mine->n_shares];
         for (;;) {
             if (atomic_load_explicit(&s->next, memory_order_relaxed) >= s->end) break;
             const bt_idx i = atomic_fetch_add_explicit(&s->next, 1, memory_order_relaxed);
             if (i >= s->end) break;
-            visit_cell(o, o->list[i]);
+            visit_cell(mine, mine->list[i]);
         }
     }
 }
 
 /// Waits for the other threads.
-static void wait_for_team(const pass *o)
+static void wait_for_team(const pass *mine)
 {
-    if (o->team == 1) return;
+    if (mine->team == 1) return;
 #pragma omp barrier
 }
 
 /// All busy cells, a stretch of them for each thread.
-static void visit_before(pass *o)
+static void visit_before(pass *mine)
 {
-    if (!o->before) return;
-    const bt_cells *t = o->w->cells;
-    const int64_t n = t->n_busy;
-    for (int64_t j = n * o->me / o->team, end = n * (o->me + 1) / o->team; j < end; j++)
-        o->before->visit(o->w, t->busy[j], o->before->context, NULL);
-    wait_for_team(o);
+    if (!mine->before) return;
+    const bt_cells *cells = mine->w->cells;
+    const int64_t n = cells->n_busy;
+    for (int64_t j = n * mine->me / mine->team, end = n * (mine->me + 1) / mine->team; j < end; j++)
+        mine->before->visit(mine->w, cells->busy[j], mine->before->context, NULL);
+    wait_for_team(mine);
 }
 
-static void run_phases(pass *o)
+static void run_phases(pass *mine)
 {
-    bt_world *w = o->w;
-    const bool among = w->exchange != NULL, sends = among && o->exchanged && o->me == 0;
-    const bt_cells *t = w->cells;
-    visit_before(o);
+    bt_world *world = mine->w;
+    const bool among = world->exchange != NULL, sends = among && mine->exchanged && mine->me == 0;
+    const bt_cells *cells = world->cells;
+    visit_before(mine);
     for (int p = 0; p < BT_PHASES; p++) {
-        if (p == BT_COLOURS && t->start[p] < t->start[p + 1]) wait_for_team(o);
+        if (p == BT_COLOURS && cells->start[p] < cells->start[p + 1]) wait_for_team(mine);
         if (among) {
-            visit_stretch(o, 2 * p);
-            wait_for_team(o);
-            if (sends) w->exchange->send(w, p, o->exchanged);
+            visit_stretch(mine, 2 * p);
+            wait_for_team(mine);
+            if (sends) world->exchange->send(world, p, mine->exchanged);
         }
-        visit_stretch(o, 2 * p + 1);
-        if (sends) w->exchange->receive(w, p, o->exchanged);
-        if (among) wait_for_team(o);
+        visit_stretch(mine, 2 * p + 1);
+        if (sends) world->exchange->receive(world, p, mine->exchanged);
+        if (among) wait_for_team(mine);
     }
 }
 
-static void run_stretches(pass *o)
+static void run_stretches(pass *mine)
 {
-    for (int s = 0; s < o->n_stretches; s++) visit_stretch(o, s);
+    for (int s = 0; s < mine->n_stretches; s++) visit_stretch(mine, s);
 }
 
 /// The pass on all threads. One thread goes without OpenMP: in libgomp a team of one and each of its barriers enter the
-/// kernel too, to wake nobody, which was a sixth of the time of a small run. It adds to t itself: to clear, copy and
-/// merge totals of its own costs as much as a small cell.
-static void run_on_team(void run(pass *), pass *o, bt_totals *t)
+/// kernel too, to wake nobody, which was a sixth of the time of a small run. It adds to `totals` itself: to clear, copy
+/// and merge totals of its own costs as much as a small cell.
+static void run_on_team(void run(pass *), pass *o, bt_totals *totals)
 {
     for (bt_idx s = 0; s < o->n_stretches * o->n_shares; s++)
         atomic_store_explicit(&o->share[s].next, o->share[s].begin, memory_order_relaxed);
     if (o->n_shares == 1) {
-        o->own = t;
+        o->own = totals;
         run(o);
         return;
     }
     const double t0 = bt_clock();
 #pragma omp parallel num_threads(o->n_shares)
     {
-        bt_totals own = {.n_sums = t->n_sums, .most = t->most, .most2 = t->most2};
+        bt_totals own = {.n_sums = totals->n_sums, .most = totals->most, .most2 = totals->most2};
         pass mine = *o;
         mine.me = omp_get_thread_num();
         mine.team = omp_get_num_threads();
         mine.own = &own;
         run(&mine);
 #pragma omp critical
-        totals_merge(t, &own);
+        totals_merge(totals, &own);
     }
     o->w->stats.in_team += bt_clock() - t0;
 }
 
 /// The reference: what the schedule above comes to, without threads, shares, or an exchange under way.
-static void run_plain(bt_world *w, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
-                      bt_totals *t)
+static void run_plain(bt_world *world, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
+                      bt_totals *totals)
 {
-    const bt_cells *cs = w->cells;
-    for (bt_idx j = 0; before && j < cs->n_busy; j++) before->visit(w, cs->busy[j], before->context, NULL);
+    const bt_cells *cs = world->cells;
+    for (bt_idx j = 0; before && j < cs->n_busy; j++) before->visit(world, cs->busy[j], before->context, NULL);
     for (int p = 0; p < BT_PHASES; p++) {
-        for (bt_idx i = cs->start[p]; i < cs->start[p + 1]; i++) visit(w, cs->order[i], context, t);
-        if (!w->exchange || !exchanged) continue;
-        w->exchange->send(w, p, exchanged);
-        w->exchange->receive(w, p, exchanged);
+        for (bt_idx i = cs->start[p]; i < cs->start[p + 1]; i++) visit(world, cs->order[i], context, totals);
+        if (!world->exchange || !exchanged) continue;
+        world->exchange->send(world, p, exchanged);
+        world->exchange->receive(world, p, exchanged);
     }
 }
 
-void bt_phases_run(bt_world *w, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
-                   bt_totals *t)
+void bt_phases_run(bt_world *world, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
+                   bt_totals *totals)
 {
-    if (w->par.plain_schedule) {
-        run_plain(w, before, visit, context, exchanged, t);
+    if (world->par.plain_schedule) {
+        run_plain(world, before, visit, context, exchanged, totals);
         return;
     }
-    if (++w->cells->n_passes == 0) w->cells->n_passes = 1;
-    pass o = in_order(w, visit, context);
-    o.before = before, o.exchanged = exchanged, o.number = w->cells->n_passes;
-    run_on_team(run_phases, &o, t);
+    if (++world->cells->n_passes == 0) world->cells->n_passes = 1;
+    pass mine = in_order(world, visit, context);
+    mine.before = before, mine.exchanged = exchanged, mine.number = world->cells->n_passes;
+    run_on_team(run_phases, &mine, totals);
 }
 
-void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
+void bt_phases_any_order(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals)
 {
-    pass o = in_order(w, visit, context);
-    run_on_team(run_stretches, &o, t);
+    pass mine = in_order(world, visit, context);
+    run_on_team(run_stretches, &mine, totals);
 }
 
-void bt_phases_listed(bt_world *w, const bt_idx *list, bt_idx n, bt_idx few, bt_visit *visit, const void *context,
-                      bt_totals *t)
+void bt_phases_listed(bt_world *world, const bt_idx *list, bt_idx n, bt_idx few, bt_visit *visit, const void *context,
+                      bt_totals *totals)
 {
     const bt_idx team = BT_MANY(n, few) ? omp_get_max_threads() : 1;
     bt_share share[team];
     for (bt_idx s = 0; s < team; s++)
         share[s] = (bt_share){.begin = (bt_idx)((int64_t)n * s / team), .end = (bt_idx)((int64_t)n * (s + 1) / team)};
-    pass o = {.w = w,
-              .list = list,
-              .share = share,
-              .n_stretches = 1,
-              .n_shares = team,
-              .visit = visit,
-              .context = context,
-              .team = 1};
-    run_on_team(run_stretches, &o, t);
+    pass mine = {.w = world,
+                 .list = list,
+                 .share = share,
+                 .n_stretches = 1,
+                 .n_shares = team,
+                 .visit = visit,
+                 .context = context,
+                 .team = 1};
+    run_on_team(run_stretches, &mine, totals);
 }
 
-void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
+void bt_phases_busy(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals)
 {
-    bt_phases_listed(w, w->cells->busy, w->cells->n_busy, BT_FEW_CELLS, visit, context, t);
+    bt_phases_listed(world, world->cells->busy, world->cells->n_busy, BT_FEW_CELLS, visit, context, totals);
 }

@@ -45,15 +45,15 @@ typedef struct bt_totals {
     double most, most2;
 } bt_totals;
 
-/// Work on one cell. Only the bodies of its block, its contacts and *t may be changed.
-typedef void bt_visit(bt_world *w, bt_idx cell, const void *context, bt_totals *t);
+/// Work on one cell. Only the bodies of its block, its contacts and *totals may be changed.
+typedef void bt_visit(bt_world *world, bt_idx cell, const void *context, bt_totals *totals);
 
 /// List the cells of this rank with work in t->order, by phase, and distribute them to threads. After the contacts have
 /// been made.
-void bt_phases_order(bt_world *w);
+void bt_phases_order(bt_world *world);
 
 /// Assign the cells to threads by the contacts that are listed in them. No result depends on it.
-void bt_phases_distribute(bt_world *w);
+void bt_phases_distribute(bt_world *world);
 
 /// What a pass does first, with all busy cells, also those without contacts and of other ranks, for the sake of their
 /// bodies, in any order; no totals (NULL).
@@ -65,17 +65,17 @@ typedef struct bt_before {
 /// Collective. After what comes before it (or NULL), visit the cells of phase 0, then those of phase 1, ...: those of
 /// one phase share no movable body and are done at once by threads and ranks. After each phase, `exchanged` (an array
 /// over the bodies, or NULL) is brought up to date on all ranks, while the other cells are still worked on.
-void bt_phases_run(bt_world *w, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
-                   bt_totals *t);
+void bt_phases_run(bt_world *world, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
+                   bt_totals *totals);
 
 /// Visit the cells with work in any order, all at once.
-void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
+void bt_phases_any_order(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals);
 
 /// Visit cells [n] of a list in any order; not more than `few` are left to one thread. Totals are of this rank only.
-void bt_phases_listed(bt_world *w, const bt_idx *list, bt_idx n, bt_idx few, bt_visit *visit, const void *context,
-                      bt_totals *t);
+void bt_phases_listed(bt_world *world, const bt_idx *list, bt_idx n, bt_idx few, bt_visit *visit, const void *context,
+                      bt_totals *totals);
 
 /// The same with all busy cells.
-void bt_phases_busy(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
+void bt_phases_busy(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals);
 
 #endif

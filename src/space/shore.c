@@ -25,26 +25,26 @@ struct bt_shore {
     box *node;
 };
 
-void bt_shore_free(bt_shore *s)
+void bt_shore_free(bt_shore *shore)
 {
-    if (!s) return;
-    free(s->first);
-    free(s->face);
-    free(s->polygon);
-    free(s->node);
-    free(s);
+    if (!shore) return;
+    free(shore->first);
+    free(shore->face);
+    free(shore->polygon);
+    free(shore->node);
+    free(shore);
 }
 
-bool bt_shore_has(const bt_shore *s, bt_gid gid) { return s && gid < s->n_gids && s->first[gid] >= 0; }
+bool bt_shore_has(const bt_shore *shore, bt_gid gid) { return shore && gid < shore->n_gids && shore->first[gid] >= 0; }
 
-const bt_face *bt_shore_faces(const bt_shore *s, bt_gid gid, int part)
+const bt_face *bt_shore_faces(const bt_shore *shore, bt_gid gid, int part)
 {
-    return bt_shore_has(s, gid) ? s->face + s->first[gid] + part : NULL;
+    return bt_shore_has(shore, gid) ? shore->face + shore->first[gid] + part : NULL;
 }
 
-bool bt_shore_in_cone(const bt_face *f, double nx, double ny)
+bool bt_shore_in_cone(const bt_face *face, double nx, double ny)
 {
-    const double *u = f->u, *w = f->w;
+    const double *u = face->u, *w = face->w;
     return u[0] * ny - u[1] * nx >= -CONE && nx * w[1] - ny * w[0] >= -CONE &&
            nx * (u[0] + w[0]) + ny * (u[1] + w[1]) > 0;
 }
@@ -65,28 +65,28 @@ static int along_y(const void *p, const void *q)
     return x != y ? (x < y ? -1 : 1) : a->gid != b->gid ? (a->gid < b->gid ? -1 : 1) : a->part - b->part;
 }
 
-static void build_node(bt_shore *s, int node, int begin, int end)
+static void build_node(bt_shore *shore, int node, int begin, int end)
 {
-    box b = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    box bounds = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
     for (int i = begin; i < end; i++)
         for (int a = 0; a < 2; a++) {
-            b.low[a] = bt_min(b.low[a], s->polygon[i].low[a]);
-            b.high[a] = bt_max(b.high[a], s->polygon[i].high[a]);
+            bounds.low[a] = bt_min(bounds.low[a], shore->polygon[i].low[a]);
+            bounds.high[a] = bt_max(bounds.high[a], shore->polygon[i].high[a]);
         }
-    s->node[node] = b;
+    shore->node[node] = bounds;
     if (end - begin <= LEAF) return;
-    const bool long_x = b.high[0] - b.low[0] >= b.high[1] - b.low[1];
-    qsort(s->polygon + begin, (size_t)(end - begin), sizeof *s->polygon, long_x ? along_x : along_y);
+    const bool long_x = bounds.high[0] - bounds.low[0] >= bounds.high[1] - bounds.low[1];
+    qsort(shore->polygon + begin, (size_t)(end - begin), sizeof *shore->polygon, long_x ? along_x : along_y);
     const int middle = begin + (end - begin) / 2;
-    build_node(s, 2 * node + 1, begin, middle);
-    build_node(s, 2 * node + 2, middle, end);
+    build_node(shore, 2 * node + 1, begin, middle);
+    build_node(shore, 2 * node + 2, middle, end);
 }
 
-static void build_tree(bt_shore *s)
+static void build_tree(bt_shore *shore)
 {
-    free(s->node);
-    s->node = bt_alloc(4 * (size_t)s->n + 4, sizeof *s->node);
-    if (s->n > 0) build_node(s, 0, 0, s->n);
+    free(shore->node);
+    shore->node = bt_alloc(4 * (size_t)shore->n + 4, sizeof *shore->node);
+    if (shore->n > 0) build_node(shore, 0, 0, shore->n);
 }
 
 static bool boxes_meet(const double low[2], const double high[2], const double other_low[2],
@@ -96,18 +96,19 @@ static bool boxes_meet(const double low[2], const double high[2], const double o
 }
 
 /// Calls take(context, polygon) for each that meets the box.
-static void visit(const bt_shore *s, int node, int begin, int end, const box *b,
+static void visit(const bt_shore *shore, int node, int begin, int end, const box *bounds,
                   void (*take)(void *, const bt_shore_polygon *), void *context)
 {
-    if (!boxes_meet(b->low, b->high, s->node[node].low, s->node[node].high)) return;
+    if (!boxes_meet(bounds->low, bounds->high, shore->node[node].low, shore->node[node].high)) return;
     if (end - begin > LEAF) {
         const int middle = begin + (end - begin) / 2;
-        visit(s, 2 * node + 1, begin, middle, b, take, context);
-        visit(s, 2 * node + 2, middle, end, b, take, context);
+        visit(shore, 2 * node + 1, begin, middle, bounds, take, context);
+        visit(shore, 2 * node + 2, middle, end, bounds, take, context);
         return;
     }
     for (int i = begin; i < end; i++)
-        if (boxes_meet(b->low, b->high, s->polygon[i].low, s->polygon[i].high)) take(context, &s->polygon[i]);
+        if (boxes_meet(bounds->low, bounds->high, shore->polygon[i].low, shore->polygon[i].high))
+            take(context, &shore->polygon[i]);
 }
 
 typedef struct { bt_shore_list *list; double x, y, shift[2], period[2]; } nearest;
@@ -119,23 +120,25 @@ static void take_nearest(void *context, const bt_shore_polygon *p)
     const double dx = p->x - c->x, dy = p->y - c->y;
     if (bt_nearest_image(dx, c->period[0]) != dx + c->shift[0]) return;
     if (bt_nearest_image(dy, c->period[1]) != dy + c->shift[1]) return;
-    bt_shore_list *l = c->list;
-    if (l->n == l->cap) l->found = bt_realloc(l->found, l->cap = l->cap ? 2 * l->cap : 64, sizeof *l->found);
-    l->found[l->n++] = *p;
+    bt_shore_list *list = c->list;
+    if (list->n == list->cap)
+        list->found = bt_realloc(list->found, list->cap = list->cap ? 2 * list->cap : 64, sizeof *list->found);
+    list->found[list->n++] = *p;
 }
 
-void bt_shore_near(const bt_world *w, double x, double y, const double low[2], const double high[2],
+void bt_shore_near(const bt_world *world, double x, double y, const double low[2], const double high[2],
                    bt_shore_list *list)
 {
-    const bt_shore *s = w->shore;
-    const double period[2] = {w->par.period_x, w->par.period_y};
+    const bt_shore *shore = world->shore;
+    const double period[2] = {world->par.period_x, world->par.period_y};
     const int images_x = period[0] > 0, images_y = period[1] > 0;
     list->n = 0;
     for (int kx = -images_x; kx <= images_x; kx++)
         for (int ky = -images_y; ky <= images_y; ky++) {
             nearest c = {list, x, y, {kx * period[0], ky * period[1]}, {period[0], period[1]}};
-            const box b = {{low[0] - c.shift[0], low[1] - c.shift[1]}, {high[0] - c.shift[0], high[1] - c.shift[1]}};
-            visit(s, 0, 0, s->n, &b, take_nearest, &c);
+            const box bounds =
+                {{low[0] - c.shift[0], low[1] - c.shift[1]}, {high[0] - c.shift[0], high[1] - c.shift[1]}};
+            visit(shore, 0, 0, shore->n, &bounds, take_nearest, &c);
         }
 }
 
@@ -144,23 +147,23 @@ void bt_shore_near(const bt_world *w, double x, double y, const double low[2], c
 /// A polygon in a common frame.
 typedef struct { int n; const double *v; double x, y; } polygon;
 
-static polygon polygon_of(const bt_bodies *b, const bt_shore_polygon *p, const double shift[2])
+static polygon polygon_of(const bt_bodies *bodies, const bt_shore_polygon *p, const double shift[2])
 {
-    const double *v = b->outline + 2 * (b->offset[b->index_of[p->gid]] + p->part);
+    const double *v = bodies->outline + 2 * (bodies->offset[bodies->index_of[p->gid]] + p->part);
     return (polygon){p->count, v, p->x + shift[0], p->y + shift[1]};
 }
 
-static void vertex(const polygon *p, int i, double out[2])
+static void vertex(const polygon *shape, int i, double out[2])
 {
-    const double *v = p->v + 2 * (i < p->n ? i : i - p->n);
-    out[0] = p->x + v[0];
-    out[1] = p->y + v[1];
+    const double *v = shape->v + 2 * (i < shape->n ? i : i - shape->n);
+    out[0] = shape->x + v[0];
+    out[1] = shape->y + v[1];
 }
 
 /// Outward unit normal of edge i, and how long that is, m.
-static double normal_of(const polygon *p, int i, double n[2])
+static double normal_of(const polygon *shape, int i, double n[2])
 {
-    const double *v = p->v + 2 * (i < p->n ? i : i - p->n), *q = p->v + 2 * ((i + 1) % p->n);
+    const double *v = shape->v + 2 * (i < shape->n ? i : i - shape->n), *q = shape->v + 2 * ((i + 1) % shape->n);
     const double length = bt_hypot(q[0] - v[0], q[1] - v[1]);
     n[0] = (q[1] - v[1]) / length;
     n[1] = (v[0] - q[0]) / length;
@@ -168,11 +171,11 @@ static double normal_of(const polygon *p, int i, double n[2])
 }
 
 /// Height of x above edge i.
-static double height(const polygon *p, int i, const double x[2])
+static double height(const polygon *shape, int i, const double x[2])
 {
     double n[2], v[2];
-    normal_of(p, i, n);
-    vertex(p, i, v);
+    normal_of(shape, i, n);
+    vertex(shape, i, v);
     return n[0] * (x[0] - v[0]) + n[1] * (x[1] - v[1]);
 }
 
@@ -209,25 +212,25 @@ static bool cover(const polygon *p, int i, const polygon *q, double beyond, doub
     return span[0] < span[1];
 }
 
-/// The normals of polygon p at a point of its boundary, from the first to the last edge that it is on; false: it is
-/// inside, or `near` is false.
-static bool cone_at(const polygon *p, const double x[2], double reach, bool *near, double u[2], double w[2])
+/// The normals of polygon `shape` at a point of its boundary, from the first to the last edge that it is on; false: it
+/// is inside, or `near` is false.
+static bool cone_at(const polygon *shape, const double x[2], double reach, bool *near, double u[2], double w[2])
 {
     bool on[BT_MAX_VERTICES];
     int first = -1;
     *near = true;
-    for (int i = 0; i < p->n; i++) {
-        const double h = height(p, i, x);
+    for (int i = 0; i < shape->n; i++) {
+        const double h = height(shape, i, x);
         *near = *near && h <= reach;
         on[i] = h >= -reach;
     }
-    for (int i = 0; i < p->n; i++)
-        if (on[i] && !on[i > 0 ? i - 1 : p->n - 1]) first = i;
+    for (int i = 0; i < shape->n; i++)
+        if (on[i] && !on[i > 0 ? i - 1 : shape->n - 1]) first = i;
     if (!*near || first < 0) return false;
     int last = first;
-    while (on[(last + 1) % p->n]) last++;
-    normal_of(p, first, u);
-    normal_of(p, last, w);
+    while (on[(last + 1) % shape->n]) last++;
+    normal_of(shape, first, u);
+    normal_of(shape, last, w);
     return true;
 }
 
@@ -257,133 +260,137 @@ typedef struct {
 
 static void take_beside(void *context, const bt_shore_polygon *q)
 {
-    about *c = context;
-    if (q->gid == c->of->gid && q->part == c->of->part && c->shift[0] == 0 && c->shift[1] == 0) return;
+    about *around = context;
+    if (q->gid == around->of->gid && q->part == around->of->part && around->shift[0] == 0 && around->shift[1] == 0)
+        return;
     const double none[2] = {0, 0};
-    const polygon p = polygon_of(c->b, c->of, none), other = polygon_of(c->b, q, c->shift);
-    if (apart_by_edge_of(&p, &other, c->reach) || apart_by_edge_of(&other, &p, c->reach)) return;
-    c->alone = false;
-    if (!c->face) return;
+    const polygon shape = polygon_of(around->b, around->of, none), other = polygon_of(around->b, q, around->shift);
+    if (apart_by_edge_of(&shape, &other, around->reach) || apart_by_edge_of(&other, &shape, around->reach)) return;
+    around->alone = false;
+    if (!around->face) return;
     double x[2], u[2], w[2], span[2];
     bool near;
-    vertex(&p, c->edge, x);
-    bt_face *f = &c->face[c->edge];
-    if (cone_at(&other, x, c->reach, &near, u, w)) intersect(f, u, w);
-    else if (near) memset(f->u, 0, sizeof f->u), memset(f->w, 0, sizeof f->w);
-    if (!cover(&p, c->edge, &other, c->reach, span)) return;
-    if (c->n_spans == c->cap_spans)
-        c->span = bt_realloc(c->span, (size_t)(c->cap_spans = 2 * c->cap_spans + 8), sizeof *c->span);
-    memcpy(c->span[c->n_spans++], span, sizeof span);
+    vertex(&shape, around->edge, x);
+    bt_face *face = &around->face[around->edge];
+    if (cone_at(&other, x, around->reach, &near, u, w)) intersect(face, u, w);
+    else if (near) memset(face->u, 0, sizeof face->u), memset(face->w, 0, sizeof face->w);
+    if (!cover(&shape, around->edge, &other, around->reach, span)) return;
+    if (around->n_spans == around->cap_spans)
+        around->span = bt_realloc(around->span, (size_t)(around->cap_spans = 2 * around->cap_spans + 8),
+                                  sizeof *around->span);
+    memcpy(around->span[around->n_spans++], span, sizeof span);
 }
 
-/// Looks at all polygons that may lie against c->of, at all images.
-static void look_beside(const bt_world *w, about *c)
+/// Looks at all polygons that may lie against around->of, at all images.
+static void look_beside(const bt_world *world, about *around)
 {
-    const double period[2] = {w->par.period_x, w->par.period_y};
+    const double period[2] = {world->par.period_x, world->par.period_y};
     const int images_x = period[0] > 0, images_y = period[1] > 0;
     for (int kx = -images_x; kx <= images_x; kx++)
         for (int ky = -images_y; ky <= images_y; ky++) {
-            box b;
-            c->shift[0] = kx * period[0], c->shift[1] = ky * period[1];
+            box bounds;
+            around->shift[0] = kx * period[0], around->shift[1] = ky * period[1];
             for (int a = 0; a < 2; a++) {
-                b.low[a] = c->of->low[a] - c->shift[a] - 2 * c->reach;
-                b.high[a] = c->of->high[a] - c->shift[a] + 2 * c->reach;
+                bounds.low[a] = around->of->low[a] - around->shift[a] - 2 * around->reach;
+                bounds.high[a] = around->of->high[a] - around->shift[a] + 2 * around->reach;
             }
-            visit(c->s, 0, 0, c->s->n, &b, take_beside, c);
+            visit(around->s, 0, 0, around->s->n, &bounds, take_beside, around);
         }
 }
 
 /// The ends of an edge that others cover are taken off.
-static void trim(about *c, bt_face *f, double length)
+static void trim(about *around, bt_face *face, double length)
 {
-    f->from = 0;
-    f->to = length;
-    const double slack = ENDS * c->reach;
+    face->from = 0;
+    face->to = length;
+    const double slack = ENDS * around->reach;
     for (bool changed = true; changed;) {
         changed = false;
-        for (int k = 0; k < c->n_spans; k++) {
-            const double *s = c->span[k];
-            if (s[0] <= f->from + slack && s[1] > f->from) f->from = s[1], changed = true;
-            if (s[1] >= f->to - slack && s[0] < f->to) f->to = s[0], changed = true;
+        for (int k = 0; k < around->n_spans; k++) {
+            const double *s = around->span[k];
+            if (s[0] <= face->from + slack && s[1] > face->from) face->from = s[1], changed = true;
+            if (s[1] >= face->to - slack && s[0] < face->to) face->to = s[0], changed = true;
         }
     }
-    if (f->to - f->from <= bt_min(slack, 0.5 * length)) f->to = f->from;
+    if (face->to - face->from <= bt_min(slack, 0.5 * length)) face->to = face->from;
 }
 
-static void find_faces(const bt_world *w, about *c)
+static void find_faces(const bt_world *world, about *around)
 {
     const double none[2] = {0, 0};
-    const polygon p = polygon_of(c->b, c->of, none);
-    for (c->edge = 0; c->edge < p.n; c->edge++) {
-        bt_face *f = &c->face[c->edge];
-        normal_of(&p, c->edge > 0 ? c->edge - 1 : p.n - 1, f->u);
-        const double length = normal_of(&p, c->edge, f->w);
-        c->n_spans = 0;
-        look_beside(w, c);
-        trim(c, f, length);
+    const polygon shape = polygon_of(around->b, around->of, none);
+    for (around->edge = 0; around->edge < shape.n; around->edge++) {
+        bt_face *face = &around->face[around->edge];
+        normal_of(&shape, around->edge > 0 ? around->edge - 1 : shape.n - 1, face->u);
+        const double length = normal_of(&shape, around->edge, face->w);
+        around->n_spans = 0;
+        look_beside(world, around);
+        trim(around, face, length);
     }
 }
 
 /// All polygons of the fixed bodies there are.
-static void collect(const bt_world *w, bt_shore *s)
+static void collect(const bt_world *world, bt_shore *shore)
 {
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     int cap = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] != BT_STATIC) continue;
-        for (int part = bt_part_first(b, i); part >= 0; part = bt_part_next(b, i, part)) {
-            if (s->n == cap) s->polygon = bt_realloc(s->polygon, (size_t)(cap = 2 * cap + 8), sizeof *s->polygon);
-            bt_shore_polygon *p = &s->polygon[s->n++];
-            *p = (bt_shore_polygon){.gid = b->gid[i], .part = part, .count = b->mark[b->offset[i] + part].count,
-                                    .x = b->pose[i].x, .y = b->pose[i].y,
-                                    .low = {INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY}};
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (bodies->motion[i] != BT_STATIC) continue;
+        for (int part = bt_part_first(bodies, i); part >= 0; part = bt_part_next(bodies, i, part)) {
+            if (shore->n == cap)
+                shore->polygon = bt_realloc(shore->polygon, (size_t)(cap = 2 * cap + 8), sizeof *shore->polygon);
+            bt_shore_polygon *p = &shore->polygon[shore->n++];
+            *p = (bt_shore_polygon){.gid = bodies->gid[i], .part = part,
+                                    .count = bodies->mark[bodies->offset[i] + part].count, .x = bodies->pose[i].x,
+                                    .y = bodies->pose[i].y, .low = {INFINITY, INFINITY},
+                                    .high = {-INFINITY, -INFINITY}};
             const double none[2] = {0, 0};
-            const polygon q = polygon_of(b, p, none);
-            for (int k = 0; k < q.n; k++) {
+            const polygon shape = polygon_of(bodies, p, none);
+            for (int k = 0; k < shape.n; k++) {
                 double x[2];
-                vertex(&q, k, x);
+                vertex(&shape, k, x);
                 for (int a = 0; a < 2; a++) p->low[a] = bt_min(p->low[a], x[a]), p->high[a] = bt_max(p->high[a], x[a]);
             }
         }
     }
-    build_tree(s);
+    build_tree(shore);
 }
 
-void bt_shore_create(bt_world *w)
+void bt_shore_create(bt_world *world)
 {
-    bt_bodies *b = &w->bodies;
-    bt_shore *s = bt_alloc(1, sizeof *s);
-    s->n_gids = b->n_global;
-    s->first = bt_alloc((size_t)s->n_gids + 1, sizeof *s->first);
-    for (bt_gid g = 0; g < s->n_gids; g++) s->first[g] = -1;
-    collect(w, s);
-    about c = {.b = b, .s = s, .reach = bt_max(w->par.slop, 1e-9 * w->par.size)};
+    bt_bodies *bodies = &world->bodies;
+    bt_shore *shore = bt_alloc(1, sizeof *shore);
+    shore->n_gids = bodies->n_global;
+    shore->first = bt_alloc((size_t)shore->n_gids + 1, sizeof *shore->first);
+    for (bt_gid g = 0; g < shore->n_gids; g++) shore->first[g] = -1;
+    collect(world, shore);
+    about around = {.b = bodies, .s = shore, .reach = bt_max(world->par.slop, 1e-9 * world->par.size)};
     int64_t n_faces = 0;
-    for (int k = 0; k < s->n; k++) {
-        c.of = &s->polygon[k];
-        c.alone = c.of->part == 0;
-        if (c.alone) look_beside(w, &c);
-        if (c.alone || s->first[c.of->gid] >= 0) continue;
-        const bt_idx i = b->index_of[c.of->gid];
-        s->first[c.of->gid] = n_faces;
-        n_faces += b->offset[i + 1] - b->offset[i];
-        b->large[i] = 1;
+    for (int k = 0; k < shore->n; k++) {
+        around.of = &shore->polygon[k];
+        around.alone = around.of->part == 0;
+        if (around.alone) look_beside(world, &around);
+        if (around.alone || shore->first[around.of->gid] >= 0) continue;
+        const bt_idx i = bodies->index_of[around.of->gid];
+        shore->first[around.of->gid] = n_faces;
+        n_faces += bodies->offset[i + 1] - bodies->offset[i];
+        bodies->large[i] = 1;
     }
     int kept = 0;
-    for (int k = 0; k < s->n; k++)
-        if (s->first[s->polygon[k].gid] >= 0) s->polygon[kept++] = s->polygon[k];
-    s->n = kept;
+    for (int k = 0; k < shore->n; k++)
+        if (shore->first[shore->polygon[k].gid] >= 0) shore->polygon[kept++] = shore->polygon[k];
+    shore->n = kept;
     if (kept == 0) {
-        bt_shore_free(s);
+        bt_shore_free(shore);
         return;
     }
-    build_tree(s);
-    s->face = bt_alloc((size_t)n_faces, sizeof *s->face);
-    for (int k = 0; k < s->n; k++) {
-        c.of = &s->polygon[k];
-        c.face = s->face + s->first[c.of->gid] + c.of->part;
-        find_faces(w, &c);
+    build_tree(shore);
+    shore->face = bt_alloc((size_t)n_faces, sizeof *shore->face);
+    for (int k = 0; k < shore->n; k++) {
+        around.of = &shore->polygon[k];
+        around.face = shore->face + shore->first[around.of->gid] + around.of->part;
+        find_faces(world, &around);
     }
-    free(c.span);
-    w->shore = s;
+    free(around.span);
+    world->shore = shore;
 }

@@ -32,22 +32,22 @@ typedef struct bt_face {
 
 typedef struct bt_shore bt_shore;
 
-/// Find the shores among the fixed bodies of a world that is not yet distributed, before its walls are added; w->shore
-/// stays NULL where there is none. Their bodies become large.
-void bt_shore_create(bt_world *w);
-void bt_shore_free(bt_shore *s);
+/// Find the shores among the fixed bodies of a world that is not yet distributed, before its walls are added;
+/// world->shore stays NULL where there is none. Their bodies become large.
+void bt_shore_create(bt_world *world);
+void bt_shore_free(bt_shore *shore);
 
 /// Is body gid part of a shore?
-bool bt_shore_has(const bt_shore *s, bt_gid gid);
+bool bt_shore_has(const bt_shore *shore, bt_gid gid);
 /// The same of the body with index i.
-static inline bool bt_shore_holds(const bt_world *w, bt_idx i)
+static inline bool bt_shore_holds(const bt_world *world, bt_idx i)
 {
-    return w->shore && bt_shore_has(w->shore, w->bodies.gid[i]);
+    return world->shore && bt_shore_has(world->shore, world->bodies.gid[i]);
 }
 /// Faces of the polygon of body gid that starts at its vertex `part`; NULL: the body is part of no shore.
-const bt_face *bt_shore_faces(const bt_shore *s, bt_gid gid, int part);
+const bt_face *bt_shore_faces(const bt_shore *shore, bt_gid gid, int part);
 /// Does the corner of a face count in the direction of the unit vector n?
-bool bt_shore_in_cone(const bt_face *f, double nx, double ny);
+bool bt_shore_in_cone(const bt_face *face, double nx, double ny);
 
 /// A polygon of a shore: the one of body gid that starts at its vertex `part`.
 typedef struct bt_shore_polygon {
@@ -63,7 +63,7 @@ typedef struct bt_shore_list {
 } bt_shore_list;
 
 /// Polygons whose boxes come within the box low..high, m, at the image nearest to the body with its centroid at (x, y).
-void bt_shore_near(const bt_world *w, double x, double y, const double low[2], const double high[2],
+void bt_shore_near(const bt_world *world, double x, double y, const double low[2], const double high[2],
                    bt_shore_list *list);
 
 #endif

@@ -26,6 +26,6 @@ typedef struct bt_piece {
 /// hold to rounding, and with velocities V + ω k × c_i and spins ω also mass, momentum, angular momentum and kinetic
 /// energy. The ends of the section have the same bits in the parent's frame before each centroid is taken off. False
 /// when a piece has fewer than 3 or more than BT_MAX_VERTICES vertices, no area, or no convex parts.
-bool bt_split_cut(int n, const double *outline, double area, double polar, const bt_chord *c, bt_piece piece[2]);
+bool bt_split_cut(int n, const double *outline, double area, double polar, const bt_chord *chord, bt_piece piece[2]);
 
 #endif

@@ -59,77 +59,77 @@ typedef struct form {
     double xx, xy, yy;               ///< second moments, m4
 } form;
 
-static form form_of(const bt_split_floe *f)
+static form form_of(const bt_split_floe *floe)
 {
-    form o = {.inradius = f->convex ? INFINITY : 0};
+    form outline = {.inradius = floe->convex ? INFINITY : 0};
     double r2 = 0;
-    for (int i = 0; i < f->n; i++) {
-        const double *p = f->outline + 2 * i, *q = f->outline + 2 * (i + 1 < f->n ? i + 1 : 0);
+    for (int i = 0; i < floe->n; i++) {
+        const double *p = floe->outline + 2 * i, *q = floe->outline + 2 * (i + 1 < floe->n ? i + 1 : 0);
         const double c = p[0] * q[1] - p[1] * q[0];
-        o.area += c / 2;
-        o.xx += c * (p[0] * p[0] + p[0] * q[0] + q[0] * q[0]) / 12;
-        o.yy += c * (p[1] * p[1] + p[1] * q[1] + q[1] * q[1]) / 12;
-        o.xy += c * (2 * (p[0] * p[1] + q[0] * q[1]) + p[0] * q[1] + q[0] * p[1]) / 24;
+        outline.area += c / 2;
+        outline.xx += c * (p[0] * p[0] + p[0] * q[0] + q[0] * q[0]) / 12;
+        outline.yy += c * (p[1] * p[1] + p[1] * q[1] + q[1] * q[1]) / 12;
+        outline.xy += c * (2 * (p[0] * p[1] + q[0] * q[1]) + p[0] * q[1] + q[0] * p[1]) / 24;
         r2 = bt_max(r2, p[0] * p[0] + p[1] * p[1]);
-        if (f->convex) o.inradius = bt_min(o.inradius, c / bt_hypot(q[0] - p[0], q[1] - p[1]));
+        if (floe->convex) outline.inradius = bt_min(outline.inradius, c / bt_hypot(q[0] - p[0], q[1] - p[1]));
     }
-    o.radius = sqrt(r2);
-    o.polar = o.xx + o.yy;
-    o.inradius = bt_max(0, o.inradius);
-    return o;
+    outline.radius = sqrt(r2);
+    outline.polar = outline.xx + outline.yy;
+    outline.inradius = bt_max(0, outline.inradius);
+    return outline;
 }
 
 static const double STEP = 1.3; // ratio of the lengths between which a bound is taken at once
 
 /// Upper bound of stress over strength of sections of these lengths; size G, opening P.
-static double bound_between(const bt_split_floe *f, const form *o, double size, double torque, double opening,
+static double bound_between(const bt_split_floe *floe, const form *outline, double size, double torque, double opening,
                             const bt_split_law *law, double low, double high)
 {
-    const double radius = o->radius, ratio = o->area / o->polar;
+    const double radius = outline->radius, ratio = outline->area / outline->polar;
     const double off = sqrt(bt_max(0, radius * radius - low * low / 4));
     double normal = size + torque * sqrt(ratio) / 2;
     double bending = ((radius + off) * size + torque * (1 + off * sqrt(ratio)) / 2) / low; // M/l
-    if (high <= 2 * o->inradius) {
-        const double slope = radius / o->inradius + 2 * law->slop / low; // d/l
-        const double share = bt_min(1, high * high * slope / o->area);
+    if (high <= 2 * outline->inradius) {
+        const double slope = radius / outline->inradius + 2 * law->slop / low; // d/l
+        const double share = bt_min(1, high * high * slope / outline->area);
         const double part = size + share * (size + torque * radius * ratio);
         normal = bt_min(normal, part);
         bending = bt_min(bending, slope * part);
     }
-    const double strength = bt_split_strength(law, low, false), hl = f->thickness * low;
+    const double strength = bt_split_strength(law, low, false), hl = floe->thickness * low;
     double most = (normal + 6 * bending) / (hl * strength);
     if (opening > 0) most += 4 * opening / (hl * bt_split_strength(law, low, true));
     // b = l of burst is below that; b = A/l is largest at l = D
     const double d = 2 * radius;
-    return bt_max(most, BURST_HELD * size * d / (f->thickness * o->area * bt_split_strength(law, d, false))) /
-           f->factor;
+    return bt_max(most, BURST_HELD * size * d / (floe->thickness * outline->area * bt_split_strength(law, d, false))) /
+           floe->factor;
 }
 
 /// Of all sections of length l and more.
-static double bound(const bt_split_floe *f, const form *o, double size, double torque, double opening,
+static double bound(const bt_split_floe *floe, const form *outline, double size, double torque, double opening,
                     const bt_split_law *law, double l)
 {
     double most = 0;
-    while (l < 2 * o->inradius) {
-        const double high = bt_min(STEP * l, 2 * o->inradius);
-        most = bt_max(most, bound_between(f, o, size, torque, opening, law, l, high));
+    while (l < 2 * outline->inradius) {
+        const double high = bt_min(STEP * l, 2 * outline->inradius);
+        most = bt_max(most, bound_between(floe, outline, size, torque, opening, law, l, high));
         l = high;
     }
-    return bt_max(most, bound_between(f, o, size, torque, opening, law, l, INFINITY));
+    return bt_max(most, bound_between(floe, outline, size, torque, opening, law, l, INFINITY));
 }
 
-double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l)
+double bt_split_bound(const bt_split_floe *floe, const bt_load_case *loads, const bt_split_law *law, double l)
 {
-    const form o = form_of(f);
-    return bound(f, &o, loads->size, fabs(loads->torque), loads->opening, law, l);
+    const form outline = form_of(floe);
+    return bound(floe, &outline, loads->size, fabs(loads->torque), loads->opening, law, l);
 }
 
-double bt_split_borne(const bt_split_floe *f, const bt_split_law *law)
+double bt_split_borne(const bt_split_floe *floe, const bt_split_law *law)
 {
-    const form o = form_of(f);
-    if (!(2 * o.radius >= law->least_width)) return INFINITY;
+    const form outline = form_of(floe);
+    if (!(2 * outline.radius >= law->least_width)) return INFINITY;
     const double l = law->least_width; // the bound is linear in sizes and opening forces
-    return 1 / bt_max(bound(f, &o, 1, o.radius, 0, law, l), bound(f, &o, 0, 0, 1, law, l));
+    return 1 / bt_max(bound(floe, &outline, 1, outline.radius, 0, law, l), bound(floe, &outline, 0, 0, 1, law, l));
 }
 
 /// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
@@ -166,18 +166,18 @@ static bool has_parts(int n, const double *v)
     return bt_outline_convex(n, v) || (!bt_outline_fault(n, v) && bt_outline_split(n, v, &parts));
 }
 
-static bt_split_refusal refusal_of(const bt_split_floe *f, const bt_chord *c, const bt_split_law *law)
+static bt_split_refusal refusal_of(const bt_split_floe *floe, const bt_chord *chord, const bt_split_law *law)
 {
     double whole = 0;
-    hull_width(f->n, f->outline, f->convex, &whole);
+    hull_width(floe->n, floe->outline, floe->convex, &whole);
     const double most = bt_max(law->aspect, whole * (1 - EQUAL));
     for (int side = 0; side < 2; side++) {
-        const bt_chord along = side ? (bt_chord){c->b, c->a} : *c;
+        const bt_chord along = side ? (bt_chord){chord->b, chord->a} : *chord;
         double piece[2 * (BT_MAX_VERTICES + 2)], aspect = 0;
-        const int n = bt_chord_piece(f->n, f->outline, &along, piece);
-        if (n < 3 || !(hull_width(n, piece, f->convex, &aspect) >= law->least_width)) return BT_SPLIT_SIZE;
+        const int n = bt_chord_piece(floe->n, floe->outline, &along, piece);
+        if (n < 3 || !(hull_width(n, piece, floe->convex, &aspect) >= law->least_width)) return BT_SPLIT_SIZE;
         if (aspect > most) return BT_SPLIT_ASPECT;
-        if (n > BT_MAX_VERTICES || (!f->convex && !has_parts(n, piece))) return BT_SPLIT_OUTLINE;
+        if (n > BT_MAX_VERTICES || (!floe->convex && !has_parts(n, piece))) return BT_SPLIT_OUTLINE;
     }
     return BT_SPLIT_ALLOWED;
 }
@@ -192,22 +192,22 @@ typedef struct search {
 } search;
 
 /// Largest stress / strength of a section.
-static double demand(const search *s, const bt_section *q, bt_split_mode *mode)
+static double demand(const search *s, const bt_section *section, bt_split_mode *mode)
 {
-    const double l = q->length, hl = s->floe->thickness * l, b = bt_min(q->width, l);
+    const double l = section->length, hl = s->floe->thickness * l, b = bt_min(section->width, l);
     const double strength = s->floe->factor * bt_split_strength(s->law, l, false);
     double worst = 0;
     *mode = BT_SPLIT_FAR;
     for (int k = 0; k < 2; k++) {
-        const bt_section_end *e = &q->at[k], *opposite = &q->at[1 - k];
-        const double pair = 4 * e->opening / hl, share = bt_min(1, e->bearing / b);
+        const bt_section_end *end = &section->at[k], *opposite = &section->at[1 - k];
+        const double pair = 4 * end->opening / hl, share = bt_min(1, end->bearing / b);
         const double rest =
-            (q->normal + (k ? 6 : -6) * q->moment / l - FAR_RELIEF * opposite->inertial) / hl - pair;
+            (section->normal + (k ? 6 : -6) * section->moment / l - FAR_RELIEF * opposite->inertial) / hl - pair;
         double ratio = bt_max(0, rest) / strength;
         if (pair > 0) ratio += (pair + bt_min(0, rest)) / (s->floe->factor * bt_split_strength(s->law, l, true));
         if (ratio > worst) worst = ratio, *mode = pair > 0 ? BT_SPLIT_NEAR : BT_SPLIT_FAR;
-        const double burst = (BURST_HELD * (1 - share * sqrt(share)) * (e->thrust - e->inertial) +
-                              BURST_FREE * (1 - share) * e->inertial) /
+        const double burst = (BURST_HELD * (1 - share * sqrt(share)) * (end->thrust - end->inertial) +
+                              BURST_FREE * (1 - share) * end->inertial) /
                              (s->floe->thickness * b * strength);
         if (burst > worst) worst = burst, *mode = BT_SPLIT_BURST;
     }
@@ -216,43 +216,43 @@ static double demand(const search *s, const bt_section *q, bt_split_mode *mode)
 
 /// Take a section when it is the best so far. One from a contact keeps its direction, another is turned so that bending
 /// opens b: where both pieces are equal, the direction says which is the first.
-static void consider(const search *s, bt_chord c, bool from_contact)
+static void consider(const search *s, bt_chord chord, bool from_contact)
 {
     double a[2], b[2];
-    bt_chord_place(s->floe->n, s->floe->outline, c.a, a);
-    bt_chord_place(s->floe->n, s->floe->outline, c.b, b);
+    bt_chord_place(s->floe->n, s->floe->outline, chord.a, a);
+    bt_chord_place(s->floe->n, s->floe->outline, chord.b, b);
     const double l = bt_hypot(b[0] - a[0], b[1] - a[1]);
-    const bt_load_case *w = s->loads;
+    const bt_load_case *loads = s->loads;
     if (!(l >= s->law->least_width) || !(l > s->law->slop)) return;
-    if (!(bound_between(s->floe, s->form, w->size, fabs(w->torque), w->opening, s->law, l, l) > 1)) return;
-    const bt_section q = bt_section_of(s->floe, s->form->area, s->form->polar, w, &c, s->law->slop);
+    if (!(bound_between(s->floe, s->form, loads->size, fabs(loads->torque), loads->opening, s->law, l, l) > 1)) return;
+    const bt_section section = bt_section_of(s->floe, s->form->area, s->form->polar, loads, &chord, s->law->slop);
     bt_split_mode mode;
-    const double ratio = demand(s, &q, &mode);
-    if (!from_contact && q.moment < 0) c = (bt_chord){c.b, c.a};
+    const double ratio = demand(s, &section, &mode);
+    if (!from_contact && section.moment < 0) chord = (bt_chord){chord.b, chord.a};
     bt_split *best = s->best;
     if (!(ratio > 1) || !(ratio > best->ratio * (1 + EQUAL))) return;
-    const bt_split_refusal refused = refusal_of(s->floe, &c, s->law);
+    const bt_split_refusal refused = refusal_of(s->floe, &chord, s->law);
     if (refused) {
         if (ratio > best->refused_ratio) best->refused_ratio = ratio, best->refused = refused;
         return;
     }
-    best->chord = c;
+    best->chord = chord;
     best->mode = mode;
     best->ratio = ratio;
     best->length = l;
-    best->peak = w->peak;
+    best->peak = loads->peak;
 }
 
 static void consider_from(const search *s, bt_chord_end from, double dx, double dy)
 {
-    bt_chord c;
-    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &c)) consider(s, c, true);
+    bt_chord chord;
+    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &chord)) consider(s, chord, true);
 }
 
 static void consider_through(const search *s, double x, double y, double dx, double dy)
 {
-    bt_chord c;
-    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &c)) consider(s, c, false);
+    bt_chord chord;
+    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &chord)) consider(s, chord, false);
 }
 
 /// Unit vector of the larger eigenvalue of a symmetric 2 × 2 matrix; false when both differ by less than 2 tiny.
@@ -266,56 +266,56 @@ static bool major_axis(double xx, double xy, double yy, double tiny, double *x, 
     return true;
 }
 
-static double load_size(const bt_load_case *w, int k)
+static double load_size(const bt_load_case *loads, int k)
 {
-    return bt_hypot(w->load[k].load->fx, w->load[k].load->fy) + w->load[k].load->opening;
+    return bt_hypot(loads->load[k].load->fx, loads->load[k].load->fy) + loads->load[k].load->opening;
 }
 
 static void search_sections(const search *s)
 {
-    const bt_load_case *w = s->loads;
-    const bt_split_floe *f = s->floe;
+    const bt_load_case *loads = s->loads;
+    const bt_split_floe *floe = s->floe;
     // The largest contacts, then in the order of the loads: an order by size would turn on rounding where two
     // are equal.
     int chosen[BT_SPLIT_CONTACTS] = {0}, n = 0;
     double largest = 0;
-    for (int k = 0; k < w->n; k++)
-        if (bt_load_acts(w, k)) largest = bt_max(largest, load_size(w, k));
-    for (int k = 0; k < w->n; k++) {
-        if (!bt_load_acts(w, k) || !(load_size(w, k) > LEAST_LOAD * largest)) continue;
+    for (int k = 0; k < loads->n; k++)
+        if (bt_load_acts(loads, k)) largest = bt_max(largest, load_size(loads, k));
+    for (int k = 0; k < loads->n; k++) {
+        if (!bt_load_acts(loads, k) || !(load_size(loads, k) > LEAST_LOAD * largest)) continue;
         if (n < BT_SPLIT_CONTACTS) {
             chosen[n++] = k;
             continue;
         }
         int least = 0;
         for (int i = 1; i < n; i++)
-            if (load_size(w, chosen[i]) < load_size(w, chosen[least])) least = i;
-        if (!(load_size(w, k) > load_size(w, chosen[least]))) continue;
+            if (load_size(loads, chosen[i]) < load_size(loads, chosen[least])) least = i;
+        if (!(load_size(loads, k) > load_size(loads, chosen[least]))) continue;
         memmove(chosen + least, chosen + least + 1, (size_t)(n - 1 - least) * sizeof *chosen);
         chosen[n - 1] = k;
     }
     double xx = 0, xy = 0, yy = 0, scale = 0;
     for (int i = 0; i < n; i++) {
-        const bt_edge_load *e = &w->load[chosen[i]];
-        consider_from(s, e->place, e->load->fx, e->load->fy);
-        consider_from(s, e->place, -e->x, -e->y);
+        const bt_edge_load *edge = &loads->load[chosen[i]];
+        consider_from(s, edge->place, edge->load->fx, edge->load->fy);
+        consider_from(s, edge->place, -edge->x, -edge->y);
         // Both ends of a section are looked at; in an outline that is not convex the way back may be another.
-        for (int j = f->convex ? i + 1 : 0; j < n; j++) {
-            const bt_edge_load *other = &w->load[chosen[j]];
-            if (j != i) consider_from(s, e->place, other->x - e->x, other->y - e->y);
+        for (int j = floe->convex ? i + 1 : 0; j < n; j++) {
+            const bt_edge_load *other = &loads->load[chosen[j]];
+            if (j != i) consider_from(s, edge->place, other->x - edge->x, other->y - edge->y);
         }
-        xx += e->x * e->load->fx, yy += e->y * e->load->fy;
-        xy += (e->x * e->load->fy + e->y * e->load->fx) / 2;
-        scale += s->form->radius * (fabs(e->load->fx) + fabs(e->load->fy));
+        xx += edge->x * edge->load->fx, yy += edge->y * edge->load->fy;
+        xy += (edge->x * edge->load->fy + edge->y * edge->load->fx) / 2;
+        scale += s->form->radius * (fabs(edge->load->fx) + fabs(edge->load->fy));
     }
     double x, y;
     if (major_axis(xx, xy, yy, EQUAL * scale, &x, &y)) consider_through(s, 0, 0, -y, x);
-    const form *o = s->form;
-    if (!major_axis(o->xx, o->xy, o->yy, COMPACT * o->polar / 2, &x, &y)) return;
-    if (x * f->outline[0] + y * f->outline[1] < 0) x = -x, y = -y;
+    const form *outline = s->form;
+    if (!major_axis(outline->xx, outline->xy, outline->yy, COMPACT * outline->polar / 2, &x, &y)) return;
+    if (x * floe->outline[0] + y * floe->outline[1] < 0) x = -x, y = -y;
     double low = 0, high = 0;
-    for (int i = 0; i < f->n; i++) {
-        const double along = x * f->outline[2 * i] + y * f->outline[2 * i + 1];
+    for (int i = 0; i < floe->n; i++) {
+        const double along = x * floe->outline[2 * i] + y * floe->outline[2 * i + 1];
         low = bt_min(low, along), high = bt_max(high, along);
     }
     consider_through(s, 0, 0, -y, x);
@@ -334,19 +334,20 @@ static int by_contact(const void *a, const void *b)
     return (int)p->collision - (int)q->collision;
 }
 
-bool bt_split_find(const bt_split_floe *f, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best)
+bool bt_split_find(const bt_split_floe *floe, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best)
 {
     *best = (bt_split){.peak = -1};
-    const form o = form_of(f);
-    if (!(2 * o.radius >= law->least_width)) return false;
+    const form outline = form_of(floe);
+    if (!(2 * outline.radius >= law->least_width)) return false;
     qsort(load, (size_t)n_loads, sizeof *load, by_contact);
     bt_edge_load few[16], *on_edge = n_loads <= 16 ? few : bt_alloc((size_t)n_loads, sizeof *on_edge);
-    for (int k = 0; k < n_loads; k++) on_edge[k] = bt_edge_load_of(f, &load[k], law->slop);
+    for (int k = 0; k < n_loads; k++) on_edge[k] = bt_edge_load_of(floe, &load[k], law->slop);
     for (int k = -1; k < n_loads; k++) {
         if (k >= 0 && !load[k].collision) continue;
-        const bt_load_case w = bt_load_case_of(on_edge, n_loads, k);
-        if (!(bound(f, &o, w.size, fabs(w.torque), w.opening, law, law->least_width) > 1)) continue;
-        search_sections(&(search){f, &o, &w, law, best});
+        const bt_load_case loads = bt_load_case_of(on_edge, n_loads, k);
+        if (!(bound(floe, &outline, loads.size, fabs(loads.torque), loads.opening, law, law->least_width) > 1))
+            continue;
+        search_sections(&(search){floe, &outline, &loads, law, best});
     }
     if (on_edge != few) free(on_edge);
     return best->ratio > 0;

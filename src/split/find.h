@@ -33,12 +33,12 @@ typedef struct bt_split {
 /// The section of a floe with the largest ratio of stress to strength above 1, of those the law allows; false when
 /// there is none. The loads are put into the order of (other, part, point): their order has no effect. Among sections
 /// whose ratios agree to 1e-9 the first one counts. Safe in threads.
-bool bt_split_find(const bt_split_floe *f, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best);
+bool bt_split_find(const bt_split_floe *floe, bt_floe_load *load, int n_loads, const bt_split_law *law, bt_split *best);
 
 /// Loads whose sizes, with their opening forces, add up to no more than this, N, split no such floe (find.c).
-double bt_split_borne(const bt_split_floe *f, const bt_split_law *law);
+double bt_split_borne(const bt_split_floe *floe, const bt_split_law *law);
 
 /// Upper bound of the ratio of every section of this length or longer, m, whichever the loads (find.c).
-double bt_split_bound(const bt_split_floe *f, const bt_load_case *loads, const bt_split_law *law, double l);
+double bt_split_bound(const bt_split_floe *floe, const bt_load_case *loads, const bt_split_law *law, double l);
 
 #endif

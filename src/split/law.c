@@ -18,9 +18,9 @@ double bt_split_strength(const bt_split_law *law, double l, bool pair)
 double bt_split_scatter(int64_t seed, bt_gid ancestor, int64_t path, double modulus)
 {
     if (!(modulus > 0)) return 1;
-    bt_rng r = bt_rng_start(seed, BT_RNG_SPLIT, ancestor);
-    r.ctr.v[2] = (uint64_t)path;
-    const double u = 1 - bt_rng_uniform(&r); // in (0, 1]
+    bt_rng rng = bt_rng_start(seed, BT_RNG_SPLIT, ancestor);
+    rng.ctr.v[2] = (uint64_t)path;
+    const double u = 1 - bt_rng_uniform(&rng); // in (0, 1]
     return bt_pow(-bt_log(u) / bt_log(2), 1 / modulus);
 }
 

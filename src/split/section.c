@@ -10,11 +10,11 @@
 static double cross(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
 static double square(double x, double y) { return x * x + y * y; }
 
-void bt_chord_place(int n, const double *v, bt_chord_end e, double p[2])
+void bt_chord_place(int n, const double *v, bt_chord_end end, double p[2])
 {
-    const double *a = v + 2 * e.edge, *b = v + 2 * (e.edge + 1 < n ? e.edge + 1 : 0);
-    p[0] = a[0] + e.t * (b[0] - a[0]);
-    p[1] = a[1] + e.t * (b[1] - a[1]);
+    const double *a = v + 2 * end.edge, *b = v + 2 * (end.edge + 1 < n ? end.edge + 1 : 0);
+    p[0] = a[0] + end.t * (b[0] - a[0]);
+    p[1] = a[1] + end.t * (b[1] - a[1]);
 }
 
 /// The place at share t, 0 to 1, of an edge, or a vertex within slop of it.
@@ -77,21 +77,21 @@ static bool unit(double *dx, double *dy)
     return true;
 }
 
-bool bt_chord_from(int n, const double *v, bt_chord_end a, double dx, double dy, double slop, bt_chord *c)
+bool bt_chord_from(int n, const double *v, bt_chord_end end, double dx, double dy, double slop, bt_chord *chord)
 {
     crossing at[BT_MAX_VERTICES];
     double p[2];
-    bt_chord_place(n, v, a, p);
+    bt_chord_place(n, v, end, p);
     if (!unit(&dx, &dy)) return false;
     const int k = crossings(n, v, p[0], p[1], dx, dy, at);
     int first = 0;
     while (first < k && at[first].along <= slop) first++;
     if ((k - first) % 2 == 0) return false; // just beyond the place is outside
-    *c = (bt_chord){a, place_on(n, v, at[first].edge, at[first].t, slop)};
+    *chord = (bt_chord){end, place_on(n, v, at[first].edge, at[first].t, slop)};
     return true;
 }
 
-bool bt_chord_through(int n, const double *v, double x, double y, double dx, double dy, double slop, bt_chord *c)
+bool bt_chord_through(int n, const double *v, double x, double y, double dx, double dy, double slop, bt_chord *chord)
 {
     crossing at[BT_MAX_VERTICES];
     if (!unit(&dx, &dy)) return false;
@@ -103,14 +103,14 @@ bool bt_chord_through(int n, const double *v, double x, double y, double dx, dou
         if (away < least) least = away, best = i;
     }
     if (best < 0) return false;
-    *c = (bt_chord){place_on(n, v, at[best].edge, at[best].t, slop),
-                    place_on(n, v, at[best + 1].edge, at[best + 1].t, slop)};
+    *chord = (bt_chord){place_on(n, v, at[best].edge, at[best].t, slop),
+                        place_on(n, v, at[best + 1].edge, at[best + 1].t, slop)};
     return true;
 }
 
-int bt_chord_piece(int n, const double *v, const bt_chord *c, double *out)
+int bt_chord_piece(int n, const double *v, const bt_chord *chord, double *out)
 {
-    const bt_chord_end a = c->a, b = c->b;
+    const bt_chord_end a = chord->a, b = chord->b;
     if (a.edge == b.edge && a.t == b.t) return 0;
     bt_chord_place(n, v, a, out);
     bt_chord_place(n, v, b, out + 2);
@@ -124,39 +124,40 @@ int bt_chord_piece(int n, const double *v, const bt_chord *c, double *out)
     return between + 2;
 }
 
-bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, double slop)
+bt_edge_load bt_edge_load_of(const bt_split_floe *floe, const bt_floe_load *load, double slop)
 {
-    bt_edge_load e = {.load = load, .place = bt_chord_nearest(f->n, f->outline, load->x, load->y, slop), .parts = 1};
+    bt_edge_load edge = {.load = load, .place = bt_chord_nearest(floe->n, floe->outline, load->x, load->y, slop),
+                         .parts = 1};
     double p[2];
-    bt_chord_place(f->n, f->outline, e.place, p);
-    e.x = p[0], e.y = p[1];
-    e.part[0].x = p[0], e.part[0].y = p[1], e.part[0].position = e.place.edge + e.place.t;
-    e.mean_x = p[0], e.mean_y = p[1];
-    if (!(load->length / 4 > slop)) return e;
-    e.parts = 2;
+    bt_chord_place(floe->n, floe->outline, edge.place, p);
+    edge.x = p[0], edge.y = p[1];
+    edge.part[0].x = p[0], edge.part[0].y = p[1], edge.part[0].position = edge.place.edge + edge.place.t;
+    edge.mean_x = p[0], edge.mean_y = p[1];
+    if (!(load->length / 4 > slop)) return edge;
+    edge.parts = 2;
     for (int i = 0; i < 2; i++) {
         const double off = (i ? 0.25 : -0.25) * load->length;
         const bt_chord_end at =
-            bt_chord_nearest(f->n, f->outline, e.x + off * load->edge_x, e.y + off * load->edge_y, 0);
-        bt_chord_place(f->n, f->outline, at, p);
-        e.part[i].x = p[0], e.part[i].y = p[1], e.part[i].position = at.edge + at.t;
+            bt_chord_nearest(floe->n, floe->outline, edge.x + off * load->edge_x, edge.y + off * load->edge_y, 0);
+        bt_chord_place(floe->n, floe->outline, at, p);
+        edge.part[i].x = p[0], edge.part[i].y = p[1], edge.part[i].position = at.edge + at.t;
     }
-    e.mean_x = (e.part[0].x + e.part[1].x) / 2, e.mean_y = (e.part[0].y + e.part[1].y) / 2;
-    return e;
+    edge.mean_x = (edge.part[0].x + edge.part[1].x) / 2, edge.mean_y = (edge.part[0].y + edge.part[1].y) / 2;
+    return edge;
 }
 
 bt_load_case bt_load_case_of(const bt_edge_load *load, int n, int peak)
 {
-    bt_load_case c = {.load = load, .n = n, .peak = peak};
+    bt_load_case loads = {.load = load, .n = n, .peak = peak};
     for (int k = 0; k < n; k++) {
-        if (!bt_load_acts(&c, k)) continue;
+        if (!bt_load_acts(&loads, k)) continue;
         const bt_floe_load *f = load[k].load;
-        c.fx += f->fx, c.fy += f->fy;
-        c.size += bt_hypot(f->fx, f->fy);
-        c.opening += f->opening;
-        c.torque += cross(load[k].mean_x, load[k].mean_y, f->fx, f->fy);
+        loads.fx += f->fx, loads.fy += f->fy;
+        loads.size += bt_hypot(f->fx, f->fy);
+        loads.opening += f->opening;
+        loads.torque += cross(load[k].mean_x, load[k].mean_y, f->fx, f->fy);
     }
-    return c;
+    return loads;
 }
 
 /// Area, first moments and polar second moment of a polygon about the origin.
@@ -172,55 +173,56 @@ static void moments_about_origin(int n, const double *v, double *area, double *s
     }
 }
 
-bt_section bt_section_of(const bt_split_floe *f, double area, double polar, const bt_load_case *loads,
-                         const bt_chord *c, double slop)
+bt_section bt_section_of(const bt_split_floe *floe, double area, double polar, const bt_load_case *loads,
+                         const bt_chord *chord, double slop)
 {
     double a[2], b[2], piece[2 * (BT_MAX_VERTICES + 2)];
-    bt_chord_place(f->n, f->outline, c->a, a);
-    bt_chord_place(f->n, f->outline, c->b, b);
-    bt_section s = {.length = bt_hypot(b[0] - a[0], b[1] - a[1])};
-    const double l = s.length, dx = (b[0] - a[0]) / l, dy = (b[1] - a[1]) / l, nx = -dy, ny = dx;
+    bt_chord_place(floe->n, floe->outline, chord->a, a);
+    bt_chord_place(floe->n, floe->outline, chord->b, b);
+    bt_section section = {.length = bt_hypot(b[0] - a[0], b[1] - a[1])};
+    const double l = section.length, dx = (b[0] - a[0]) / l, dy = (b[1] - a[1]) / l, nx = -dy, ny = dx;
     const double mx = (a[0] + b[0]) / 2, my = (a[1] + b[1]) / 2;
     double area1, sx, sy, polar1;
-    moments_about_origin(bt_chord_piece(f->n, f->outline, c, piece), piece, &area1, &sx, &sy, &polar1);
+    moments_about_origin(bt_chord_piece(floe->n, floe->outline, chord, piece), piece, &area1, &sx, &sy, &polar1);
     const double turn = loads->torque / polar;
     double qx = -loads->fx * area1 / area + turn * sy, qy = -loads->fy * area1 / area - turn * sx;
     double moment = -cross(sx, sy, loads->fx, loads->fy) / area - turn * polar1 - cross(mx, my, qx, qy);
 
-    const double at_a = c->a.edge + c->a.t, at_b = c->b.edge + c->b.t, n = f->n;
+    const double at_a = chord->a.edge + chord->a.t, at_b = chord->b.edge + chord->b.t, n = floe->n;
     const double left = at_a >= at_b ? at_a - at_b : at_a - at_b + n, near2 = slop * slop;
     for (int k = 0; k < loads->n; k++) {
         if (!bt_load_acts(loads, k)) continue;
-        const bt_edge_load *e = &loads->load[k];
-        const bt_floe_load *force = e->load;
-        const double from_a = square(e->x - a[0], e->y - a[1]), from_b = square(e->x - b[0], e->y - b[1]);
+        const bt_edge_load *edge = &loads->load[k];
+        const bt_floe_load *force = edge->load;
+        const double from_a = square(edge->x - a[0], edge->y - a[1]), from_b = square(edge->x - b[0], edge->y - b[1]);
         const double reach = slop + force->length / 2;
         if (bt_min(from_a, from_b) > reach * reach) {
-            const double position = e->place.edge + e->place.t;
+            const double position = edge->place.edge + edge->place.t;
             if (!((position >= at_b ? position - at_b : position - at_b + n) < left)) continue;
             qx += force->fx, qy += force->fy;
-            moment += cross(e->mean_x - mx, e->mean_y - my, force->fx, force->fy);
+            moment += cross(edge->mean_x - mx, edge->mean_y - my, force->fx, force->fy);
             continue;
         }
-        for (int i = 0; i < e->parts; i++) {
-            const double x = e->part[i].x, y = e->part[i].y, position = e->part[i].position;
+        for (int i = 0; i < edge->parts; i++) {
+            const double x = edge->part[i].x, y = edge->part[i].y, position = edge->part[i].position;
             const double after_b = position >= at_b ? position - at_b : position - at_b + n;
             const bool at_end = square(x - a[0], y - a[1]) <= near2 || square(x - b[0], y - b[1]) <= near2;
-            const double share = (at_end ? 0.5 : after_b < left ? 1 : 0) / e->parts;
+            const double share = (at_end ? 0.5 : after_b < left ? 1 : 0) / edge->parts;
             qx += share * force->fx, qy += share * force->fy;
             moment += share * cross(x - mx, y - my, force->fx, force->fy);
         }
         const int end = from_a <= from_b ? 0 : 1;
-        s.at[end].opening += force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
-        s.at[end].thrust += (end ? -1 : 1) * (force->fx * dx + force->fy * dy);
-        s.at[end].bearing += force->length;
+        section.at[end].opening += force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
+        section.at[end].thrust += (end ? -1 : 1) * (force->fx * dx + force->fy * dy);
+        section.at[end].bearing += force->length;
     }
     for (int end = 0; end < 2; end++) {
-        s.at[end].thrust = bt_max(0, s.at[end].thrust);
-        s.at[end].inertial = bt_min(s.at[end].thrust, bt_max(0, (end ? -1 : 1) * (loads->fx * dx + loads->fy * dy)));
+        section.at[end].thrust = bt_max(0, section.at[end].thrust);
+        section.at[end].inertial =
+            bt_min(section.at[end].thrust, bt_max(0, (end ? -1 : 1) * (loads->fx * dx + loads->fy * dy)));
     }
-    s.width = area / l;
-    s.normal = qx * nx + qy * ny + s.at[0].opening + s.at[1].opening;
-    s.moment = moment + (s.at[1].opening - s.at[0].opening) * l / 2;
-    return s;
+    section.width = area / l;
+    section.normal = qx * nx + qy * ny + section.at[0].opening + section.at[1].opening;
+    section.moment = moment + (section.at[1].opening - section.at[0].opening) * l / 2;
+    return section;
 }

@@ -84,10 +84,13 @@ typedef struct bt_section {
 } bt_section;
 
 /// Does load k act in this case?
-static inline bool bt_load_acts(const bt_load_case *c, int k) { return !c->load[k].load->collision || k == c->peak; }
+static inline bool bt_load_acts(const bt_load_case *loads, int k)
+{
+    return !loads->load[k].load->collision || k == loads->peak;
+}
 
 /// Put a load on the outline.
-bt_edge_load bt_edge_load_of(const bt_split_floe *f, const bt_floe_load *load, double slop);
+bt_edge_load bt_edge_load_of(const bt_split_floe *floe, const bt_floe_load *load, double slop);
 
 /// The persisting loads and the collision number `peak` (−1: none), with their sums.
 bt_load_case bt_load_case_of(const bt_edge_load *load, int n, int peak);
@@ -96,21 +99,21 @@ bt_load_case bt_load_case_of(const bt_edge_load *load, int n, int peak);
 bt_chord_end bt_chord_nearest(int n, const double *v, double x, double y, double slop);
 
 /// The place in metres.
-void bt_chord_place(int n, const double *v, bt_chord_end e, double p[2]);
+void bt_chord_place(int n, const double *v, bt_chord_end end, double p[2]);
 
 /// The section from a place on the outline along (dx, dy), to where it first leaves the floe. False when it does not
 /// lead inside, or leaves at once.
-bool bt_chord_from(int n, const double *v, bt_chord_end a, double dx, double dy, double slop, bt_chord *c);
+bool bt_chord_from(int n, const double *v, bt_chord_end end, double dx, double dy, double slop, bt_chord *chord);
 
 /// The section along (dx, dy) through (x, y), or when that lies outside the floe, the nearest one on the same line.
-bool bt_chord_through(int n, const double *v, double x, double y, double dx, double dy, double slop, bt_chord *c);
+bool bt_chord_through(int n, const double *v, double x, double y, double dx, double dy, double slop, bt_chord *chord);
 
 /// Outline of the part left of the chord, [at most n + 2][2] m into out: a, b, and on round to a. Returns the number of
 /// vertices, fewer than 3 when there is no such part. The right part is the left one of the chord from b to a.
-int bt_chord_piece(int n, const double *v, const bt_chord *c, double *out);
+int bt_chord_piece(int n, const double *v, const bt_chord *chord, double *out);
 
 /// What a section carries. area, polar: A and J of the floe.
-bt_section bt_section_of(const bt_split_floe *f, double area, double polar, const bt_load_case *loads,
-                         const bt_chord *c, double slop);
+bt_section bt_section_of(const bt_split_floe *floe, double area, double polar, const bt_load_case *loads,
+                         const bt_chord *chord, double slop);
 
 #endif

@@ -6,10 +6,10 @@
 #include "bergtow/world.h"
 
 /// Collective. Another velocity. Errors, the reason in err: BT_ERR_USAGE.
-bt_status bt_edit_velocity(bt_world *w, bt_gid gid, const double v[3], bt_errors *err);
+bt_status bt_edit_velocity(bt_world *world, bt_gid gid, const double v[3], bt_errors *err);
 
 /// Collective. Another place, free of other bodies; that it is in the domain is the caller's to see to. Errors:
 /// BT_ERR_USAGE.
-bt_status bt_edit_place(bt_world *w, bt_gid gid, const double to[3], bt_errors *err);
+bt_status bt_edit_place(bt_world *world, bt_gid gid, const double to[3], bt_errors *err);
 
 #endif

@@ -83,38 +83,41 @@ typedef struct bt_splitting {
     bt_gid cap_borne;
 } bt_splitting;
 
-void bt_splitting_free(bt_splitting *s);
+void bt_splitting_free(bt_splitting *splitting);
 
 /// Pieces that have been born.
-static inline bt_gid bt_splitting_pieces(const bt_splitting *s) { return s ? 2 * s->n : 0; }
+static inline bt_gid bt_splitting_pieces(const bt_splitting *splitting) { return splitting ? 2 * splitting->n : 0; }
 
 /// The split that made piece k (from 0), and which of its pieces it is.
-static inline const bt_split_record *bt_splitting_birth(const bt_splitting *s, bt_gid k) { return &s->split[k / 2]; }
+static inline const bt_split_record *bt_splitting_birth(const bt_splitting *splitting, bt_gid k)
+{
+    return &splitting->split[k / 2];
+}
 
 /// Outlines of split k: of piece 0, of piece 1, or, 2, of a parent that was there from the start.
-static inline const double *bt_splitting_outline(const bt_splitting *s, int64_t k, int which)
+static inline const double *bt_splitting_outline(const bt_splitting *splitting, int64_t k, int which)
 {
-    const int64_t *c = s->split[k].corners;
-    return s->vertex + 2 * (s->begin[k] + (which > 0 ? c[0] : 0) + (which > 1 ? c[1] : 0));
+    const int64_t *c = splitting->split[k].corners;
+    return splitting->vertex + 2 * (splitting->begin[k] + (which > 0 ? c[0] : 0) + (which > 1 ? c[1] : 0));
 }
 
 /// Append a split to the history: its outlines one after the other, [corners[0] + corners[1] + corners[2]][2].
-void bt_splitting_append(bt_splitting *s, const bt_split_record *r, const double *vertex);
+void bt_splitting_append(bt_splitting *splitting, const bt_split_record *record, const double *vertex);
 
 /// Generation of a floe, 0 = there from the start.
-int64_t bt_splitting_generation(const bt_splitting *s, bt_gid gid);
+int64_t bt_splitting_generation(const bt_splitting *splitting, bt_gid gid);
 /// The floe that was there from the start, and the way from it to gid (bt_split_scatter).
-bt_gid bt_splitting_ancestor(const bt_splitting *s, bt_gid gid, int64_t *path);
+bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t *path);
 
 /// Collective. After the solve. True: floes were cut, their pieces are new bodies, all velocities are those at the
 /// start of the step, and it is to be solved again. False: nothing splits, or `round` is BT_SPLIT_ROUNDS.
-bool bt_splitting_step(bt_world *w, int round);
+bool bt_splitting_step(bt_world *world, int round);
 
 /// After bodies have been set up as in the beginning, before they are distributed: pieces in the place of parents, as
 /// the history of s has them. Poses and velocities are yet to be set.
-void bt_splitting_restore(bt_world *w);
+void bt_splitting_restore(bt_world *world);
 
 /// Of the history, for the hash of the state.
-uint64_t bt_splitting_hash(const bt_splitting *s);
+uint64_t bt_splitting_hash(const bt_splitting *splitting);
 
 #endif

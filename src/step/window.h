@@ -53,13 +53,13 @@ typedef struct bt_undisturbed {
 
 /// Of the floes below id n_floes of a world whose bodies have all been added, before it is distributed to ranks. held:
 /// along x, y, by walls.
-void bt_undisturbed_create(bt_world *w, bt_gid n_floes, const bool held[2]);
+void bt_undisturbed_create(bt_world *world, bt_gid n_floes, const bool held[2]);
 
 /// At the end of a step: it drifts on. Nothing where there is none.
-void bt_undisturbed_advance(bt_world *w);
+void bt_undisturbed_advance(bt_world *world);
 
 /// Place of the towed body in the frame that drifts with this ice (where there is none, over ground), not wrapped, m.
-void bt_undisturbed_place(const bt_world *w, double at[2]);
+void bt_undisturbed_place(const bt_world *world, double at[2]);
 
 /// Mean floe diameters by which the rear moves on at most: renewing costs new labels, so it is done for many floes at
 /// once.
@@ -84,26 +84,26 @@ typedef struct bt_window {
 } bt_window;
 
 /// Let the window follow the towed body of a world whose bodies have all been added, before it is distributed to ranks:
-/// par.period_x is its length, and w->undisturbed is there.
+/// par.period_x is its length, and world->undisturbed is there.
 /// sign: of the tow along x; ahead: m; n_floes: bodies below this id are renewed.
-void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes);
+void bt_window_create(bt_world *world, double sign, double ahead, bt_gid n_floes);
 
 /// Collective. At the start of a step: the rear follows the body, floes are renewed. Nothing without a window.
-void bt_window_begin(bt_world *w);
+void bt_window_begin(bt_world *world);
 
 /// Low end of the window, x in m.
-static inline double bt_window_low(const bt_window *v, const bt_undisturbed *ice)
+static inline double bt_window_low(const bt_window *window, const bt_undisturbed *ice)
 {
-    return (v->sign > 0 ? v->rear : -(v->rear + v->length)) + ice->drift_x;
+    return (window->sign > 0 ? window->rear : -(window->rear + window->length)) + ice->drift_x;
 }
 
 /// Periods that a body in the window at x lies above it.
-int32_t bt_window_lap(const bt_world *w, double x);
+int32_t bt_window_lap(const bt_world *world, double x);
 
 /// Windows of ice that have gone by: way of the rear through the ice over the length.
-static inline double bt_window_laps(const bt_window *v) { return (v->rear - v->start) / v->length; }
+static inline double bt_window_laps(const bt_window *window) { return (window->rear - window->start) / window->length; }
 
 /// Of the window and of the undisturbed ice.
-uint64_t bt_window_hash(const bt_world *w);
+uint64_t bt_window_hash(const bt_world *world);
 
 #endif

@@ -17,41 +17,41 @@
 #include "step/window.h"
 #include "tow/tow.h"
 
-bt_world *bt_world_create(const bt_params *p)
+bt_world *bt_world_create(const bt_params *par)
 {
-    bt_world *w = bt_alloc(1, sizeof *w);
-    w->par = *p;
-    w->towed = -1;
-    w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
-    w->cells = bt_cells_create();
-    w->solver = bt_solver_create();
-    w->forces = bt_forces_create();
-    return w;
+    bt_world *world = bt_alloc(1, sizeof *world);
+    world->par = *par;
+    world->towed = -1;
+    world->bodies.offset = bt_alloc(1, sizeof *world->bodies.offset);
+    world->cells = bt_cells_create();
+    world->solver = bt_solver_create();
+    world->forces = bt_forces_create();
+    return world;
 }
 
-void bt_world_free(bt_world *w)
+void bt_world_free(bt_world *world)
 {
-    if (!w) return;
-    bt_bodies_free(&w->bodies);
-    bt_cells_free(w->cells);
-    bt_solver_free(w->solver);
-    bt_forces_free(w->forces);
-    bt_domain_free(w->domain);
-    bt_shore_free(w->shore);
-    bt_impacts_free(w->impacts);
-    bt_environment_free(w->environment);
-    bt_splitting_free(w->splitting);
-    bt_tow_free(w->tow);
-    bt_events_free(&w->events);
-    free(w->window);
-    free(w->undisturbed);
-    free(w);
+    if (!world) return;
+    bt_bodies_free(&world->bodies);
+    bt_cells_free(world->cells);
+    bt_solver_free(world->solver);
+    bt_forces_free(world->forces);
+    bt_domain_free(world->domain);
+    bt_shore_free(world->shore);
+    bt_impacts_free(world->impacts);
+    bt_environment_free(world->environment);
+    bt_splitting_free(world->splitting);
+    bt_tow_free(world->tow);
+    bt_events_free(&world->events);
+    free(world->window);
+    free(world->undisturbed);
+    free(world);
 }
 
-bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
+bt_gid bt_world_add(bt_world *world, const bt_body_def *def)
 {
-    w->cells->labelled = false;
-    return bt_bodies_add(&w->bodies, d);
+    world->cells->labelled = false;
+    return bt_bodies_add(&world->bodies, def);
 }
 
 /// Mix of a 64-bit word: the finaliser of SplitMix64 (Steele, Lea & Flood 2014).
@@ -73,46 +73,47 @@ static uint64_t mix_double(uint64_t h, double x)
 
 /// What a body is called in the hash: ids that are kept for pieces count last, so that a world in which nothing splits
 /// is called as one in which nothing can.
-static uint64_t name_of(const bt_world *w, bt_gid gid)
+static uint64_t name_of(const bt_world *world, bt_gid gid)
 {
-    const bt_splitting *s = w->splitting;
-    if (!s || gid < s->first) return (uint64_t)gid;
-    if (gid >= s->first + s->reserve) return (uint64_t)(gid - s->reserve);
-    return (uint64_t)(w->bodies.n_global - s->reserve + (gid - s->first));
+    const bt_splitting *splitting = world->splitting;
+    if (!splitting || gid < splitting->first) return (uint64_t)gid;
+    if (gid >= splitting->first + splitting->reserve) return (uint64_t)(gid - splitting->reserve);
+    return (uint64_t)(world->bodies.n_global - splitting->reserve + (gid - splitting->first));
 }
 
 /// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their
 /// names.
-static uint64_t hash_memory(const bt_world *w, const bt_memory *r)
+static uint64_t hash_memory(const bt_world *world, const bt_memory *memory)
 {
-    const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];
-    uint64_t h = mix(mix(mix(name_of(w, r->a)) ^ name_of(w, r->b)) ^ where);
-    for (int i = 0; i < r->n_points; i++) h = mix_double(mix(h ^ r->feature[i]), r->value[i]);
-    return r->law > 1 ? mix_double(mix_double(h, r->value[2]), r->value[3]) : h;
+    const uint64_t where = (uint64_t)(memory->law - 1) << 32 | (uint64_t)memory->part[0] << 16 | memory->part[1];
+    uint64_t h = mix(mix(mix(name_of(world, memory->a)) ^ name_of(world, memory->b)) ^ where);
+    for (int i = 0; i < memory->n_points; i++) h = mix_double(mix(h ^ memory->feature[i]), memory->value[i]);
+    return memory->law > 1 ? mix_double(mix_double(h, memory->value[2]), memory->value[3]) : h;
 }
 
-uint64_t bt_world_hash(const bt_world *w)
+uint64_t bt_world_hash(const bt_world *world)
 {
     // The sum over bodies is associative: any order, any distribution.
-    const bt_bodies *b = &w->bodies;
+    const bt_bodies *bodies = &world->bodies;
     uint64_t sum = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (!bt_domain_owns(w, i)) continue;
-        uint64_t h = mix(name_of(w, b->gid[i]));
-        const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
+    for (bt_idx i = 0; i < bodies->n; i++) {
+        if (!bt_domain_owns(world, i)) continue;
+        uint64_t h = mix(name_of(world, bodies->gid[i]));
+        const double state[] = {bodies->pose[i].x, bodies->pose[i].y, bodies->pose[i].yaw, bodies->vel[i].x,
+                                bodies->vel[i].y, bodies->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
-        const bt_exposure *e = &b->exposure[i];
-        if (e->skin != 1 || e->water_form != 1 || e->air_form != 1)
-            h = mix_double(mix_double(mix_double(h, e->skin), e->water_form), e->air_form);
-        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->lap[i]));
+        const bt_exposure *exposure = &bodies->exposure[i];
+        if (exposure->skin != 1 || exposure->water_form != 1 || exposure->air_form != 1)
+            h = mix_double(mix_double(mix_double(h, exposure->skin), exposure->water_form), exposure->air_form);
+        if (world->window) h = mix(h ^ ((uint64_t)(uint32_t)bodies->home[i].copy << 32 | (uint32_t)bodies->lap[i]));
         sum += h;
     }
-    for (bt_idx k = 0; k < w->cells->n; k++)
-        for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].laws.n_memory; i++)
-            sum += hash_memory(w, &w->cells->cell[k].laws.memory[i]);
-    sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
-    if (w->window) sum = mix(sum ^ bt_window_hash(w));
-    if (w->splitting && w->splitting->n > 0) sum = mix(sum ^ bt_splitting_hash(w->splitting));
-    if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
-    return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
+    for (bt_idx k = 0; k < world->cells->n; k++)
+        for (bt_idx i = 0; world->cells->cell[k].own && i < world->cells->cell[k].laws.n_memory; i++)
+            sum += hash_memory(world, &world->cells->cell[k].laws.memory[i]);
+    sum = bt_domain_sum_words(world, sum) + mix((uint64_t)world->step);
+    if (world->window) sum = mix(sum ^ bt_window_hash(world));
+    if (world->splitting && world->splitting->n > 0) sum = mix(sum ^ bt_splitting_hash(world->splitting));
+    if (world->environment) sum = mix_double(mix_double(sum, world->drift_x), world->drift_y);
+    return world->tow ? mix(sum ^ bt_tow_hash(world->tow)) : sum;
 }

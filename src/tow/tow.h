@@ -121,51 +121,51 @@ typedef struct bt_tow {
     double body_w[BT_MAX_BRANCHES]; ///< ∂(l̂·v_hull)/∂λ, 1/kg
 } bt_tow;
 
-void bt_tow_free(bt_tow *t);
+void bt_tow_free(bt_tow *tow);
 
 /// Does a line pull (modes line and thrust)?
-static inline bool bt_tow_has_line(const bt_tow *t)
+static inline bool bt_tow_has_line(const bt_tow *tow)
 {
-    return t && (t->mode == BT_TOW_LINE || t->mode == BT_TOW_THRUST);
+    return tow && (tow->mode == BT_TOW_LINE || tow->mode == BT_TOW_THRUST);
 }
 
 /// Speed of the programme at this time, m/s.
-double bt_tow_speed(const bt_tow *t, double time);
+double bt_tow_speed(const bt_tow *tow, double time);
 
 /// At the start of a step, before the forces are asked for: speed of the programme, and the prescribed velocity into a
 /// body that is led.
-void bt_tow_lead(bt_world *w);
+void bt_tow_lead(bt_world *world);
 
 /// At the start of a step, after the free velocities: end moved, line rows set up.
-void bt_tow_begin(bt_world *w);
+void bt_tow_begin(bt_world *world);
 
 /// Exact solution of the line rows at the velocity *v of the body, which changes with them; returns their natural-map
 /// residual before, m/s.
-double bt_tow_update(bt_tow *t, bt_vel *v, bt_inv inv);
+double bt_tow_update(bt_tow *tow, bt_vel *v, bt_inv inv);
 
 /// Velocity of the body changed by the impulses of all branches.
-void bt_tow_apply(const bt_tow *t, bt_vel *v, bt_inv inv);
+void bt_tow_apply(const bt_tow *tow, bt_vel *v, bt_inv inv);
 
 /// Natural-map residual of the line rows at velocity v, m/s.
-double bt_tow_residual(const bt_tow *t, const bt_vel *v);
+double bt_tow_residual(const bt_tow *tow, const bt_vel *v);
 
 /// Start from the impulses of the last step, or from none.
-void bt_tow_warm_start(bt_tow *t, bool keep);
+void bt_tow_warm_start(bt_tow *tow, bool keep);
 
 /// At the end of a step, after the body has moved: the end moves, branches break, events are noted.
-void bt_tow_advance(bt_world *w);
+void bt_tow_advance(bt_world *world);
 
 /// Pull of branch k in the last step, along the line between its ends, N.
-static inline double bt_tow_pull(const bt_tow *t, int k) { return t->branch[k].lambda / t->dt; }
+static inline double bt_tow_pull(const bt_tow *tow, int k) { return tow->branch[k].lambda / tow->dt; }
 
 /// Its tension, N: of a branch with a weight that at its ends, which bear half of the weight each.
-static inline double bt_tow_tension(const bt_tow *t, int k)
+static inline double bt_tow_tension(const bt_tow *tow, int k)
 {
-    const bt_branch *b = &t->branch[k];
-    const double pull = bt_tow_pull(t, k), half = 0.5 * b->weight * b->length0;
+    const bt_branch *branch = &tow->branch[k];
+    const double pull = bt_tow_pull(tow, k), half = 0.5 * branch->weight * branch->length0;
     return half > 0 && pull > 0 ? sqrt(pull * pull + half * half) : pull; // none of one that has parted
 }
 
-uint64_t bt_tow_hash(const bt_tow *t);
+uint64_t bt_tow_hash(const bt_tow *tow);
 
 #endif
