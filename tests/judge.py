@@ -177,7 +177,7 @@ def judge(case, folder, checked, ran):
     if wrong or ran.returncode == 3:
         return wrong
     if ran.returncode == 5:
-        if not re.search(r"step \d+: .*(guard\.|not a number|beyond all numbers)", ran.stderr):
+        if not re.search(r"step \d+: .*(guard\.|not a number|larger than any run can give)", ran.stderr):
             wrong.append(f"exit code 5 without a guard's message: {ran.stderr}")
         if not (folder / "failure.h5").exists():
             wrong.append(f"exit code 5 without failure.h5: {ran.stderr}")

@@ -184,7 +184,7 @@ def threads_here(asked: int) -> int:
     global team
     most = limit("threads")
     if not 0 <= asked <= most:  # before the library has it as a number of 32 bits
-        raise BergtowError(f"threads: {asked} cannot be had; give 1 to {most}, or 0 for run.threads of the "
+        raise BergtowError(f"threads: {asked} are not available; give 1 to {most}, or 0 for run.threads of the "
                            "case or all cores")
     if team in (None, os.getpid()):
         if asked != 1:

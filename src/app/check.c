@@ -163,7 +163,7 @@ static void warn_of_step(const bt_case *input, const bt_check_ice *ice, bt_error
                       input->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", step.longest);
     if (!step.floes)
         bt_warn(warnings, BT_WARN_FAST_FLOES,
-            "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s",
+            "run.dt: in %g s %s move %.3g of their size, more than 0.1; take at most %.3g s",
             input->run.dt, step.pieces ? "pieces of the lead" : "floes", step.passed, 0.1 * step.size / step.speed);
     const double reference = bt_case_reference_speed(input);
     if (ice->count >= 1 && step.speed > SLOW * reference)
@@ -195,7 +195,7 @@ static void warn_of_track(const bt_case *input, const bt_field *field, const bt_
         if (fall > BT_WINDOW_STRIDE * ice->size)
             bt_warn(warnings, BT_WARN_ICE_OVERTAKES,
                           "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, and a "
-                          "moving window takes in ice ahead only; set domain.ends: periodic or open, or tow faster",
+                          "moving window takes in new ice only ahead; set domain.ends: periodic or open, or tow faster",
                           fall);
     }
     bt_setup_track_free(&track);

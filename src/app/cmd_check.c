@@ -57,7 +57,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case 'j': opt->json = true; return 0;
     case ARGP_KEY_END:
         if (opt->json && opt->scale > 0)
-            argp_error(state, "--json and --scale: the twin is a case file; give one of them");
+            argp_error(state, "--json and --scale: the twin is a case file, not JSON; give only one of them");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }

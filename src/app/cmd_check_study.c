@@ -131,7 +131,8 @@ static bt_status check_conditions(const bt_study *study, numbers *sums, bt_error
     bt_status status = bt_study_base_case(study, &input, err); // what is wrong without any condition
     bt_case_free(&input);
     if (status != BT_OK) {
-        bt_errors_add(err, "%s: base: %s with `set` is no valid case, as any condition needs it; mend that first",
+        bt_errors_add(err, "%s: base: %s with `set` is not a valid case, which every condition needs; correct that "
+                           "first",
                       study->path, study->base_name);
         return status;
     }
@@ -146,7 +147,7 @@ static bt_status check_conditions(const bt_study *study, numbers *sums, bt_error
     tell_faults(&f, study, err);
     tell_faults(&w, study, warnings);
     if (status != BT_OK && k < study->n_conditions)
-        bt_errors_add(err, "%s: conditions from %" PRId64 " on are not looked at after %d errors; mend those first",
+        bt_errors_add(err, "%s: conditions from %" PRId64 " on are not checked after %d errors; correct those first",
                       study->path, k + 1, BT_MOST_COMPLAINTS);
     return status;
 }

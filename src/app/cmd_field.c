@@ -94,8 +94,8 @@ int bt_cmd_field(int argc, char **argv)
         const double took = bt_clock() - start;
         if (input.lead.mode != BT_LEAD_NONE)
             bt_errors_add(&warnings,
-                          "lead.mode: %s: the file holds the ice as it is before the lead, which a run of the case "
-                          "that reads the file opens in it",
+                          "lead.mode: %s: the file holds the ice without the lead; a run of the case that reads the "
+                          "file opens it",
                           input.lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed");
         input.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: its sizes are as they were drawn
         const bt_field_sizes sizes = bt_field_sizes_of(&input, &field);

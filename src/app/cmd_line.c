@@ -171,7 +171,7 @@ bt_status bt_cmd_each_may_read(const bt_comm *comm, const char *path, bt_errors 
     struct stat s;
     const bool pipe = comm->size > 1 && stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
     if (pipe)
-        bt_errors_add(err, "%s: is no file, and each of the %d ranks would read it; write it to a file first", path,
+        bt_errors_add(err, "%s: is not a file, and each of the %d ranks would read it; write it to a file first", path,
                       comm->size);
     return bt_comm_agree(comm, pipe ? BT_ERR_USAGE : BT_OK);
 }

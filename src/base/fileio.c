@@ -121,7 +121,7 @@ bt_status bt_file_may_take(const char *path, bt_errors *err)
     const char *kind = stat(path, &st) == 0 && !S_ISDIR(st.st_mode) ? kind_of(st.st_mode) : NULL;
     if (!kind && (is_own_descriptor(path) || !strncmp(path, "/dev/std", 8))) kind = "an open descriptor";
     if (!kind) return BT_OK; // a folder in the way is reported by the system
-    bt_errors_add(err, "%s: is %s and no regular file, which nothing replaces; move it away, or give another name",
+    bt_errors_add(err, "%s: is %s, not a regular file, and is not replaced; move it away, or give another name",
                   path, kind);
     return BT_ERR_IO;
 }
@@ -154,8 +154,8 @@ static int open_input(const char *path, const char *what, bool text, bool stream
     else if (S_ISDIR(st.st_mode)) bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
     else
         bt_errors_add(err,
-                      "%s: is %s and no regular file, it is not opened; write what it gives into a file, and give the "
-                      "path of that as %s",
+                      "%s: is %s, not a regular file, and is not opened; write its output to a file, and give the path "
+                      "of that as %s",
                       path, kind, what);
     return -1;
 }
@@ -194,8 +194,8 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
     }
     if (n > most) {
         bt_errors_add(err,
-                      "%s: larger than %zu MiB, which %s never is; check the name (large fields belong into an HDF5 "
-                      "file that ice.field names)",
+                      "%s: larger than %zu MiB, which %s never is; check the name (large fields belong in an HDF5 file "
+                      "that ice.field names)",
                       path, most >> 20, what);
         return BT_ERR_CASE;
     }

@@ -48,7 +48,7 @@ bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
 {
     const herr_t found = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, look_at, &(whole){path, err});
     if (found < 0)
-        bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot go through its objects; write it anew", path);
+        bt_errors_add(err, "%s: is cut off or damaged: HDF5 cannot list its objects; write it again", path);
     return found == 0 ? BT_OK : BT_ERR_CASE;
 }
 

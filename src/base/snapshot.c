@@ -106,7 +106,7 @@ static void complain(bt_snapshot *snap, const char *name, const char *what)
     if (!snap->faulty && snap->err)
         bt_errors_add(
             snap->err,
-            "%s: /%s %s; it was written by another version of the program: go on with that one, or start the run anew",
+            "%s: /%s %s; it was written by another version of the program: use that one, or start the run again",
             snap->path ? snap->path : "checkpoint", name, what);
     snap->faulty = true;
 }
@@ -117,7 +117,7 @@ void bt_snapshot_want(bt_snapshot *snap, bool good, const char *name, int64_t ro
     char where[32] = "";
     if (row >= 0) snprintf(where, sizeof where, ", row %" PRId64 ",", row);
     if (!snap->faulty && snap->err)
-        bt_errors_add(snap->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew",
+        bt_errors_add(snap->err, "%s: /%s%s %s; no run writes that: take another checkpoint, or start the run again",
                       snap->path ? snap->path : "checkpoint", name, where, what);
     snap->faulty = true;
 }
@@ -136,7 +136,7 @@ static const bt_item *demand(bt_snapshot *snap, const char *name, bt_item_type t
     else if (item->type != type || item->width != width || (n >= 0 && item->n != n))
         complain(snap, name, "has another shape than expected");
     else if (type == BT_ITEM_U8 && !yes_and_no(item))
-        bt_snapshot_want(snap, false, name, -1, "holds more than 0 and 1");
+        bt_snapshot_want(snap, false, name, -1, "holds values other than 0 and 1");
     else return item;
     return NULL;
 }
@@ -203,7 +203,7 @@ void bt_snapshot_take_row(bt_snapshot *snap, const char *group, const bt_state_r
 {
     static const char *const what[BT_ROW_CHECKS] = {
         [BT_ROW_FINITE] = "is not finite", [BT_ROW_NOT_NEGATIVE] = "is negative or not finite",
-        [BT_ROW_SHARE] = "is no share",    [BT_ROW_COUNT] = "is no count",
+        [BT_ROW_SHARE] = "is not a share",    [BT_ROW_COUNT] = "is not a count",
         [BT_ROW_FAR] = "is out of range",  [BT_ROW_YES_OR_NO] = "is neither 0 nor 1"};
     char name[128];
     snprintf(name, sizeof name, "%s/%s", group, row->name);

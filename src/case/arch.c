@@ -118,8 +118,8 @@ void bt_arch_warn(const bt_arch *arch, bt_errors *warnings)
                       arch->region, arch->water);
     if (arch->gap > 0)
         bt_warn(warnings, BT_WARN_ICE_GAP,
-                      "ice.x_min, ice.x_max: the ice fills all but %.4g m of the moving window, and is repeated so: "
-                      "the body comes into open water again and again; leave both keys out",
+                      "ice.x_min, ice.x_max: the ice fills all but %.4g m of the moving window, and the window repeats "
+                      "that gap: the body meets open water again and again; leave both keys out",
                       arch->gap);
     if (arch->unbounded)
         bt_warn(warnings, BT_WARN_LOAD_UNBOUNDED,

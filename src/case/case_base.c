@@ -100,8 +100,8 @@ static bt_status parse(bt_case_files *files, bt_errors *err)
                       file->path, root->kind == BT_NODE_LIST ? "list" : "single text");
     else if (case_is_study(root))
         bt_errors_add(err,
-                      "%s: is a study, by its key `base` and no key of a case; run it with `bergtow "
-                      "ensemble`, look at it with `bergtow check`",
+                      "%s: is a study: it has the key `base` and no section of a case; run it with `bergtow ensemble`, "
+                      "look at it with `bergtow check`",
                       file->path);
     else if (!root->n)
         bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", file->path);
@@ -165,7 +165,7 @@ bt_status bt_case_files_read(bt_case_files *files, const char *path, const char 
     bt_status status = parse(files, err);
     int line = 0;
     if (status == BT_OK && alone && bt_tree_has(files->file[0].root, "base")) {
-        bt_errors_add(err, "%s: base: a case that has been kept has none; the file is damaged", path);
+        bt_errors_add(err, "%s: base: a case stored with a result has none; the file is damaged", path);
         status = BT_ERR_CASE;
     }
     for (const bt_node *base; status == BT_OK && (base = entry(files->file[files->n - 1].root, "base", &line));)

@@ -346,8 +346,8 @@ static void check_path(const bt_check *check, int n, const double *v)
     if (isinf(reach)) return;
     const double time = bt_case_tow_last(input, reach);
     bt_check_fault(check, "run.duration",
-                   "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
-                   "enlarge the domain",
+                   "the tow is %g m long and a wall stands in its way after %g m; shorten the run to %g s, or slow the "
+                   "tow, or enlarge the domain",
                    way, reach, time);
 }
 
@@ -512,8 +512,8 @@ void bt_case_warn_body(const bt_case *input, bt_errors *warnings)
                 input->body.draft, input->body.draft / least, least);
     if (input->impact.conversion == BT_IMPACT_DURATION && input->impact.duration > BT_LONG_IMPACT * input->run.dt)
         bt_warn(warnings, BT_WARN_LONG_IMPACT,
-                      "impact.duration: %g s is %.3g time steps, of which each is about as long as a collision; the "
-                      "peaks of collisions are as much too low as that is too long: is a unit wrong?",
+                      "impact.duration: %g s is %.3g time steps, each about as long as a collision: the peaks of "
+                      "collisions come out too low by that factor; is a unit wrong?",
                       input->impact.duration, input->impact.duration / input->run.dt);
 }
 

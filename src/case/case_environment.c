@@ -38,7 +38,7 @@ static void check_table(const bt_check *check, const char *key, const bt_table *
     if (first > 0) bt_check_fault(check, key, "the table begins at %g s and the run at 0 s; add a row for 0 s", first);
     if (end < need * (1 - 1e-12))
         bt_check_fault(check, key,
-                       "the table ends at %g s and the run asks it for %g s; add rows, or shorten run.duration", end,
+                       "the table ends at %g s and the run needs it until %g s; add rows, or shorten run.duration", end,
                        need);
 }
 
@@ -68,8 +68,8 @@ static void warn_of_table(const bt_case *input, const char *key, const bt_table 
     if (n > 0)
         bt_warn(warnings, BT_WARN_TABLE_ROWS,
                       "%s: rows that change the velocity within less than a time step of %g s: %lld, the first at %g "
-                      "s: a step takes the velocity of its middle, and what changes between is not felt; lower run.dt, "
-                      "or give means over a step or longer",
+                      "s: a step takes the velocity at its middle, and misses changes in between; lower run.dt, or "
+                      "give means over a step or longer",
                       key, input->run.dt, (long long)n, table->row[3 * first]);
 }
 

@@ -263,7 +263,7 @@ static void read_floes(reader *in)
     const size_t before = in->err->n;
     for (int i = 0; i < list->n; i++) {
         if (in->err->n - before >= BT_MOST_COMPLAINTS) {
-            bt_errors_add(in->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first",
+            bt_errors_add(in->err, "%s:%d: floes[%d]: the rest is not checked after %d errors; correct those first",
                           in->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
             return;
         }

@@ -314,9 +314,8 @@ static void warn_of_jerks(const bt_case *input, bt_errors *warnings)
     for (int i = 0; i + 1 < input->tow.n_programme; i++)
         if (p[2 * i + 3] != p[2 * i + 1] && p[2 * i + 2] - p[2 * i] < input->run.dt)
             bt_warn(warnings, BT_WARN_SPEED_JUMP,
-                          "tow.programme: from %g to %g m/s in less than a step: the tow force is then mass times the "
-                          "change over run.dt, as large as that is short, and its peak says nothing; let the change "
-                          "take several steps",
+                          "tow.programme: from %g to %g m/s in less than a step: the tow force is then mass times that "
+                          "change over run.dt, and its peak depends on run.dt alone; let the change take several steps",
                           p[2 * i + 1], p[2 * i + 3]);
     bt_path path = {0};
     char why[200];
@@ -325,8 +324,8 @@ static void warn_of_jerks(const bt_case *input, bt_errors *warnings)
         if (bt_case_tow_turn(input, k) > BT_TURN && path.mark[k] < bt_case_tow_distance(input, input->run.duration)) {
             bt_warn(warnings, BT_WARN_TURN_JUMP,
                           "tow.turn_radius: 0 m, and the body turns at way-point %d within one step: the tow force is "
-                          "then mass times the change of velocity over run.dt, as large as that is short, and its peak "
-                          "says nothing; give a radius",
+                          "then mass times the change of velocity over run.dt, and its peak depends on run.dt alone; "
+                          "give a radius",
                           k + 1);
             break;
         }
@@ -370,8 +369,8 @@ static void warn_of_short_run(const bt_case *input, bt_errors *warnings)
     if (input->tow.mode == BT_TOW_NONE || input->tow.n_programme > 0 || !(input->tow.speed > 0)) return;
     if (!(input->tow.ramp >= input->run.duration)) return;
     bt_warn(warnings, BT_WARN_SHORT_RUN,
-            "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: no time of it is at tow.speed; "
-            "lengthen run.duration, or give a shorter ramp",
+            "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: it never reaches tow.speed; lengthen "
+            "run.duration, or give a shorter ramp",
             input->tow.ramp, input->run.duration);
 }
 

@@ -69,7 +69,7 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
     if (sign * input->water.current_x > 0 &&
         sign * input->water.current_x >= input->tow.speed * fabs(bt_cos(input->tow.direction))) {
         snprintf(why, 256,
-                 "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; "
+                 "%g m/s carries the ice along as fast as the tow, and a moving window takes in new ice only ahead; "
                  "set domain.ends: periodic or open",
                  input->water.current_x);
         return "water.current_x";

@@ -337,7 +337,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
         {!read, AT_MOST, "ice.extent.y_min", "ice.y_min", input->ice.y_min + slack, "", cut},
         {!read, AT_LEAST, "ice.extent.y_max", "ice.y_max", input->ice.y_max - slack, "", cut},
 
-        {true, AT_LEAST, "ice.thickness", NULL, BT_LEAST_THICKNESS, "", ", which is no ice; check the unit"},
+        {true, AT_LEAST, "ice.thickness", NULL, BT_LEAST_THICKNESS, "", ", too thin for ice; check the unit"},
         {true, AT_MOST, "ice.density", "water.density", input->water.density, "",
          ": such ice sinks; correct one of them"},
         {input->ice.rafting_kappa > 0, AT_LEAST, "ice.rafting.kappa", NULL, 2, "",
@@ -418,7 +418,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
         {true, AT_LEAST, "water.tide.minor", "the opposite of water.tide.major", -input->water.tide.major,
          "water.tide.major", swap},
         {input->water.tide.major > 0, AT_LEAST, "water.tide.period", "the time of 20 steps", TIDE_STEPS * input->run.dt,
-         "run.dt", ": they cannot follow it; a tide has hours, as in 12.42 h"},
+         "run.dt", ": they cannot follow it; tidal periods are hours, as in 12.42 h"},
 
         {lead && !towed, REFUSED, "lead.mode", NULL, 0, BODY,
          "a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode"},

@@ -175,7 +175,7 @@ void bt_case_check_cost(const bt_check *check)
                  result = bt_cost_disk_of(input, n, bt_cost_corners(input, NULL, n), 2).result;
     if (work > BT_MOST_CORE_SECONDS)
         bt_check_fault(check, "run.duration",
-                       "about %.2g floes for %.2g steps need some %.2g s of one core, at most %g are begun; shorten "
+                       "about %.2g floes for %.2g steps need some %.2g s of one core, at most %g are allowed; shorten "
                        "the run, lengthen run.dt, or take larger floes or a smaller region",
                        n, (double)bt_case_steps(input), work, BT_MOST_CORE_SECONDS);
     if (result > BT_MOST_RESULT_BYTES)

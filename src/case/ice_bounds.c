@@ -175,7 +175,7 @@ void bt_ice_warn_slow(const bt_case *input, double size, bt_errors *warnings)
         bt_warn(warnings, BT_WARN_SLOW_CLOSING,
                       "domain.%s_closing: %g m/s, shared out among the contacts of some %.0f floes from wall to wall, "
                       "is %.2g m/s each, and the solver takes %.2g m/s for rest: ice that is locked between the walls "
-                      "may bear no load, without a word; set solver.tolerance: %.1g",
+                      "may bear no load, without a warning; set solver.tolerance: %.1g",
                       k ? "sides" : "ends", closing, across, share, accepted,
                       input->solver.tolerance * 0.1 * share / accepted);
     }

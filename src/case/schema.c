@@ -602,7 +602,7 @@ int bt_schema_add(const bt_key *key, bt_errors *err)
                       "no section is base or floes",
                       key->name);
     else if (bt_schema_find(bt_case_keys, bt_n_case_keys, key->name) >= 0)
-        bt_errors_add(err, "%s: this key is there; choose another name", key->name);
+        bt_errors_add(err, "%s: this key exists already; choose another name", key->name);
     else if (section_is_closed(key->name))
         bt_errors_add(err, "%s: its section has keys of the program; choose a section of its own", key->name);
     else if (!key->range || !bt_value_range(&row, &range))

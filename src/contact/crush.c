@@ -74,7 +74,7 @@ static void warn(const bt_total_value *total, double size, bt_errors *warnings)
     if (depth <= MOST_DEPTH * size) return;
     bt_warn(warnings, BT_WARN_CRUSHED,
             "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses stay as they "
-            "were, which is no model of that",
+            "were, so the model no longer holds",
             depth, 100 * depth / size);
 }
 

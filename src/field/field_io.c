@@ -184,7 +184,7 @@ static double read_ice_area(reader *in)
     if (in->r.status != BT_OK) return NAN;
     const double area = read_number(in, "ice_area");
     if (isnan(area))
-        bt_refuse(&in->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
+        bt_refuse(&in->r, "attribute ice_area of /floes: is missing or not a number; give the area in m2 that the "
                           "concentration refers to");
     return area;
 }

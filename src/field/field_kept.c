@@ -155,7 +155,7 @@ static bool take(const char *path, const char *name, bt_field *field)
     free(bytes);
     bt_errors_free(&why);
     if (whole) return true;
-    bt_errors_add(&why, "warning: %s: is damaged, or no field of this program; it is made anew", path);
+    bt_errors_add(&why, "warning: %s: is damaged, or not a field of this program; the field is made again", path);
     bt_errors_print(&why);
     bt_errors_free(&why);
     return false;

@@ -51,8 +51,8 @@ static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
 {
     if (counts->outside)
         bt_warn(warnings, BT_WARN_ICE_OUTSIDE,
-                "%lld of %lld floes lie outside the ice region (ice.x_min and so on): they are there, and the "
-                "concentration, which refers to that region, leaves out %.4g m2 of ice outside it",
+                "%lld of %lld floes lie outside the ice region (ice.x_min and so on): they take part, but the "
+                "concentration refers to that region, and leaves out %.4g m2 of ice outside it",
                 (long long)counts->outside, (long long)counts->read, counts->outside_area);
     if (counts->own_area > 0 && counts->region_area > 0 && fabs(counts->own_area / counts->region_area - 1) > 0.01)
         bt_warn(warnings, BT_WARN_OTHER_REGION,

@@ -149,8 +149,8 @@ static bt_status take_poses(const bt_world *world, const bt_case *input, const b
         if (!isfinite(pose->x) || !isfinite(pose->y) || !isfinite(pose->yaw)) {
             bt_errors_add(
                 err,
-                "%s: ice field: floe %lld left the numbers while the field was shaken; report this case with its seed, "
-                "and use ice.shake: 0 meanwhile",
+                "%s: ice field: floe %lld has no finite place after the field was shaken; report this case with its "
+                "seed, and use ice.shake: 0 meanwhile",
                 input->path ? input->path : "case", (long long)i);
             return BT_ERR_NUMERIC;
         }

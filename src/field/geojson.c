@@ -200,9 +200,9 @@ static void begin_degrees(reader *in, bt_features *features, const json_t *mark)
     // 37° N, and of South Georgia, at 54° S.
     if (!given && middle[1] > -53 && middle[1] < 30 && fabs(middle[0]) >= 30 && swapped) {
         bt_refuse(&in->r,
-                  "its outlines lie about latitude %.4g, longitude %.4g, where no sea ice is: latitude seems to come "
-                  "first; write [longitude, latitude], or give "
-                  "ice.origin_lon and ice.origin_lat if the place is right",
+                  "its outlines lie about latitude %.4g, longitude %.4g, where there is no sea ice: latitude seems to "
+                  "come first; write [longitude, latitude], or give ice.origin_lon and ice.origin_lat if the place is "
+                  "right",
                   middle[1], middle[0]);
         return;
     }
@@ -433,7 +433,8 @@ static void choose_coordinates(reader *in, const json_t *root)
         if (in->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME)
             bt_refuse(
                 &in->r,
-                "its crs is %s, in %s, and ice.outlines_crs says else; remove the key, or correct the crs of the file",
+                "its crs is %s, in %s, and ice.outlines_crs says otherwise; remove the key, or correct the crs of the "
+                "file",
                 in->crs.name, in->kind == DEGREES ? "degrees" : "metres east and north");
     } else if (crs && key == BT_CRS_FILE) {
         bt_refuse(&in->r,

@@ -350,7 +350,7 @@ bt_status bt_features_open(bt_features *features, const char *path, bt_errors *e
     if (!split(features)) {
         json_t *whole = json_loadb(features->text, features->size, JSON_REJECT_DUPLICATES, &why);
         if (!whole) {
-            bt_errors_add(err, "%s:%d: is not JSON: %s; mend the file", path, why.line, why.text);
+            bt_errors_add(err, "%s:%d: is not JSON: %s; correct the file", path, why.line, why.text);
             return BT_ERR_CASE;
         }
         json_decref(features->root);

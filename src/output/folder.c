@@ -108,8 +108,8 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
         char *path = bt_file_join(dir, files[k].name);
         if (is_foreign(dir, k, path)) {
             bt_errors_add(err,
-                          "%s: is no file that this program has written, and a run would replace it; move it away, or "
-                          "give another folder with -o",
+                          "%s: is not a file that this program has written, and a run would replace it; move it away, "
+                          "or give another folder with -o",
                           path);
             status = BT_ERR_IO;
         }

@@ -61,8 +61,8 @@ static void refuse(bt_h5_reader *old, const bt_snapshot *snap, const char *why)
 {
     if (old->status != BT_OK) return;
     bt_errors_add(old->err,
-                  "%s: is of another run than %s: %s; restore the result of that run, or go on from a checkpoint of "
-                  "this one",
+                  "%s: belongs to another run than %s: %s; restore the result of that run, or go on from a checkpoint "
+                  "of this one",
                   old->path, snap->path, why);
     old->status = BT_ERR_CASE;
 }
@@ -374,7 +374,7 @@ static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int
                   width = bt_h5_size(old, "/frames/pose", 1);
     if (old->status != BT_OK || (there >= entries && pictures >= frames && width == floes)) return;
     bt_errors_add(old->err,
-                  "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint counts on %lld, %lld and "
+                  "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint expects %lld, %lld and "
                   "%lld: it is of another run, or older; restore it",
                   old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries,
                   (long long)frames, (long long)floes);

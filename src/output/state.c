@@ -595,7 +595,7 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
     if (status == BT_OK && !same_constants(&made, &world->par, !world->environment)) {
         bt_errors_add(err,
                       "%s: the case it holds makes other constants of the step now; it was written by another version "
-                      "of the program: go on with that one",
+                      "of the program: use that one",
                       snap->path);
         status = BT_ERR_CASE;
     }

@@ -48,7 +48,7 @@ static void want_ice(bt_snapshot *snap, const char *name, int64_t row, const cha
 void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_vertices, bt_snapshot *snap)
 {
     bt_snapshot_want(snap, n_offsets >= 1 && n_offsets <= BT_MOST_FLOES + 1, "field/offsets", -1,
-                     "has no number of rows that a field can have");
+                     "has a number of rows that no field has");
     if (snap->faulty) return;
     bt_snapshot_want(snap, field->offsets[0] == 0 && field->offsets[n_offsets - 1] == n_vertices, "field/offsets", -1,
                      "does not begin with 0 and end with the number of vertices");
@@ -79,7 +79,7 @@ void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_ve
     }
     if (snap->faulty) return;
     bt_snapshot_want(snap, field->concentration >= 0 && field->concentration <= 1 + 1e-9, "field/concentration", -1,
-                     "is no concentration");
+                     "is not a concentration");
     // Floes outside the ice region have no part in its concentration, and a file that was read may have such; a field
     // without floes may have no ice region, and so no area.
     const bool outside = field->outlines.outside_area > 0 || field->outlines.own_area > 0;
@@ -99,14 +99,14 @@ typedef struct {
 static void check_direction(bt_snapshot *snap, const cell_names *name, bool in_cells, double period, double side,
                             int32_t wrap, int32_t low, int32_t n)
 {
-    bt_snapshot_want(snap, side > 0, name->side, -1, "is no width of a cell");
+    bt_snapshot_want(snap, side > 0, name->side, -1, "is not a width of a cell");
     bt_snapshot_want(snap, period > 0 ? wrap == 1 || (wrap >= 4 && wrap % 2 == 0) : wrap == 0, name->wrap, -1,
-                     "is no number of cells around this domain");
+                     "is not a number of cells around this domain");
     if (snap->faulty) return;
     bt_snapshot_want(snap, wrap == 0 || side == period / wrap, name->side, -1, "does not go round the domain");
-    bt_snapshot_want(snap, wrap == 0 ? low >= -FAR && low <= FAR : low == 0, name->low, -1, "is no place of a cell");
+    bt_snapshot_want(snap, wrap == 0 ? low >= -FAR && low <= FAR : low == 0, name->low, -1, "is not a place of a cell");
     bt_snapshot_want(snap, n >= 1 && (wrap == 0 || n == wrap || (n == 1 && !in_cells)), name->n, -1,
-                     "is no number of cells");
+                     "is not a number of cells");
 }
 
 static void check_cells(const bt_world *world, bt_snapshot *snap)
@@ -128,7 +128,7 @@ static void check_cells(const bt_world *world, bt_snapshot *snap)
                      "cells/n_x", -1,
                      "and n_y are more cells than are made for so many floes");
     bt_snapshot_want(snap, cells->margin_max > 0 && isfinite(cells->margin_max), "cells/margin_max", -1,
-                     "is no margin");
+                     "is not a margin");
     // Rounding: another build may have made the radii.
     bt_snapshot_want(snap, cells->reach >= widest * (1 - 1e-9), "cells/reach", -1,
                      "is less than the radius of a floe");
@@ -189,9 +189,9 @@ static void check_contacts(const bt_world *world, const bt_memory *memory, int64
         const bt_idx i = bt_world_index(world, t->a), j = bt_world_index(world, t->b);
         bt_snapshot_want(snap, can_meet(world, i, j), "contacts/a", k, "and b are bodies that cannot touch");
         bt_snapshot_want(snap, has_part(bodies, i, t->part[0]) && has_part(bodies, j, t->part[1]), "contacts/part", k,
-                         "is no part of its body");
+                         "is not a part of its body");
         bt_snapshot_want(snap, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
-        bt_snapshot_want(snap, t->law < BT_LAWS + world->par.added_laws, "contacts/law", k, "is no contact law");
+        bt_snapshot_want(snap, t->law < BT_LAWS + world->par.added_laws, "contacts/law", k, "is not a contact law");
         if (snap->faulty) return;
         const bool on = t->law == BT_LAW_RIGID ||
                         (bt_law_on(&world->par, t->law) && bt_law_applies(world, t->law, i, j));
@@ -207,7 +207,7 @@ static void check_tow(const bt_world *world, bt_snapshot *snap)
     const bt_tow *tow = world->tow;
     bt_snapshot_want(snap, tow->time == (double)world->step * tow->dt, "tow/time", -1, "is not that of the step");
     bt_snapshot_want(snap, tow->mark >= 0 && tow->mark <= tow->path.n_marks, "tow/mark", -1,
-                     "is no number of way-points passed");
+                     "is not a number of way-points passed");
 }
 
 /// Places of floes that enter a window are found from the drift.
@@ -231,7 +231,7 @@ static void check_impacts(const bt_world *world, bt_snapshot *snap)
         const bt_impact *impact = &impacts->open[k].so_far;
         bt_snapshot_want(snap, is_gid(impact->gid, n) && (k == 0 || impacts->open[k - 1].so_far.gid < impact->gid),
                          "impacts/open", k,
-                         "is no collision, or out of order");
+                         "is not a collision, or out of order");
         const double real[] = {
             impact->time, impact->x, impact->y, impact->impulse, impact->approach, impact->mass, impact->thickness,
             impacts->open[k].rest, impacts->open[k].largest};
@@ -246,7 +246,7 @@ static void check_events(const bt_world *world, bt_snapshot *snap)
     for (int64_t k = 0; k < world->events.n && !snap->faulty; k++) {
         const bt_event *event = &world->events.event[k];
         bt_snapshot_want(snap, event->kind >= 0 && event->kind < BT_EVENT_KINDS, "events/kind", k,
-                         "is no kind of event");
+                         "is not a kind of event");
     }
 }
 
@@ -258,10 +258,10 @@ static void check_split(const bt_world *world, const bt_split_record *record, in
 {
     const bt_splitting *splitting = world->splitting;
     const bool known = record->parent >= 0 && record->parent < world->bodies.n_global && there[record->parent];
-    bt_snapshot_want(snap, known, "splits/parent", k, "is no floe that is there");
+    bt_snapshot_want(snap, known, "splits/parent", k, "is not a floe that is there");
     bt_snapshot_want(snap, record->step < world->step && record->mode >= BT_SPLIT_NEAR &&
                      record->mode <= BT_SPLIT_BURST, "splits/mode", k,
-                     "is no split of the steps done");
+                     "is not a split of the steps done");
     if (snap->faulty) return;
     const bool piece = record->parent >= splitting->first && record->parent < splitting->first + splitting->reserve;
     bt_snapshot_want(snap, (record->corners[2] == 0) == piece && (record->generation == 1) == !piece,
@@ -269,7 +269,7 @@ static void check_split(const bt_world *world, const bt_split_record *record, in
                      "does not fit the floe");
     for (int i = 0; i < 3 && !snap->faulty && record->corners[i] > 0; v += 2 * record->corners[i++])
         bt_snapshot_want(snap, !bt_outline_fault((int)record->corners[i], v), "splits/vertices", k,
-                         "are no outline of a floe");
+                         "are not the outline of a floe");
     there[record->parent] = 0;
     there[splitting->first + 2 * k] = there[splitting->first + 2 * k + 1] = 1;
 }
@@ -284,7 +284,7 @@ void bt_state_check_splits(const bt_world *world, const bt_split_record *rows, i
         const int64_t *c = rows[k].corners;
         for (int i = 0; i < 3; i++)
             bt_snapshot_want(snap, (c[i] >= 3 || (i == 2 && c[i] == 0)) && c[i] <= BT_MAX_VERTICES, "splits/corners", k,
-                             "is no number of vertices");
+                             "is not a number of vertices");
         at += snap->faulty ? 0 : c[0] + c[1] + c[2];
         bt_snapshot_want(snap, at <= n_vertices, "splits/corners", k, "are more vertices than there are");
     }

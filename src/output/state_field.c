@@ -92,7 +92,7 @@ void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap)
     int32_t mode = 0;
     bt_snapshot_take(snap, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
     // before it is taken as one
-    bt_snapshot_want(snap, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead");
+    bt_snapshot_want(snap, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is not a kind of lead");
     if (!snap->faulty) bt_snapshot_take_rows(snap, "lead", lead_rows, BT_N_OF(lead_rows), stats);
 }
 

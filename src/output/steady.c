@@ -329,7 +329,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
         const bt_event *event = &totals->events->event[i];
         if (event->kind == BT_EVENT_ADRIFT)
             bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_ADRIFT,
-                    "the last line parted at %g s, and nothing tows the body since", event->time);
+                    "the last line parted at %g s, and nothing has towed the body since", event->time);
         else if (event->kind == BT_EVENT_LINE_BROKEN && event->time > steady->start)
             bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PARTED_IN_WINDOW,
                     "a line parted at %g s, within the window, whose means mix before and after",
@@ -389,8 +389,8 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
     else if (way < BT_STALL_SHARE * asked && !steady->turns) { // else the body may be on the leg before
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NO_HEADWAY,
                 "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
-                "does not come on",
-                asked, steady->start, steady->end, way < 0 ? "gone astern by" : "come on by", fabs(way));
+                "makes no headway",
+                asked, steady->start, steady->end, way < 0 ? "gone astern by" : "moved ahead by", fabs(way));
         bt_warn_number(&steady->reasons, "way_m", way);
     }
 }
@@ -430,8 +430,8 @@ static void judge_contact(bt_steady *steady, const bt_run_totals *totals)
     if (steady->met_no_ice) steady->stretches = 0;
     if (steady->met_no_ice && totals->lead.mode == BT_LEAD_CHANNEL)
         bt_warn(because(steady, BT_TOO_SHORT), BT_WARN_NO_ICE_CHANNEL,
-                "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or take it "
-                "that the ice does not come into the channel",
+                "the body met no ice within the window, %g to %g s, in a channel of %.4g m: run longer, or conclude "
+                "that no ice enters the channel",
                 steady->start, steady->end, totals->lead.width);
     else if (steady->met_no_ice)
         bt_warn(because(steady, BT_TOO_SHORT), BT_WARN_NO_ICE,
@@ -439,8 +439,8 @@ static void judge_contact(bt_steady *steady, const bt_run_totals *totals)
                 steady->start, steady->end, 100 * totals->concentration);
     else if (ice->mean != 0 && steady->stretches < BT_STEADY_STRETCHES)
         bt_warn(because(steady, BT_TOO_SHORT), BT_WARN_FEW_CONTACTS,
-                "the mean of the ice resistance within the window, %g to %g s, is made of a few stretches of contact, "
-                "worth %.2g equal ones, fewer than %d: run longer",
+                "the mean of the ice resistance within the window, %g to %g s, rests on a few stretches of contact, "
+                "equivalent to %.2g equal ones, fewer than %d: run longer",
                 steady->start, steady->end, steady->stretches, BT_STEADY_STRETCHES);
 }
 
@@ -481,7 +481,7 @@ void bt_steady_find(bt_steady *steady, const bt_history *history, const bt_case 
                 "no window: it would begin at %g s and the run ends at %g s: run longer, or %s",
                 steady->earliest, history->n ? time[history->n - 1] : 0,
                 steady->given                  ? "lower output.window_start"
-                : input->tow.n_programme > 0 ? "let tow.programme come to its largest speed earlier"
+                : input->tow.n_programme > 0 ? "let tow.programme reach its largest speed earlier"
                                              : "shorten tow.ramp");
     } else {
         steady->start = time[steady->first];
@@ -496,7 +496,7 @@ void bt_steady_find(bt_steady *steady, const bt_history *history, const bt_case 
     if (steady->start < ramp * (1 - 1e-12))
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_WITHIN_RAMP,
                 "the window begins at %g s, before the %s at %g s: raise output.window_start",
-                steady->start, input->tow.n_programme > 0 ? "tow comes to the largest speed of its programme"
+                steady->start, input->tow.n_programme > 0 ? "tow reaches the largest speed of its programme"
                                                           : "ramp of the tow ends",
                 ramp);
     judge_solver(steady, input, totals);

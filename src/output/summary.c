@@ -45,10 +45,9 @@ void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
 {
     if (!(laps > 1)) return;
     bt_warn(warnings, BT_WARN_WINDOW_LAPS,
-            "the moving window goes %.2f times its length through the ice: the body meets the same field "
-            "again after each, with the hole in which it stood at time zero; samples a length apart are not "
-            "independent, and the standard error may be too small; take a longer domain, or several values of "
-            "ice.seed",
+            "the moving window travels %.2f times its length through the ice: after each length the body meets the "
+            "same field again, with the hole where it stood at time zero; samples a length apart are not independent, "
+            "and the standard error may be too small; take a longer domain, or several values of ice.seed",
             laps);
 }
 
@@ -60,18 +59,18 @@ static void summary_window_warn(bt_errors *warnings, const bt_window *window)
     if (window->overtaken > window->stride)
         bt_warn(warnings, BT_WARN_ICE_OVERTOOK,
                 "ice overtook the body, which fell %.3g m back through it: wind, current or tide carried the ice "
-                "faster than the tow, and what came from behind was the ice of the window once more, which is "
-                "renewed ahead only; set domain.ends: periodic or open, or tow faster",
+                "faster than the tow, and old ice of the window came from behind, since it is renewed only ahead; set "
+                "domain.ends: periodic or open, or tow faster",
                 window->overtaken);
     bt_summary_window_warn_laps(warnings, bt_window_laps(window));
     if (places > 0 && (double)window->missed > SHARE_LIMIT * places)
         bt_warn(warnings, BT_WARN_PLACES_MISSED,
                 "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
-                "along, or pushes them far ahead; the ice that it meets is thinner by that; take a longer domain",
+                "along, or pushes them far ahead; it meets that much less ice; take a longer domain",
                 100 * (double)window->missed / places);
     if (floes > 0 && (double)window->kept > SHARE_LIMIT * floes)
         bt_warn(warnings, BT_WARN_FLOES_KEPT,
-                "%.1f %% of the floes behind the moving window came back ahead as they were, their places not being "
+                "%.1f %% of the floes behind the moving window came back ahead unchanged, since their places were not "
                 "free: disturbed ice enters; take a longer domain, and more of it behind the body",
                 100 * (double)window->kept / floes);
 }
@@ -217,8 +216,8 @@ static void warn_of_solver(bt_summary *summary, const bt_history *history, const
     if (history->unprojected > 0)
         bt_warn(&summary->warnings, BT_WARN_UNPROJECTED,
                 "in %lld of %lld steps the position projection met its limit of work and left overlap: raise "
-                "solver.position_sweeps, or, where bodies are pressed together slower than the tolerance tells, "
-                "lower solver.tolerance",
+                "solver.position_sweeps, or, where bodies are pressed together more slowly than the tolerance "
+                "resolves, lower solver.tolerance",
                 (long long)history->unprojected, (long long)history->n);
     if (history->outrun)
         bt_warn(&summary->warnings, BT_WARN_OUTRUN,
@@ -293,8 +292,7 @@ static void warn_of_bodies(bt_summary *summary, const bt_history *history, const
     summary_window_warn(&summary->warnings, totals->window);
     if (totals->floes_outside)
         bt_warn(&summary->warnings, BT_WARN_FLOES_LEFT,
-                "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
-                "matters",
+                "%lld floes left the open domain and no longer resist; use a larger domain or walls if that matters",
                 (long long)totals->floes_outside);
 }
 
@@ -305,8 +303,8 @@ static void without_tow(bt_summary *summary, const bt_case *input)
     summary->ice.mean = summary->ice.se = summary->ice.low = summary->ice.high = NAN;
     bt_warn(&summary->warnings, BT_WARN_NO_TOW,
             "nothing tows the body, so there is no mean ice resistance: all other forces of the summary, and the "
-            "series of ice_resistance, are those against tow.direction (%g deg), whatever way the body drifts; "
-            "for the force of the ice read the series ice_force_x and ice_force_y",
+            "series of ice_resistance, are those against tow.direction (%g deg), whichever way the body drifts; for "
+            "the force of the ice read the series ice_force_x and ice_force_y",
             input->tow.direction * 180 / BT_PI);
 }
 
@@ -381,7 +379,7 @@ void bt_summary_make(bt_summary *summary, const bt_history *history, const bt_ca
     if (totals->stopped) bt_warn(&summary->warnings, BT_WARN_STOPPED, "the run stopped early: %s", totals->stopped);
     else if (totals->n_steps < totals->whole_steps)
         bt_warn(&summary->warnings, BT_WARN_ENDED_EARLY,
-                "the run ended after %lld of %lld steps, as it was asked to: `bergtow resume` takes the others",
+                "the run ended after %lld of %lld steps, as requested: `bergtow resume` runs the rest",
                 (long long)totals->n_steps, (long long)totals->whole_steps);
 
     const bt_mean none = bt_stats_mean(NULL, 0);

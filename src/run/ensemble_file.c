@@ -460,7 +460,7 @@ bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_r
     if (status == BT_OK && t.unread) {
         bt_errors_add(err,
                       "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
-                      "mend that, and call again",
+                                     "correct that, and call again",
                       path, t.unread);
         status = BT_ERR_IO;
     }

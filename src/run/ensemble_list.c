@@ -347,7 +347,7 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
     if (sound != BT_OK) {
         if (n->unsound++ < BT_MOST_REPORTED)
             bt_errors_add(err, "member %s is not sound: %s; %s", entry->m.name, damage.text[0],
-                          sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
+                          sound == BT_ERR_IO ? "correct that, and call again" : "the same call runs it again");
         status = BT_ERR_IO;
     } else if (state == BT_MEMBER_FINISHED) {
         n->finished++;

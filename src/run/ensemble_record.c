@@ -167,7 +167,7 @@ bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
     if (status == BT_OK && !json_is_object(*root)) {
         json_decref(*root);
         *root = NULL;
-        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
+        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; check the disk", path, why.line, why.text);
         status = BT_ERR_CASE;
     }
     free(text);
@@ -186,7 +186,7 @@ static bt_status check_summary(const char *folder, bt_errors *err)
     for (int k = 0; numbers[k] && !missing; k++)
         if (!json_is_number(json_object_get(root, numbers[k]))) missing = numbers[k];
     const bool stopped = json_is_string(json_object_get(root, "stopped"));
-    if (missing) bt_errors_add(err, "%s: has no %s; look at the disk", path, missing);
+    if (missing) bt_errors_add(err, "%s: has no %s; check the disk", path, missing);
     else if (stopped) bt_errors_add(err, "%s: is of a run that was stopped", path);
     const bt_status status = !missing && !stopped ? BT_OK : BT_ERR_IO;
     json_decref(root);
@@ -235,7 +235,7 @@ static void report(const char *folder, const char *kept, const char *wanted, bt_
     static const char *const whose[] = {"name", "study"};
     char a[128], b[128];
     if (strncmp(kept, "bergtow finished member 1\n", 26)) {
-        bt_errors_add(err, "%s/%s: is no record of a finished member", folder, RECORD);
+        bt_errors_add(err, "%s/%s: is not a record of a finished member", folder, RECORD);
         return;
     }
     for (int k = 0; k < 2; k++) {

@@ -209,9 +209,9 @@ void bt_guard_name(const bt_guard *guard, const bt_world *world, bt_errors *err)
     if (found[0] >= 0) {
         body_name(guard, world, (bt_gid)found[0], name);
         bt_errors_add(err,
-                      "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law remembers "
-                      "one of it; take a smaller run.dt, and check the law, and masses, stiffness and speeds of the "
-                      "case",
+                      "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law stores one "
+                                      "for it; take a smaller run.dt, and check the law, and masses, stiffness and "
+                                      "speeds of the case",
                       world->step, name);
     }
     if (found[1] >= 0) {
@@ -245,9 +245,9 @@ static bool numbers_of_sample(const bt_world *world, const bt_sample *sample, bt
                   "step %" PRId64 ": %s (%s) is %s; "
                   "take a smaller run.dt, and check masses, stiffness and speeds of the case",
                   world->step, quantity->name, quantity->description,
-                  isnan(x)                   ? "not a number, or came from some too large to be summed up"
+                  isnan(x)                   ? "not a number, or a sum of numbers too large to add"
                   : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure"
-                                             : "beyond all numbers of a run");
+                                             : "larger than any run can give");
     return false;
 }
 

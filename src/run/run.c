@@ -28,8 +28,8 @@ static void report(const bt_snapshot *snap, const char *said)
     const bt_item *item = bt_snapshot_find(snap, "about/revision");
     if (item && item->type == BT_ITEM_TEXT && strcmp(item->data, BT_REVISION))
         bt_errors_add(&warnings,
-                      "warning: %s was written by revision %s of the program, and this is %s: the run may go on "
-                      "otherwise than it would have",
+                      "warning: %s was written by revision %s of the program, and this is %s: the run may continue "
+                      "differently",
                       snap->path, (const char *)item->data, BT_REVISION);
     bt_errors_print(&warnings);
     bt_errors_free(&warnings);
@@ -185,8 +185,8 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *input, const bt
     if (failed >= 0) bt_run_keep_failure(comm, input, options, failed, start, err);
     const bool taken = manner.lock >= 0 || (options->held && comm->rank == 0);
     if (status != BT_OK && taken && bt_folder_keeps(options->dir))
-        bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", options->dir, options->dir,
-                      BT_FOLDER_REPLACED);
+        bt_errors_add(err, "the previous contents of %s are in %s/%s until a new result is complete", options->dir,
+                      options->dir, BT_FOLDER_REPLACED);
     bt_lock_drop(options->dir, manner.lock);
     return status;
 }

@@ -145,7 +145,7 @@ bt_status bt_running_load_case(bt_case *input, bt_snapshot *snap, bt_errors *err
     bt_table_free(&wind);
     if (status != BT_OK) return status;
     const int64_t step = bt_snapshot_int(snap, "world/step");
-    bt_snapshot_want(snap, step >= 0 && step <= bt_case_steps(input), "world/step", -1, "is no step of its case");
+    bt_snapshot_want(snap, step >= 0 && step <= bt_case_steps(input), "world/step", -1, "is not a step of its case");
     free(input->text); // the result shows the case as it was given
     input->text = bt_text_copy(given);
     return snap->faulty ? BT_ERR_CASE : BT_OK;
@@ -164,7 +164,7 @@ static void check_frames(const bt_running *running, bt_snapshot *snap)
 {
     const int64_t step = bt_snapshot_int(snap, "world/step"), first = bt_running_draws(running->c);
     bt_snapshot_want(snap, running->frames >= first && running->frames <= BT_MOST_STEPS, "record/frames", -1,
-                     "is no number of frames up to here");
+                     "is not a number of frames up to here");
     if (!first) {
         bt_snapshot_want(snap, running->frames_due == 1, "run/frames_due", -1, "is not that of a run without frames");
         return;
@@ -185,10 +185,10 @@ static void check_counters(const bt_running *running, bt_snapshot *snap)
     check_frames(running, snap);
     bt_snapshot_want(snap, running->guard.in_a_row >= 0 && running->guard.in_a_row <= BT_MOST_STEPS,
                      "run/unconverged_in_a_row", -1,
-                     "is no number of steps");
+                     "is not a number of steps");
     bt_snapshot_want(snap, running->guard.locked >= 0 && running->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
-                     "is no number of steps");
-    bt_snapshot_want(snap, !(running->guard.energy < 0), "run/energy_limit", -1, "is no energy");
+                     "is not a number of steps");
+    bt_snapshot_want(snap, !(running->guard.energy < 0), "run/energy_limit", -1, "is not an energy");
     bt_snapshot_want(snap, isfinite(sum), "clock/phases", -1, "are not all finite");
     bt_snapshot_want(snap, isfinite(shared), "clock/shared", -1, "are not all finite");
     bt_snapshot_want(snap, isfinite(running->totals.wall_time), "clock/wall_time", -1, "is not finite");

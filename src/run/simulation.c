@@ -145,11 +145,11 @@ static bt_status begin(bt_simulation *sim, bt_errors *err)
 static bt_status check_numbers(const bt_simulation_options *options, bt_errors *err)
 {
     if (options->n_set < 0 || (options->n_set > 0 && !options->set)) {
-        bt_errors_add(err, "n_set: %d is no number of texts in set", options->n_set);
+        bt_errors_add(err, "n_set: %d is not a number of texts; give 0 with set NULL, or their number", options->n_set);
         return BT_ERR_USAGE;
     }
     if (options->threads >= 0 && options->threads <= BT_MOST_THREADS) return BT_OK;
-    bt_errors_add(err, "threads: %d cannot be had; give 1 to %d, or 0 for run.threads of the case or all cores",
+    bt_errors_add(err, "threads: %d are not available; give 1 to %d, or 0 for run.threads of the case or all cores",
                   options->threads, BT_MOST_THREADS);
     return BT_ERR_USAGE;
 }
@@ -403,7 +403,7 @@ bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, doub
     const bt_params *par = &sim->r.w->par;
     const double length = sim->c.domain.length, width = sim->c.domain.width;
     if (is_outside(x, par->x0, length) || is_outside(y, par->y0, width)) {
-        bt_errors_add(&err, "body %lld: (%g, %g) m is outside of the domain, %g x %g m from (%g, %g)", (long long)id, x,
+        bt_errors_add(&err, "body %lld: (%g, %g) m is outside the domain, %g x %g m from (%g, %g)", (long long)id, x,
                       y, length, width, par->x0, par->y0);
         return reported(BT_ERR_USAGE, &err);
     }
@@ -519,7 +519,7 @@ bt_status bt_seal_check(const char *path, const char *kind)
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
         if (!strncmp(kinds[k], kind, n) && kinds[k][n] == ' ')
             return reported(bt_checksum_check(path, kinds[k], NULL, &err), &err);
-    bt_errors_add(&err, "%s: no kind of a sealed file; give result, ensemble, field or checkpoint", kind);
+    bt_errors_add(&err, "%s: not a kind of sealed file; give result, ensemble, field or checkpoint", kind);
     return reported(BT_ERR_USAGE, &err);
 }
 

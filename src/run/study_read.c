@@ -139,7 +139,7 @@ static void read_parameters(const bt_study_reader *reader, const bt_node *map, i
         else
             bt_study_complain(
                 reader, at,
-                "%s: needs a list [a, b] or a range {from: a, to: b, n: 3}; a single value belongs into `set`",
+                "%s: needs a list [a, b] or a range {from: a, to: b, n: 3}; a single value belongs in `set`",
                 parameter->name);
     }
 }

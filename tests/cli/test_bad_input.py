@@ -106,7 +106,7 @@ TEXTS = {
                                    "domain.width"),
     "body outside": (GOOD.replace("x: 4", "x: 40"), "bad.yml:4: body.x:", "outside the domain"),
     "tow through the wall": (GOOD.replace("duration: 1}",
-                                          "duration: 1000}"), "bad.yml:1: run.duration:", "a wall stands after"),
+                                          "duration: 1000}"), "bad.yml:1: run.duration:", "in its way after"),
     "body that is not convex": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0],[1,0.2],[0,2]]"),
                                 "bad.yml:4: body.vertices: the waterline is refused"),
     "two points": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0]]"),
@@ -335,9 +335,9 @@ USAGES = {
     "empty folder name": (["run", "good.yml", "-o", ""], "name of the folder is empty"),
     "dump without file": (["run", "good.yml", "--dump-contacts", "3"], "--dump-contacts 3: give STEP:FILE.h5"),
     "dump of step 0": (["run", "good.yml", "--dump-contacts", "0:a.h5"], "give a whole number"),
-    "dump after the end": (["run", "good.yml", "--dump-contacts", "11:a.h5"], "step 11 is not made: the last one is"),
+    "dump after the end": (["run", "good.yml", "--dump-contacts", "11:a.h5"], "step 11 is not computed: the last"),
     "dump after the last step": (["run", "good.yml", "--steps", "3", "--dump-contacts", "4:a.h5"],
-                                 "step 4 is not made: the last one is 3"),
+                                 "step 4 is not computed: the last one is 3"),
     "dump of no step": (["run", "good.yml", "--dump-contacts", "x:a.h5"], "give a whole number"),
     "field without output": (["field", "good.yml"], "no output file given"),
 }
@@ -372,7 +372,7 @@ def test_a_pipe_feeds_one_rank(folder):
     words = [*launcher(2), BERGTOW, "run", "/dev/stdin", "--quiet"]
     result = subprocess.run(words, cwd=folder, input=GOOD.encode(), capture_output=True, timeout=60,
                             env=environment())
-    refused(result, USAGE, "/dev/stdin: is no file, and each of the 2 ranks would read it")
+    refused(result, USAGE, "/dev/stdin: is not a file, and each of the 2 ranks would read it")
 
 
 # ---- what must work ----

@@ -138,7 +138,7 @@ def test_a_pipe_in_the_place_of_a_result_stays(copy):
     pipe.unlink()
     os.mkfifo(pipe)
     result = ensemble(copy)
-    assert result.returncode == IO and "c001-r002/result.h5: is a pipe (FIFO) and no regular file" in result.stderr
+    assert result.returncode == IO and "c001-r002/result.h5: is a pipe (FIFO), not a regular file" in result.stderr
     assert pipe.is_fifo()
     pipe.unlink()
     assert ensemble(copy, "--retry-failed").returncode == DONE and pipe.is_file()

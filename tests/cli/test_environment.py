@@ -203,7 +203,7 @@ TABLES = {
     "not sorted": ("t,u,v\n0,1,1\n50,1,1\n50,2,1\n99,0,0\n", "bad.csv:4: its time is not after"),
     "late": ("t,u,v\n1,1,1\n99,1,1\n", "case.yml", "water.current_table: the table begins at 1 s"),
     "short": ("t,u,v\n0,1,1\n49,1,1\n", "case.yml",
-              "water.current_table: the table ends at 49 s and the run asks it for 50 s"),
+              "water.current_table: the table ends at 49 s and the run needs it until 50 s"),
     "long line": ("t,u,v\n" + "0" * 300 + ",1,1\n", "bad.csv:2: is longer"),
 }
 
@@ -228,7 +228,7 @@ def test_keys_beside_a_table_and_a_table_that_is_missing(tmp_path):
     assert result.returncode == CASE
     for key, table in (("water.current_x", "water.current_table"), ("water.tide.major", "water.current_table"),
                        ("air.wind_y", "air.wind_table")):
-        assert f"{key}: has no effect beside {table}" in result.stderr
+        assert f"{key}: has no effect with {table}" in result.stderr
     assert call("check", write_case(tmp_path, changed(base, water={"current_table": "t.csv"}))).returncode == DONE
     result = call("check", write_case(tmp_path, changed(base, water={"current_table": "none.csv"})))
     assert result.returncode == IO and "none.csv: cannot be read: No such file" in result.stderr

@@ -47,7 +47,7 @@ def test_floes_beyond_walls_end_the_run_at_the_step_they_pass(tmp_path):
 def test_energy_that_overflows_ends_the_run(tmp_path):
     r = run(tmp_path, HEAVY, "--quiet", code=NUMERIC)
     said = (r"step 1: kinetic_energy \(kinetic energy of all dynamic bodies.*\) is not a number, "
-            r"or came from some too large")
+            r"or a sum of numbers too large")
     assert re.search(said, r.result.stderr), r.result.stderr
     assert (r.dir / "failure.h5").exists() and not (r.dir / "summary.json").exists()
     assert np.isfinite(r.series("kinetic_energy")).all() and not len(r.series("time"))

@@ -99,7 +99,7 @@ def test_a_field_says_that_its_lead_is_not_in_it(tmp_path):
                  ice__concentration=0.8)
     write_case(tmp_path, changed(BASE, lead=MANAGED, run__duration=2, **sizes))
     said = call("field", tmp_path / "case.yml", "-o", tmp_path / "f.h5").stdout
-    assert "warning: lead.mode: managed: the file holds the ice as it is before the lead" in said
+    assert "warning: lead.mode: managed: the file holds the ice without the lead" in said
     write_case(tmp_path, changed(BASE, run__duration=2, **sizes))
     without = call("field", tmp_path / "case.yml", "-o", tmp_path / "g.h5").stdout
     below = [line for line in without.splitlines() if "smaller than ice.size_min" in line]

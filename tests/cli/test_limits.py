@@ -62,7 +62,7 @@ def test_greedy_case(tmp_path, kind):
 def test_wrong_floes_are_not_reported_for_ever(tmp_path):
     """10,000 floes of 250 unknown keys: 2.5 million messages, with a search for the nearest key each."""
     case = changed(SMALL, floes=[{f"k{i}": 0 for i in range(250)}] * 3000)
-    result = refusal(tmp_path, case, "what follows is not looked at after 200 errors")
+    result = refusal(tmp_path, case, "the rest is not checked after 200 errors")
     assert len(result.stderr.splitlines()) < 1000
 
 

@@ -201,7 +201,7 @@ def test_degrees_by_crs(tmp_path, crs):
     write(tmp_path, lonlat(ARROW), **named(crs))
     rings, *_ = field(tmp_path, changed(FRAMES["geographic"], **ORIGIN))
     assert same_ring(rings[0], seen("geographic", ARROW), 1e-3)
-    assert "ice.outlines_crs says else" in field(tmp_path, changed(FRAMES["geographic"], ice__outlines_crs="plane"),
+    assert "outlines_crs says otherwise" in field(tmp_path, changed(FRAMES["geographic"], ice__outlines_crs="plane"),
                                                  code=CASE)
     assert "give ice.origin_lon" in field(tmp_path, changed(FRAMES["geographic"], ice__origin_east=0,
                                                             ice__origin_north=0), code=CASE)
@@ -224,7 +224,7 @@ def test_metres_by_crs(tmp_path, crs):
     assert code in text and "scale factor" in text and "convergence" in text
     said = call("check", tmp_path / "case.yml").stdout
     assert f"{east:.10g} m east, {north:.10g} m north at x = y = 0" in said and "plane coordinates" in said
-    assert "ice.outlines_crs says else" in field(tmp_path, changed(FRAMES["geographic"], ice__outlines_crs="lonlat"),
+    assert "outlines_crs says otherwise" in field(tmp_path, changed(FRAMES["geographic"], ice__outlines_crs="lonlat"),
                                                  code=CASE)
     assert "give ice.origin_east" in field(tmp_path, changed(FRAMES["geographic"], **ORIGIN), code=CASE)
     # The same numbers as degrees: the crs is wrong.

@@ -364,4 +364,4 @@ def test_a_case_from_the_shells_pipe(tmp_path):
     path = write_case(tmp_path, changed(TANK, water={"current_table": "/dev/stdin"}))
     result = subprocess.run(["bash", "-c", f"printf 't,u,v\\n0,0,0\\n' | {BERGTOW} check {path}"], env=environment(),
                             capture_output=True, text=True, timeout=20)
-    assert result.returncode == IO and "/dev/stdin: is a pipe (FIFO) and no regular file" in result.stderr
+    assert result.returncode == IO and "/dev/stdin: is a pipe (FIFO), not a regular file" in result.stderr

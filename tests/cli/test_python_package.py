@@ -69,7 +69,7 @@ def test_a_text_that_would_end_at_a_nul_is_refused(tmp_path):
 
 @pytest.mark.parametrize("threads", [-1, 1025, 10_000_000, 2 ** 32 + 1])
 def test_threads_are_as_many_as_the_command_takes(threads):
-    with pytest.raises(bergtow.BergtowError, match=f"^threads: {threads} cannot be had; give 1 to 1024"):
+    with pytest.raises(bergtow.BergtowError, match=f"^threads: {threads} are not available; give 1 to 1024"):
         bergtow.Simulation(SHORT, threads=threads)
 
 

@@ -74,7 +74,7 @@ def test_a_failed_end_keeps_the_old_result_aside(tmp_path, old, both):
     before = contents(old)
     words = ["run", write_case(tmp_path, OTHER), "-o", old, "--force", "--quiet"]
     result = call(*words, env=faulty(BT_FAULT="checkpoint.h5.tmp"))
-    assert result.returncode == IO and f"{old}/replaced until a new result stands" in result.stderr
+    assert result.returncode == IO and f"{old}/replaced until a new result is complete" in result.stderr
     kept = contents(old / "replaced")
     assert all(kept[p] == before[p] for p in before) and not (old / "summary.json").exists()
     again = call(*words, env=faulty(BT_FAULT="checkpoint.h5.tmp"))
@@ -160,7 +160,7 @@ def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, dear, force):
     out.mkdir()
     (out / name).write_bytes(dear)
     result = call("run", write_case(tmp_path, SHORT), "-o", out, *force)
-    assert result.returncode == IO and f"{out / name}: is no file that this program has written" in result.stderr
+    assert result.returncode == IO and f"{out / name}: is not a file that this program has written" in result.stderr
     assert contents(out) == {(out / name).relative_to(out): dear}
 
 
@@ -261,7 +261,7 @@ def test_standard_output_is_no_place_for_a_file(tmp_path):
     with open(tmp_path / "taken.h5", "wb") as file:
         result = subprocess.run([BERGTOW, "field", write_case(tmp_path, SHORT), "-o", "/dev/stdout", "--force"],
                                 stdout=file, stderr=subprocess.PIPE, text=True, env=environment())
-    assert result.returncode == IO and "/dev/stdout: is an open descriptor and no regular file" in result.stderr
+    assert result.returncode == IO and "/dev/stdout: is an open descriptor, not a regular file" in result.stderr
     assert os.path.islink("/dev/stdout")
 
 

@@ -287,7 +287,7 @@ def test_a_checkpoint_tells_how_it_ends(stopped):
     (lambda f: f.pop("field/bare"), "/field/bare is missing"),
     (lambda f: f.pop("run/energy_limit"), "/run/energy_limit is missing"),
     (lambda f: f["stall/asked"].__setitem__((), float("nan")), "/stall/asked is not finite"),
-    (lambda f: f["stall/windows"].__setitem__((), -1), "/stall/windows is no count")])
+    (lambda f: f["stall/windows"].__setitem__((), -1), "/stall/windows is not a count")])
 def test_what_is_missing_or_too_much_in_a_checkpoint_is_named(stopped, damage, says):
     """Red where a member that is not there is taken for one that a run had not."""
     folder, _ = stopped

@@ -84,7 +84,7 @@ static int check(const char *path, const char *text, size_t size)
     int rings = -1;
     if (!whole) {
         char expected[512];
-        snprintf(expected, sizeof expected, "%s:%d: is not JSON: %s; mend the file", path, why.line, why.text);
+        snprintf(expected, sizeof expected, "%s:%d: is not JSON: %s; correct the file", path, why.line, why.text);
         assert_int_equal(status, BT_ERR_CASE);
         assert_int_equal(err.n, 1);
         assert_string_equal(err.text[0], expected);

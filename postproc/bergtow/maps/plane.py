@@ -143,8 +143,9 @@ class Plane:
         lonlat = plane._prepare(found, xy)
         plane.centre = centre or middle(lonlat)
         if not centre and -53 < plane.centre[1] < 30 and found.crs and crs.is_geographic:
-            raise RunError(found.path, "lies about latitude {1:.4g}, longitude {0:.4g}, where no sea ice is".format(
-                *plane.centre), "swap the coordinates if latitude comes first, or give the place with --centre")
+            where = "lies about latitude {1:.4g}, longitude {0:.4g}, where there is no sea ice".format(*plane.centre)
+            raise RunError(found.path, where,
+                           "swap the coordinates if latitude comes first, or give the place with --centre")
         plane._aeqd = about(plane.centre)
         return plane
 

@@ -152,7 +152,7 @@ def _of_the_case(e, rows, case, tow):
                     "value can be too large", narrow))
     left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
     if np.nanmax(left, initial=0.0) > 0:
-        out.append(("floes left through the open ends of the domain and resist no more: the value can be too small",
+        out.append(("floes left through the open ends of the domain and no longer resist: the value can be too small",
                     f"{np.sum(left > 0)} of {len(rows)} members, up to {np.nanmax(left):.0f} floes"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
