@@ -348,7 +348,8 @@ def head_sea(t, runs, current=None, wind=None):
     n, ends, parts = changed(t, base, other)
     largest = max(runs.measured("head-sea", lambda run: largest_mean(run, t.scale, *run.window)))
     return row("head_sea", n, "changed", "runs", in_design=given, runs=len(runs.fields), set=sets, formula="changed",
-               interval_95=combined_interval(t, n, ends, parts["ice_ratio"]), values=values | parts | {"largest_n": largest})
+               interval_95=combined_interval(t, n, ends, parts["ice_ratio"]),
+               values=values | parts | {"largest_n": largest})
 
 
 # ---- ranges
