@@ -124,9 +124,9 @@ static void list_idle(const bt_case *input, idle out[IDLE])
         {input->water.tilt != BT_TILT_SLOPE, ALWAYS, "water.slope_x water.slope_y", "water.tilt",
          "without water.tilt: slope"},
         {input->water.table.n > 0, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
-         "water.current_table", "beside water.current_table, which says it all"},
+         "water.current_table", "with water.current_table, which gives all of it"},
         {input->air.table.n > 0, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
-         "beside air.wind_table, which says it all"},
+         "with air.wind_table, which gives all of it"},
         {!input->ice.outlines, ALWAYS, "ice.outlines_crs", "ice.outlines", "without ice.outlines"},
         {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that is made, whose floes are convex"},
     };

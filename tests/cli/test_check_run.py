@@ -284,7 +284,7 @@ def test_outlines_without_a_thickness(tmp_path):
         assert said.returncode == CASE and "2 of 3 outlines have no property `thickness` (but `" in said.stderr
     assert missing(tmp_path, case, "--set", "ice.thickness=1") == (DONE, [])
     assert missing(tmp_path, changed(case, domain__frame="basin", domain__x0=-1000)) == (DONE, [])
-    text = "--set ice.thickness=none: is none, and a value is needed; give it (as in 1 m)"
+    text = "--set ice.thickness=none: is none where a value is needed; give it (as in 1 m)"
     assert text in call("check", write_case(tmp_path, LOOSE), "--set", "ice.thickness=none").stderr
 
 

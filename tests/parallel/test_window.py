@@ -100,7 +100,7 @@ def test_what_is_recorded(alone):
     # is shown below. So this is a limit on these two fields, and not one of the method.
     assert r.summary["max_overlap_relative"] < 0.02
     assert r.summary["momentum_residual"] < 1e-9
-    assert warned(r, "goes [12]\\.[0-9]+ times its length")
+    assert warned(r, "travels [12]\\.[0-9]+ times its length")
     assert "moving window" in run(r.dir.parent, CASES[name], "--steps", 3, name="short").result.stdout
 
 
@@ -211,7 +211,7 @@ def test_ice_that_drifts_past_a_body_is_renewed_as_that_which_it_is_towed_throug
         r = run(tmp_path, changed(case, tow__speed=speed, water__current_x=speed - 0.5), "--quiet", name=f"at {speed}")
         w, ice = r.summary["moving_window"], r.series("ice_resistance")
         found.append((w["laps"], w["renewed"] + w["missed"], ice[400:].mean()))
-        assert warned(r, "goes 2\\.[0-9]+ times its length through the ice")
+        assert warned(r, "travels 2\\.[0-9]+ times its length through the ice")
         assert np.all(np.diff(r.series("body_in_ice_x")) > 0)
     laps, places, force = np.array(found).T
     assert np.ptp(laps) < 0.1 and np.ptp(places) < 0.1 * places[0]
