@@ -148,7 +148,7 @@ static bt_status refuse(const char *path, const char *kind, const ends *e, bt_er
                       "take another copy of it",
                       path);
     else if (!seal && end < 0)
-        bt_errors_add(err, "%s: is not a %.*s file of this program, or is damaged; give the right one, or another copy",
+        bt_errors_add(err, "%s: is not this program's %.*s file, or is damaged; give the right one, or another copy",
                       path, (int)word, kind);
     else bt_errors_add(err, "%s: is damaged: its bytes do not fit their digest; take another copy of it", path);
     return BT_ERR_CASE;

@@ -49,6 +49,9 @@ bool bt_contacts_outrun(const bt_world *world);
 /// call.
 void bt_contacts_detect(bt_world *world, bool again);
 
+/// Sum of the bits of all impulses of a cell: the same for the same impulses, in any order of the contacts.
+uint64_t bt_contacts_load(const bt_cell *cell);
+
 /// Collective. Deepest overlap of the state after a step, m: what the next step would find before it solves anything,
 /// in the cells that have moved, crushed ice left out. Poses and velocities stay; contacts, labels, storage and marks
 /// of crushing that have come apart do not, so the state must have been saved.

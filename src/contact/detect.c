@@ -314,10 +314,7 @@ static void narrow_phase(bt_world *world, bt_idx k, const void *scratch, bt_tota
         several = several || pair->part[0] || pair->part[1] || bt_shore_holds(world, pair->a) ||
                   bt_shore_holds(world, pair->b);
     }
-    if (several) {
-        merge(world, cell, &s->pack);
-        cell->news = BT_NEW_CONTACTS; // a contact may have given way to one that is farther off
-    }
+    if (several) merge(world, cell, &s->pack);
     if (cell->laws.n_memory > 0) replace(world, cell, &s->pack);
     bt_pack_contacts(world, k, &s->pack);
 }
@@ -363,7 +360,7 @@ void bt_contacts_detect(bt_world *world, bool again)
     for (bt_idx j = 0; j < cells->n_busy; j++) {
         const bt_idx k = cells->busy[j];
         bt_cell *cell = &cells->cell[k];
-        cell->news = BT_SAME_CONTACTS;
+        cell->fresh = false;
         if (!cell->own) continue;
         const bool active = cells->bound[k] > 0;
         if (!active) {
@@ -374,7 +371,7 @@ void bt_contacts_detect(bt_world *world, bool again)
         if (again && cell->active && bt_margin_holds(world, cell->margin, cells->bound[k])) continue;
         cell->active = true;
         cell->margin = bt_margin_for(world, cells->bound[k]);
-        cell->news = again ? BT_MORE_CONTACTS : BT_NEW_CONTACTS;
+        cell->fresh = true;
         due[n_due++] = k;
     }
     // within a team of the caller the pass is that one thread's, which keeps its number

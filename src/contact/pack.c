@@ -206,11 +206,24 @@ static bt_row_state row_state(const bt_world *world, const bt_cell *cell, bt_idx
     return BT_ROW_OPEN;
 }
 
+uint64_t bt_contacts_load(const bt_cell *cell)
+{
+    uint64_t sum = 0;
+    for (bt_idx i = 0; i < cell->n_contacts; i++) {
+        const double x[3] = {cell->contacts[i].ln[0], cell->contacts[i].ln[1], cell->contacts[i].lt};
+        uint64_t bits[3];
+        memcpy(bits, x, sizeof bits);
+        sum += bits[0] + bits[1] + bits[2];
+    }
+    return sum;
+}
+
 __attribute__((flatten))
 void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch)
 {
     bt_cell *cell = &world->cells->cell[k];
     hold(cell, scratch);
+    cell->load = world->stats.repeats > 0 ? bt_contacts_load(cell) : 0;
     if ((bt_idx)scratch->n > cell->cap_contacts) {
         cell->cap_contacts = bt_cells_room((bt_idx)scratch->n);
         free(cell->gaps);

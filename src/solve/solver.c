@@ -407,15 +407,17 @@ static bool warm_start(bt_world *world)
 static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     bt_cell *cell = &world->cells->cell[k];
-    if (cell->news == BT_SAME_CONTACTS) return;
+    if (!cell->fresh) return;
     start_impulses(cell, world->bodies.inv);
     residual_of_cell(world, k, context, totals);
-    totals->most = bt_max(totals->most, cell->news == BT_MORE_CONTACTS ? cell->work.found.most : INFINITY);
+    const bool same = bt_contacts_load(cell) == cell->load;
+    totals->most = bt_max(totals->most, same ? cell->work.found.most : INFINITY);
     bt_sum_add(&totals->sum[0], cell->n_contacts);
 }
 
-/// Does the solution at hand hold with the contacts that have been added to it? They bear no load, so that it has the
-/// velocities of all impulses still, and the residual elsewhere is as it was.
+/// Does the solution at hand hold with the contacts that have been added to it? Where all impulses are there still, and
+/// no more, the velocities are theirs, and the residual elsewhere is as it was. An impulse can be gone: a point gave way
+/// to an edge of another part of the floe, or a bound took some of it.
 static bool holds_with_more(bt_world *world)
 {
     bt_step_stats *st = &world->stats;

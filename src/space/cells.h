@@ -177,9 +177,8 @@ typedef struct bt_cell {
     bool border;                    ///< some body of its block is held by other ranks too
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
-    /// What the last detection made of them: those of the detection before it in this step; these and maybe more, which
-    /// bear no load yet; or others
-    enum { BT_SAME_CONTACTS, BT_MORE_CONTACTS, BT_NEW_CONTACTS } news;
+    bool fresh;                     ///< the last detection has looked at it
+    uint64_t load;                  ///< bt_contacts_load of the contacts before, where a step was detected again
     double margin;                  ///< m, of this step's detection
     bt_pair_search search;
     // contacts of this step

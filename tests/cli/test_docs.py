@@ -22,9 +22,9 @@ DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
 PAGES += [ROOT / folder / "README.md" for folder in ("postproc", "tests", "partition")]
 HEADS = ("src", "include", "partition", "tests", "cases", "docs", "postproc")
-COMMANDS = {"run", "check", "field", "ensemble", "resume", "diff", "estimate", *cli.COMMANDS}
+COMMANDS = {"run", "check", "field", "ensemble", "resume", "diff", "estimate", "help", *cli.COMMANDS}
 FOLLOWED = {"ice-from-an-image.md"}  # word for word, files and all, by test_import_map.py
-MADE_BY_RUNS = {"bench.csv", "statistics.csv"}
+MADE_BY_RUNS = {"bench.csv", "members.csv", "statistics.csv"}
 # Words with a dot that begin like a section of a case and are none of its keys: files, and members of Python objects.
 NO_KEYS = "h5 h c sh yml csv png md html pdf json geojson py mp4 part resolved append summary units polygons".split()
 every_page = pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))

@@ -110,5 +110,5 @@ def test_each_source_stands_once_with_what_is_from_it():
     some = [value(f"a.k{k}", "1", "source", "default: Smith 1999") for k in range(6)] + [
         value("a.x", "1", "assumed", "assumed"), value("a.y", "1", "source", "Jones 2001")]
     blocks = document.sources(some, [{"source": "Jones 2001", "label": "ramming"}])
-    table = dict(next(b for b in blocks if b["kind"] == "table")["rows"][1:])
+    table = dict(next(b for b in blocks if b["kind"] == "pairs")["rows"][1:])
     assert table == {"Smith 1999": "a.k0, a.k1, a.k2, a.k3 and 2 more", "Jones 2001": "a.y, estimate: ramming"}

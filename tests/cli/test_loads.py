@@ -490,7 +490,7 @@ def test_what_moves_water_and_air_and_a_lead_stand_in_what_a_value_holds_for():
     lead = {"lead__width": "66.66666666666667 m", "lead__length": "400 m", "lead__floe_size": "15 m"}
     for mode, pieces in (("channel", "without floes"), ("managed", "of pieces up to 15 m")):
         assert said(**still | lead | {"lead__mode": mode}).startswith(
-            f"a lead 66.6667 m wide and 400 m long {pieces}, no current")
+            f"a lead 66.67 m wide and 400 m long {pieces}, no current")
     assert said(["lead.floe_size", "lead.width"], **lead | {"lead__mode": "managed"}) == \
         "a lead 400 m long of pieces, no current, no wind"
     assert said(["lead.mode"], **still | lead | {"lead__mode": "channel"}) == "no current, no wind"

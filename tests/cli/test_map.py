@@ -432,7 +432,7 @@ def test_absurd_sizes(tmp_path, scale, says):
 def test_absurd_values_of_a_case(tmp_path, key, value):
     case = changed(FRAMES["basin"], ice={"concentration": 0.1, "size": 20, key: value})
     result = call("check", write_case(tmp_path, case))
-    assert result.returncode == CASE and f"ice.{key}: " in result.stderr and "below" in result.stderr
+    assert result.returncode == CASE and f"ice.{key}: " in result.stderr and "less than" in result.stderr
 
 
 # ---- what the place on the earth says ----

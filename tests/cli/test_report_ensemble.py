@@ -420,6 +420,6 @@ def test_nothing_has_finished(tmp_path, status, behind, reported):
 
 def test_an_unusable_ensemble_is_reported(tmp_path, capsys, monkeypatch):
     (tmp_path / "ensemble.h5").write_bytes(b"no")
-    with pytest.raises(RunError, match="is no ensemble"):
+    with pytest.raises(RunError, match="is not this program.s ensemble file"):
         cli.perform("report", tmp_path)
     assert not (tmp_path / "report.html").exists()

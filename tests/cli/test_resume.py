@@ -191,7 +191,7 @@ def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
     (["empty", "--max-wall", "2 parsecs"], USAGE, "--max-wall 2 parsecs"),
     (["empty", "--max-wall", "0"], USAGE, "give a time of more than 0"),
     (["empty", "--stops"], USAGE, "did you mean --steps?"),
-    (["empty/notes.txt"], REFUSED, "empty/notes.txt: is no checkpoint file of this program"),
+    (["empty/notes.txt"], REFUSED, "empty/notes.txt: is not this program's checkpoint file"),
     (["empty/field.h5"], REFUSED, "empty/field.h5: is a field file, and a checkpoint file is needed here"),
 ])
 def test_what_cannot_be_resumed(tmp_path, arguments, code, text):
@@ -260,8 +260,8 @@ ENDS = {
     "seal": (lambda path: flip(path, -60), "is damaged"),
     "first word of the seal": (lambda path: flip(path, -128), "is damaged"),
     "longer": (lambda path: path.write_bytes(path.read_bytes() + bytes(200)), "is damaged"),
-    "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is no checkpoint file of this program"),
-    "empty": (lambda path: path.write_bytes(b""), "is no checkpoint file of this program"),
+    "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is not this program's checkpoint file"),
+    "empty": (lambda path: path.write_bytes(b""), "is not this program's checkpoint file"),
     "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", this program reads "checkpoint \d+"'),
 }
 

@@ -37,7 +37,7 @@ CASES = {
                    domain={"length": 9, "width": 6},
                    ice__friction=0.1),
     "crushing": changed(BASE,
-                        ice__friction=0.15,
+                        ice__friction=0.15, ice__seed=3,
                         domain__wall_friction=0.1,
                         ice__crushing={"pressure": "30 Pa", "least_length": 0.2}),
     "crushing, e = 0.4": changed(BASE, ice__restitution=0.4, ice__crushing={"pressure": "30 Pa"}),

@@ -317,7 +317,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
             cli.perform("statistics", str(plain[0]), *arguments)
         assert stop.value.status == 2
     (tmp_path / "ensemble.h5").write_bytes(b"no HDF5")
-    with pytest.raises(RunError, match="is no ensemble"):
+    with pytest.raises(RunError, match="is not this program.s ensemble file"):
         Members(tmp_path)
     waiting = made_up.write(tmp_path / "w", [made_up.member([1.0] * 30, {}, 0, status=made_up.WAITING)])
     for command in ("statistics", "plot-ensemble"):

@@ -20,7 +20,7 @@ def write(title, words, picture, runs, path, force, size=8.0):
     given = dict.fromkeys(TITLE_BLOCK)
     sections = []
     for heading, folder in runs:
-        html = page.pages(Path(folder), [Path("report.html")], given, (), size, True)[Path("report.html")]
+        html = page.pages(Path(folder), [Path("report.html")], given, (), size, True)[0][Path("report.html")]
         sections.append(f'<section><h2>{escape(heading)}</h2><iframe title="{escape(heading)}" '
                         f'srcdoc="{escape(html, quote=True)}"></iframe></section>')
     image = f'<img alt="map with the routes" src="data:image/png;base64,{picture}">' if picture else ""

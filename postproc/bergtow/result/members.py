@@ -149,7 +149,7 @@ class Members:
             self._read()
             self.unsound = self._unsound()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
-            raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})",
+            raise RunError(self.file, f"is not an ensemble ({str(error).splitlines()[0]})",
                            "run `bergtow ensemble` again: it makes the file anew") from None
         self._dropped = {}
 
