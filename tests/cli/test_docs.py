@@ -22,7 +22,7 @@ DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
 PAGES += [ROOT / folder / "README.md" for folder in ("postproc", "tests", "partition")]
 HEADS = ("src", "include", "partition", "tests", "cases", "docs", "postproc")
-COMMANDS = {"run", "check", "field", "ensemble", "resume", "diff", "estimate", "help", *cli.COMMANDS}
+COMMANDS = {"run", "check", "field", "ensemble", "resume", "diff", "estimate", *cli.COMMANDS}
 FOLLOWED = {"ice-from-an-image.md"}  # word for word, files and all, by test_import_map.py
 MADE_BY_RUNS = {"bench.csv", "members.csv", "statistics.csv"}
 # Words with a dot that begin like a section of a case and are none of its keys: files, and members of Python objects.
@@ -217,6 +217,9 @@ def test_commands_and_options_are_known(path):
     for line, words in found:
         if words[0].startswith("--"):
             assert set(words) <= {"--help", "--version", "--list-keys", "--list-quantities", "--json"}, line
+            continue
+        if words[0] == "help":
+            assert set(words[1:]) <= COMMANDS | {"COMMAND"}, line
             continue
         assert words[0] in COMMANDS, line
         assert {w.split("=")[0] for w in words[1:] if re.match("-.", w)} <= options(words[0]), line
