@@ -10,6 +10,7 @@
 
 The halves are assumed. Floes that come to lie on the towed body or leave the domain are left out, and counted.
 """
+import math
 from dataclasses import dataclass
 
 from bergtow.errors import CASE, RunError
@@ -75,10 +76,13 @@ class Floes:
             g.attrs["n_floes"] = len(self.area)
 
     def outlines(self):
-        """[n, 2] each, m."""
-        c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
-        return [self.vertices[a:b] @ np.array([[c[i], s[i]], [-s[i], c[i]]]) + self.pose[i, :2]
-                for i, (a, b) in enumerate(zip(self.offsets, self.offsets[1:]))]
+        """[n, 2] each, m. Number by number: the last digit of numpy's matrix products, sines and cosines depends on
+        where the operands lie in memory, and the members of a map must have the same bits in every call."""
+        turn = [(math.cos(yaw), math.sin(yaw)) for yaw in self.pose[:, 2]]
+        at = np.hstack([self.pose[:, :2], np.reshape(turn, (-1, 2))])
+        x, y, c, s = np.repeat(at, np.diff(self.offsets), axis=0).T
+        u, v = self.vertices.T
+        return np.split(np.stack([c * u - s * v + x, s * u + c * v + y], axis=1), self.offsets[1:-1])
 
     def take(self, kept):
         """Those floes alone."""
