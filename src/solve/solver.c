@@ -416,8 +416,8 @@ static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_
 }
 
 /// Does the solution at hand hold with the contacts that have been added to it? Where all impulses are there still, and
-/// no more, the velocities are theirs, and the residual elsewhere is as it was. An impulse can be gone: a point gave way
-/// to an edge of another part of the floe, or a bound took some of it.
+/// no more, the velocities are theirs, and the residual elsewhere is as it was. An impulse can be gone: a point gave
+/// way to an edge of another part of the floe, or a bound took some of it.
 static bool holds_with_more(bt_world *world)
 {
     bt_step_stats *st = &world->stats;
