@@ -5,7 +5,7 @@
 // the ground moves by −u t, u the drift of the ice. The path is that of the berg's centre, and its swath is the strip
 // of the berg's width W about it. The force F on the berg in the swath, at the speed V along the path, is per metre of
 // width, with m the mass of ice per area of sea, c the concentration, h the thickness, C the added mass coefficient of
-// floes, D̄ the mean size of floes by area, and averages (·)' over a square of 2 (W + D̄), of what is known of it:
+// floes, D̄ the mean size of floes by area, and averages (·)' over the known part of a square of 2 (W + D̄):
 //     water       d |V t − u_w| (V t − u_w) · t, d = ½ ρ_w C_d A_w, u_w the water's velocity in this frame: one number
 //     plough      f1 = (1 + C) m V²: floes that the berg meets are taken up to its speed; as much again is lost
 //     large       floes move as a whole. One of mass M, diameter D and offset b from the path takes in an oblique

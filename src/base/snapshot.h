@@ -124,7 +124,7 @@ void bt_snapshot_free(bt_snapshot *snap);
 /// known.
 typedef const char *bt_item_meaning(const char *name, const char **units, const char **axes);
 
-/// An HDF5 file, which what is added to `snap` from here on goes to, with what each array is unless meaning is NULL.
+/// An HDF5 file that takes all arrays added to `snap` from here on, each with its meaning unless that is NULL.
 /// `snap` is empty before. What fails here or on the way, bt_snapshot_close returns.
 void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *meaning, bt_errors *err);
 /// Nothing more comes: the file is completed, protected by a checksum, and closed.
