@@ -14,8 +14,9 @@
 double bt_margin_most(const bt_world *world) { return 16 * world->par.size; }
 
 // Contacts make floes faster within the step. With a fifth more than the speeds before the solve, the margin holds for
-// the solution nearly wherever that matters: 300 steps of full-scale tows in 80 and 90 % ice take a sixth fewer updates.
-// Two fifths save no more and add a tenth to the time of detection. Plain sweeps, the reference, have no such room: fields are shaken with them, and keep their bits.
+// the solution nearly wherever that matters: 300 steps of full-scale tows in 80 and 90 % ice take a sixth fewer
+// updates. Two fifths save no more and add a tenth to the time of detection. Plain sweeps, the reference, have no such
+// room: fields are shaken with them, and keep their bits.
 #define FASTER 1.2
 
 /// The way, m, rounded up to a power of √2, between the slop and the largest margin.
