@@ -49,10 +49,22 @@ typedef struct survey {
     double odd[2];          ///< its vertex
 } survey;
 
+/// A feature as it stands in the file.
+typedef struct map_feature {
+    int64_t vertex;     ///< its first in `ring`
+    const char *why;    ///< it is not an outline, or NULL
+    json_t *id;         ///< or NULL, as the next
+    json_t *thickness;
+} map_feature;
+
 typedef struct reader {
     const bt_case *c;
     bt_refusals r;
     bt_field *f;
+    map_feature *feature; ///< [n_features + 1], the last one only where the coordinates end
+    size_t n_features, cap_features;
+    double *ring;         ///< [vertices][2] coordinates
+    int64_t cap_vertices;
     coordinates kind;
     bool assumed;      ///< degrees because nothing says else
     bt_map_crs crs;
@@ -62,10 +74,9 @@ typedef struct reader {
 } reader;
 
 /// "feature 3" or "feature 3 (id 17)".
-static const char *name_of(const json_t *feature, size_t index, char out[96])
+static const char *name_of(const reader *in, size_t index, char out[96])
 {
-    const json_t *id = json_object_get(feature, "id");
-    if (!id) id = json_object_get(json_object_get(feature, "properties"), "id");
+    const json_t *id = in->feature[index].id;
     if (json_is_string(id)) snprintf(out, 96, "feature %zu (id %.60s)", index, json_string_value(id));
     else if (json_is_integer(id))
         snprintf(out, 96, "feature %zu (id %" JSON_INTEGER_FORMAT ")", index, json_integer_value(id));
@@ -73,7 +84,7 @@ static const char *name_of(const json_t *feature, size_t index, char out[96])
     return out;
 }
 
-/// The outer ring of a feature that the parser was left, or NULL and why not.
+/// The outer ring of a feature, or NULL and why not.
 static const json_t *ring_of(const json_t *feature, const char **why)
 {
     const json_t *geometry = json_object_get(feature, "geometry"), *polygon = json_object_get(geometry, "coordinates");
@@ -100,20 +111,17 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     return NULL;
 }
 
-/// Coordinates of feature i as they are in the file, the closing one left out; their number, 0 and why not.
-static int coordinates_of(bt_features *features, size_t i, double *v, const char **why)
+/// Coordinates of a feature as they are in the file, the closing one left out; their number, 0 and why not.
+static int coordinates_of(const json_t *feature, double *v, const char **why)
 {
-    size_t n;
-    const double *read = bt_features_ring(features, i, &n);
-    const json_t *feature = bt_features_at(features, i), *ring = read ? NULL : ring_of(feature, why);
-    if (!read && !ring) return 0;
+    const json_t *ring = ring_of(feature, why);
+    if (!ring) return 0;
     if (json_object_get(feature, "crs") || json_object_get(json_object_get(feature, "geometry"), "crs")) {
         *why = "it has a crs of its own; give one to the whole FeatureCollection";
         return 0;
     }
-    if (read) memcpy(v, read, 2 * n * sizeof *v);
-    else n = json_array_size(ring);
-    for (size_t k = 0; ring && k < n; k++) {
+    size_t n = json_array_size(ring);
+    for (size_t k = 0; k < n; k++) {
         const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
         if (!json_is_number(x) || !json_is_number(y)) {
             *why = "a vertex is no pair of numbers; write [east, north]";
@@ -137,23 +145,14 @@ static void see(survey *seen, size_t i, double x, double y, double lon)
 }
 
 /// Box of all coordinates; lon: the farthest longitude that is one.
-static survey look_over(bt_features *features, double lon)
+static survey look_over(const reader *in, double lon)
 {
     survey seen = {.low = {INFINITY, INFINITY, INFINITY, INFINITY},
                    .high = {-INFINITY, -INFINITY, -INFINITY, -INFINITY},
                    .feature = SIZE_MAX};
-    for (size_t i = 0; i < features->n; i++) {
-        const char *why;
-        size_t n;
-        const double *read = bt_features_ring(features, i, &n);
-        for (size_t k = 0; read && k < n; k++) see(&seen, i, read[2 * k], read[2 * k + 1], lon);
-        const json_t *ring = read ? NULL : ring_of(bt_features_at(features, i), &why);
-        for (size_t k = 0; ring && k < json_array_size(ring); k++) {
-            const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
-            // others are reported with their feature
-            if (json_is_number(x) && json_is_number(y)) see(&seen, i, json_number_value(x), json_number_value(y), lon);
-        }
-    }
+    for (size_t i = 0; i < in->n_features; i++)
+        for (int64_t k = in->feature[i].vertex; k < in->feature[i + 1].vertex; k++)
+            see(&seen, i, in->ring[2 * k], in->ring[2 * k + 1], lon);
     return seen;
 }
 
@@ -171,10 +170,10 @@ static void take_origin(const json_t *mark, double origin[2])
 /// Degrees out of range, or latitude before longitude; and the place of x = y = 0: the case's, that of the
 /// file's mark, or the middle of all coordinates. Rings that lie on both sides of 180° would have it on the wrong side
 /// of the earth: they are taken with longitudes from 0° to 360° when that makes the box smaller.
-static void begin_degrees(reader *in, bt_features *features, const json_t *mark)
+static void begin_degrees(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
-    const survey seen = look_over(features, in->assumed ? 180 : 360);
+    const survey seen = look_over(in, in->assumed ? 180 : 360);
     const bool given = !isnan(input->ice.origin_lon), swapped = bt_max(fabs(seen.low[0]), fabs(seen.high[0])) <= 90 &&
                                                                 bt_max(fabs(seen.low[1]), fabs(seen.high[1])) <= 360;
     if (!isnan(input->ice.origin_east))
@@ -214,10 +213,10 @@ static void begin_degrees(reader *in, bt_features *features, const json_t *mark)
 
 /// The place of x = y = 0 in a plane: the case's, that of the file's mark, the middle where the crs is a projection,
 /// whose zeros are far away; otherwise zero.
-static void begin_plane(reader *in, bt_features *features, const json_t *mark)
+static void begin_plane(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
-    const survey seen = look_over(features, 180);
+    const survey seen = look_over(in, 180);
     const bool given = !isnan(input->ice.origin_east), projected = in->crs.kind == BT_MAP_PLANE;
     if (!isnan(input->ice.origin_lon) && in->kind == PLANE)
         bt_refuse(&in->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "
@@ -334,13 +333,34 @@ static void look_for_thickness(reader *in, const json_t *properties)
     counts->unnamed += any;
 }
 
-static void read_feature(reader *in, bt_features *features, size_t index, double *v)
+/// Feature by feature as it is parsed.
+static void take_feature(void *context, size_t index, const json_t *feature)
+{
+    reader *in = context;
+    if (index >= BT_MOST_FLOES) return; // read_features refuses them
+    if (index + 1 >= in->cap_features)
+        in->feature = bt_realloc(in->feature, in->cap_features = 256 + 3 * in->cap_features / 2, sizeof *in->feature);
+    map_feature *out = &in->feature[index];
+    const int64_t first = index ? out->vertex : 0;
+    if (first + BT_MOST_RING > in->cap_vertices)
+        in->ring = bt_realloc(in->ring, 2 * (size_t)(in->cap_vertices = BT_MOST_RING + 3 * first / 2), sizeof *in->ring);
+    const json_t *properties = json_object_get(feature, "properties");
+    json_t *id = json_object_get(feature, "id"), *thickness = json_object_get(properties, "thickness");
+    *out = (map_feature){.vertex = first};
+    out[1] = (map_feature){.vertex = first + coordinates_of(feature, in->ring + 2 * first, &out->why)};
+    out->id = json_incref(id ? id : json_object_get(properties, "id"));
+    if (thickness && !json_is_null(thickness)) out->thickness = json_incref(thickness);
+    else look_for_thickness(in, properties);
+    in->n_features = index + 1;
+}
+
+static void read_feature(reader *in, size_t index)
 {
     char name[96], text[BT_ICE_WHY];
-    const json_t *feature = bt_features_at(features, index);
-    const char *why = NULL;
-    int n = coordinates_of(features, index, v, &why);
-    if (n) why = place(in, n, v);
+    const map_feature *feature = &in->feature[index];
+    double *v = in->ring + 2 * feature->vertex;
+    int n = (int)(feature[1].vertex - feature->vertex);
+    const char *why = feature->why ? feature->why : place(in, n, v);
     bt_outline_counts *counts = &in->f->outlines;
     if (!why) {
         const int clean = bt_outline_clean(n, v);
@@ -354,20 +374,19 @@ static void read_feature(reader *in, bt_features *features, size_t index, double
         why = bt_outline_admit(in->c->ice.nonconvex, &n, v, counts);
     }
     if (why) {
-        bt_refuse(&in->r, "%s is refused: %s", name_of(feature, index, name), why);
+        bt_refuse(&in->r, "%s is refused: %s", name_of(in, index, name), why);
         return;
     }
-    const json_t *properties = json_object_get(feature, "properties"),
-                 *given = json_object_get(properties, "thickness");
+    const json_t *given = feature->thickness;
     if (json_is_string(given)) {
         bt_refuse(&in->r, "%s: thickness is a text, \"%.20s\"; write the number of metres without quotes",
-                  name_of(feature, index, name), json_string_value(given));
+                  name_of(in, index, name), json_string_value(given));
         return;
     }
     double thickness;
-    if (given && !json_is_null(given)) thickness = json_is_number(given) ? json_number_value(given) : NAN;
+    if (given) thickness = json_is_number(given) ? json_number_value(given) : NAN;
     else {
-        look_for_thickness(in, properties), counts->bare++;
+        counts->bare++;
         if (isnan(in->c->ice.thickness)) return; // check_thickness
         thickness = bt_field_thickness(in->c, in->f->n);
     }
@@ -383,7 +402,7 @@ static void read_feature(reader *in, bt_features *features, size_t index, double
                               thickness,
                               field->area[i],
                               1e-6};
-    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&in->r, "%s: %s", name_of(feature, index, name), why);
+    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&in->r, "%s: %s", name_of(in, index, name), why);
 }
 
 /// Metres as the case calls them, of a file that does not say it.
@@ -519,28 +538,25 @@ static void check_whole(reader *in)
                   size / in->f->n, thickness / in->f->n);
 }
 
-static void read_features(reader *in, bt_features *features)
+static void read_features(reader *in, const json_t *root, size_t n)
 {
-    const json_t *root = features->root, *mark = json_object_get(root, "bergtow");
+    const json_t *mark = json_object_get(root, "bergtow");
     const char *type = json_string_value(json_object_get(root, "type"));
-    if (!type || strcmp(type, "FeatureCollection") || !features->listed) {
+    if (!type || strcmp(type, "FeatureCollection") || !json_is_array(json_object_get(root, "features"))) {
         bt_refuse(&in->r,
                   "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
         return;
     }
-    if (features->n == 0 || features->n > BT_MOST_FLOES) {
-        bt_refuse(&in->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n,
-                  BT_MOST_FLOES);
+    if (n == 0 || n > BT_MOST_FLOES) {
+        bt_refuse(&in->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", n, BT_MOST_FLOES);
         return;
     }
     choose_coordinates(in, root);
-    if (in->r.status == BT_OK && in->kind == DEGREES) begin_degrees(in, features, mark);
-    else if (in->r.status == BT_OK) begin_plane(in, features, mark);
+    if (in->r.status == BT_OK && in->kind == DEGREES) begin_degrees(in, mark);
+    else if (in->r.status == BT_OK) begin_plane(in, mark);
     if (in->r.status != BT_OK) return;
-    double *v = bt_alloc(2 * (BT_MOST_RING + 1), sizeof *v);
-    for (size_t i = 0; i < features->n; i++) read_feature(in, features, i, v);
-    free(v);
-    check_thickness(in, features->n);
+    for (size_t i = 0; i < n; i++) read_feature(in, i);
+    check_thickness(in, n);
     bt_outline_counts *counts = &in->f->outlines;
     counts->lon = in->kind == DEGREES ? in->lon0 : NAN;
     counts->lat = in->kind == DEGREES ? in->lat0 : NAN;
@@ -559,11 +575,15 @@ bt_status bt_field_read_outlines(const bt_case *input, bt_field *field, bt_error
     const char *path = input->ice.outlines;
     bt_field_free(field);
     bt_field_init(field);
-    bt_features features;
-    reader in = {.c = input, .r = {.path = path, .err = err, .status = bt_features_open(&features, path, err)},
-                 .f = field};
-    if (in.r.status == BT_OK) read_features(&in, &features);
-    bt_features_close(&features);
+    json_t *root;
+    size_t n;
+    reader in = {.c = input, .r = {.path = path, .err = err}, .f = field};
+    in.r.status = bt_features_read(path, take_feature, &in, &root, &n, err);
+    if (in.r.status == BT_OK) read_features(&in, root, n);
+    for (size_t i = 0; i < in.n_features; i++) json_decref(in.feature[i].id), json_decref(in.feature[i].thickness);
+    free(in.feature);
+    free(in.ring);
+    json_decref(root);
     if (in.r.status != BT_OK) {
         bt_field_free(field);
         bt_field_init(field);
