@@ -88,6 +88,9 @@ bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err);
 /// holds.
 bt_status bt_field_read_outlines(const bt_case *input, bt_field *field, bt_errors *err);
 
+/// Is a property of outlines likely to be a thickness that is not called `thickness`?
+bool bt_outline_near_thickness(const char *name);
+
 /// Outlines where they lie, as GeoJSON that ice.outlines reads back: longitude and latitude where the place of x = y =
 /// 0 on the earth is known (of outlines that were read in degrees, or ice.origin_lon and ice.origin_lat), the crs of
 /// outlines that were read in another, and otherwise metres [east, north] of x = y = 0, with a crs that says that they

@@ -195,9 +195,7 @@ static void begin_degrees(reader *in, const json_t *mark)
     if (seen.high[3] - seen.low[3] < seen.high[a] - seen.low[a]) a = 3;
     double middle[2] = {(seen.low[a] + seen.high[a]) / 2, (seen.low[1] + seen.high[1]) / 2};
     if (!(seen.low[0] <= seen.high[0])) middle[0] = middle[1] = 0; // no place at all
-    // No sea ice is there, and the other way round it could be: nearest to the equator is the ice of the Bohai Sea, at
-    // 37° N, and of South Georgia, at 54° S.
-    if (!given && middle[1] > -53 && middle[1] < 30 && fabs(middle[0]) >= 30 && swapped) {
+    if (!given && middle[1] > BT_MAP_FREE_SOUTH && middle[1] < BT_MAP_FREE_NORTH && fabs(middle[0]) >= 30 && swapped) {
         bt_refuse(&in->r,
                   "its outlines lie about latitude %.4g, longitude %.4g, where there is no sea ice: latitude seems to "
                   "come first; write [longitude, latitude], or give ice.origin_lon and ice.origin_lat if the place is "
@@ -295,19 +293,16 @@ static void turn_round(int n, double *v)
         }
 }
 
-const char *const bt_map_near_thickness[] = {"thick", "height",   "h",   "ice_height", "draft",
-                                             "dicke", "tykkelse", "sit", NULL};
-
-/// Is a property likely to be a thickness under another name?
-static bool is_nearly_thickness(const char *name)
+bool bt_outline_near_thickness(const char *name)
 {
+    static const char *const words[] = {"height", "h", "ice_height", "draft", "dicke", "tykkelse", "sit", NULL};
     char lower[64];
     size_t n = 0;
     for (; name[n] && n < sizeof lower - 1; n++)
         lower[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
     lower[n] = 0;
-    for (int i = 0; bt_map_near_thickness[i]; i++)
-        if (!strcmp(lower, bt_map_near_thickness[i])) return true;
+    for (int i = 0; words[i]; i++)
+        if (!strcmp(lower, words[i])) return true;
     return strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
 }
 
@@ -319,7 +314,7 @@ static void look_for_thickness(reader *in, const json_t *properties)
     json_t *value;
     bool any = false;
     json_object_foreach((json_t *)properties, name, value) {
-        if (!is_nearly_thickness(name) || json_is_null(value)) continue;
+        if (!bt_outline_near_thickness(name) || json_is_null(value)) continue;
         any = true;
         char entry[48];
         snprintf(entry, sizeof entry, "`%.40s`", name);
@@ -343,7 +338,8 @@ static void take_feature(void *context, size_t index, const json_t *feature)
     map_feature *out = &in->feature[index];
     const int64_t first = index ? out->vertex : 0;
     if (first + BT_MOST_RING > in->cap_vertices)
-        in->ring = bt_realloc(in->ring, 2 * (size_t)(in->cap_vertices = BT_MOST_RING + 3 * first / 2), sizeof *in->ring);
+        in->ring = bt_realloc(in->ring, 2 * (size_t)(in->cap_vertices = BT_MOST_RING + 3 * first / 2),
+                              sizeof *in->ring);
     const json_t *properties = json_object_get(feature, "properties");
     json_t *id = json_object_get(feature, "id"), *thickness = json_object_get(properties, "thickness");
     *out = (map_feature){.vertex = first};

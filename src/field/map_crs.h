@@ -39,10 +39,12 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
 
 // Where x = y = 0 of a case lies on the earth, as far as its map or its keys say it.
 
-/// Names of properties that come near to `thickness`, which is none of them; NULL ends them.
-extern const char *const bt_map_near_thickness[];
-
 #define BT_MAP_FARTHEST 100e3 ///< m from the origin: the projection is one of small areas
+
+/// Between these latitudes, deg, there is no sea ice: nearest to the equator is that of the Bohai Sea, at 37° N, and of
+/// South Georgia, at 54° S.
+#define BT_MAP_FREE_SOUTH (-53.)
+#define BT_MAP_FREE_NORTH 30.
 
 typedef struct bt_map_place {
     bt_map_kind kind;     ///< BT_MAP_DEGREES, BT_MAP_PLANE (of a projection), BT_MAP_LOCAL (of no place on the earth)

@@ -569,9 +569,8 @@ static char *limits_json(void)
     bt_json_int(&json, "threads", BT_MOST_THREADS);
     bt_json_int(&json, "contact_columns", BT_CONTACT_COLUMNS);
     bt_json_string(&json, "map_local_crs", BT_MAP_LOCAL_NAME);
-    bt_json_open(&json, "map_words_near_thickness", '[');
-    for (int k = 0; bt_map_near_thickness[k]; k++) bt_json_string(&json, NULL, bt_map_near_thickness[k]);
-    bt_json_close(&json, ']');
+    bt_json_numbers(&json, "map_ice_free_deg", 2, (const double[]){BT_MAP_FREE_SOUTH, BT_MAP_FREE_NORTH});
+    bt_json_int(&json, "outline_vertices", BT_MAX_VERTICES);
     bt_json_close(&json, '}');
     return json.text;
 }

@@ -352,6 +352,9 @@ def test_what_the_library_says_of_units_files_and_limits(tmp_path):
     for name, macro in (("window_independent", "INDEPENDENT"), ("window_contact_stretches", "STRETCHES"),
                         ("window_drift", "MATERIAL")):
         assert limits[name] == float(re.search(rf"#define BT_STEADY_{macro} (\S+)", header)[1])
+    near = [name for name in (b"Thickness_m", b"thicknes", b"Tykkelse", b"id", b"hi") if
+            lib.bt_outline_near_thickness(name)]
+    assert near == [b"Thickness_m", b"thicknes", b"Tykkelse"]
 
 
 def test_modules_use_those_below_them():

@@ -269,9 +269,10 @@ def perform(a):
         print("\n".join(map_text.change_lines(book)))
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
     distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
-    if distortion["farthest_m"] > _library.limit("map_farthest_m"):
-        far = distortion["farthest_m"] / 1e3
-        raise RunError(found.path, f"has floes {far:.4g} km from the centre; bergtow takes 100 km",
+    farthest = _library.limit("map_farthest_m")
+    if distortion["farthest_m"] > farthest:
+        raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes "
+                       f"{farthest / 1e3:g} km",
                        "choose a part with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:
         raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.maps.read import INSTALL, local_crs
 
@@ -142,7 +143,8 @@ class Plane:
                            "give longitude and latitude in degrees")
         lonlat = plane._prepare(found, xy)
         plane.centre = centre or middle(lonlat)
-        if not centre and -53 < plane.centre[1] < 30 and found.crs and crs.is_geographic:
+        south, north = _library.limit("map_ice_free_deg")
+        if not centre and south < plane.centre[1] < north and found.crs and crs.is_geographic:
             where = "lies about latitude {1:.4g}, longitude {0:.4g}, where there is no sea ice".format(*plane.centre)
             raise RunError(found.path, where,
                            "swap the coordinates if latitude comes first, or give the place with --centre")

@@ -159,8 +159,8 @@ def from_layer(path, source, how):
             layer.SetAttributeFilter(how.where)
         column = how.thickness or thickness_column(layer, columns)
         if not column:
-            found.near = [name for name in columns if "thick" in name.lower()
-                          or name.lower() in _library.limit("map_words_near_thickness")]
+            near = _library.library().bt_outline_near_thickness
+            found.near = [name for name in columns if near(name.encode(errors="replace"))]
         for feature in layer:
             add_feature(found, feature, column)
     except RuntimeError as error:

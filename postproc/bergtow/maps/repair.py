@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Polygons of a map to floes: simple rings of at most 128 vertices that neither overlap nor touch. Every change is
+"""Polygons of a map to floes: simple rings of few enough vertices that neither overlap nor touch. Every change is
 counted.
 
     book = Ledger()
@@ -26,6 +26,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.maps.plane import vertices
 
@@ -36,10 +37,8 @@ try:
 except ImportError:  # map_read.need_libraries tells it
     pass
 
-MOST_VERTICES = 128      # include/bergtow/shape.h
 SAME = 0.9               # of both areas: traced twice; of the smaller one: it lies in the other
 THIN = 1e-4              # of the tolerance and of the reader's: below it detail is rounding
-READER = 1e-3            # overlap that src/field/field_admit.c takes, of the mean size
 GAP = 2e-5               # left between floes, of the mean size
 PASSES, PATIENCE = 40, 8
 NAMED = 20               # of those that are named in the record
@@ -67,7 +66,7 @@ KINDS = {
     "touching": "floes that touched another, drawn back from it",
     "split": "floes cut in pieces by that",
     "narrow": "outlines with spikes or necks that are too thin to compute with, opened there",
-    "vertices": f"outlines of more than {MOST_VERTICES} vertices, simplified further",
+    "vertices": "outlines of more vertices than a floe may have, simplified further",
 }
 
 
@@ -125,12 +124,18 @@ def repaired(shapes, rules, book):
     """The floes. Errors: RunError where nothing is left."""
     floes = [floe for shape in shapes for floe in whole(shape, book)]
     floes = [f for f in floes if chosen(f, rules, book)]
-    finest = READER * float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1.0
+    size = float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1e3
+    finest = allowed_overlap() * size
     rules.tolerance = rules.tolerance or finest
-    rules.thin, rules.gap = THIN * min(rules.tolerance, finest), GAP / READER * finest
+    rules.thin, rules.gap = THIN * min(rules.tolerance, finest), GAP * size
     floes = [f for floe in floes for f in simplified(floe, rules, book)]
     floes = [f for f in floes if large_enough(f, rules, book) and stays(f, rules, book)]
     return apart(floes, rules, book)
+
+
+def allowed_overlap():
+    """Of floes, of their mean size, that a case reads by default."""
+    return next(float(key["default"]) for key in _library.listed("keys")["keys"] if key["name"] == "solver.slop")
 
 
 def diameter(polygon):
@@ -227,11 +232,11 @@ def with_area(polygon, area):
 
 
 def too_many(polygon):
-    return len(polygon.exterior.coords) - 1 > MOST_VERTICES
+    return len(polygon.exterior.coords) - 1 > _library.limit("outline_vertices")
 
 
 def fewer(polygon, tolerance, inside=False):
-    """At most MOST_VERTICES, with the least tolerance in steps of a quarter that does it; inside: nothing is added."""
+    """Not too many vertices, with the least tolerance in steps of a quarter that does it; inside: nothing is added."""
     out = polygon
     while too_many(out):
         tolerance *= 1.25
