@@ -22,6 +22,7 @@ from bergtow.plot import field as plot_field
 from bergtow.plot import force as plot_force
 from bergtow.reporting import run as report_run
 from bergtow.result import run as bergtow_read
+from bergtow.result.frames import place
 from bergtow.result.run import Run
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -147,7 +148,7 @@ def test_vertices_turn_anticlockwise_about_the_centroid(tmp_path):
 
 
 def test_bodies_turn_as_floes_do():
-    corner = bergtow_read.place(HULL, (5.0, 7.0, np.pi / 6))[2]
+    corner = place(HULL, (5.0, 7.0, np.pi / 6))[2]
     assert np.abs(corner - [5 + np.sqrt(3) - 0.5, 7 + 1 + np.sqrt(3) / 2]).max() < 1e-12
 
 

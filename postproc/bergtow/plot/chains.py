@@ -11,7 +11,8 @@ from pathlib import Path
 from bergtow import arguments, writing
 from bergtow.errors import RunError
 from bergtow.plot import style
-from bergtow.result.run import Run, place
+from bergtow.result.frames import place
+from bergtow.result.run import Run
 
 import h5py
 import numpy as np

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.result import overlaps as rafted
-from bergtow.result.run import place
+from bergtow.result.frames import place
 
 COLOURS = ("speed", "force", "thickness", "generation")
 

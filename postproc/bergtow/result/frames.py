@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: MIT
+"""Floes and bodies of a run, and where they are in its frames: the part of Run (result/run.py) that has outlines."""
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bergtow.errors import RunError
+from bergtow.result.hdf5 import plain
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that is not a floe: the towed body, a wall, or a fixed body given by hand."""
+
+    name: str
+    vertices: np.ndarray  #: [n, 2] m, body frame, anticlockwise in (x, y)
+    towed: bool
+
+    @property
+    def wall(self):
+        return self.name.startswith("wall")
+
+
+def place(vertices, pose):
+    """World coordinates [n, 2] m of vertices [n, 2] m (body frame) at pose (x m, y m, yaw rad)."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.asarray(vertices) @ np.array([[c, s], [-s, c]]) + np.asarray(pose[:2])
+
+
+class Frames:
+    """Of result.h5, by what Run reads from it: the file, its data sets, the domain and its period."""
+
+    # ---- floes and bodies
+
+    def _outlines(self, group):
+        vertices = self._read(f"{group}/vertices", ndim=2)
+        offsets = self._read(f"{group}/offsets", ndim=1).astype(np.int64)
+        sound = (vertices.shape[1] == 2 and len(offsets) > 0 and offsets[0] == 0
+                 and offsets[-1] == len(vertices) and (np.diff(offsets) > 0).all())
+        if not sound:
+            raise RunError(self.result, f"/{group}/offsets does not fit /{group}/vertices",
+                           "the file is damaged: run the case again")
+        return vertices, offsets
+
+    @cached_property
+    def _floes(self):
+        """Outlines of the floes and of the pieces of floes that split, which are floes like any other."""
+        vertices, offsets = self._outlines("floes")
+        if not self.n_pieces:
+            return vertices, offsets
+        more, ends = self._outlines("pieces")
+        return np.concatenate([vertices, more]), np.concatenate([offsets, offsets[-1] + ends[1:]])
+
+    @cached_property
+    def n_pieces(self):
+        """Pieces of floes that split: the last so many of the floes. Poses and forces of a floe are NaN in frames in
+        which it is not there: before it was a piece, or after it has split."""
+        return len(self._file["pieces/area"]) if "pieces" in self._file else 0
+
+    @cached_property
+    def splits(self):
+        """Floes that split: dict of columns [S], "time" s, "parent", "generation", "mode", "ratio", "thickness" m, and
+        "crack" [S, 4] m, x and y of its ends; empty where floes do not split. Split k made the floes
+        n_floes - n_pieces + 2 k and the one after it."""
+        return {name: self._read(f"splits/{name}") for name in self._file.get("splits", ())}
+
+    @property
+    def generation(self):
+        """[N] how many splits in a row made each floe: 0 of those that were there from the start."""
+        made = np.zeros(self.n_floes, int)
+        if self.n_pieces:
+            made[-self.n_pieces:] = np.repeat(self.splits["generation"], 2)
+        return made
+
+    @property
+    def vertices(self):
+        """[V, 2] m, outlines of all floes one after the other, body frame."""
+        return self._floes[0]
+
+    @property
+    def offsets(self):
+        """[N+1], floe i owns vertices[offsets[i]:offsets[i+1]]."""
+        return self._floes[1]
+
+    @property
+    def n_floes(self):
+        return len(self.offsets) - 1
+
+    @cached_property
+    def thickness(self):
+        """[N] m."""
+        own = self._read("floes/thickness", ndim=1)
+        return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
+
+    @cached_property
+    def area(self):
+        """[N] m²."""
+        own = self._read("floes/area", ndim=1)
+        return np.concatenate([own, self._read("pieces/area", ndim=1)]) if self.n_pieces else own
+
+    @cached_property
+    def bodies(self):
+        """List of Body: whatever is not a floe, in the order of body_pose; empty when there is none."""
+        if "bodies" not in self._file:
+            return []
+        vertices, offsets = self._outlines("bodies")
+        n = len(offsets) - 1
+        names = [str(plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
+        towed = int(np.ravel(self._read("bodies/towed"))[0])
+        if len(names) != n or not -1 <= towed < n:
+            raise RunError(self.result, "/bodies/names and /bodies/towed do not fit /bodies/offsets",
+                           "the file is damaged: run the case again")
+        return [Body(names[i], vertices[offsets[i]:offsets[i + 1]], i == towed) for i in range(n)]
+
+    @property
+    def towed(self):
+        """Index of the towed body in bodies, or None."""
+        return next((i for i, body in enumerate(self.bodies) if body.towed), None)
+
+    # ---- frames
+
+    @cached_property
+    def frame_times(self):
+        """[T] s."""
+        return self._read("frames/time", ndim=1)
+
+    @property
+    def n_frames(self):
+        return len(self.frame_times)
+
+    def frame_at(self, time):
+        """Index of the frame nearest to a time, s."""
+        if not self.n_frames:
+            raise RunError(self.result, "holds no frames", "set output.frame_interval and run the case again")
+        return int(np.argmin(np.abs(self.frame_times - time)))
+
+    def _frame(self, name, frame, width):
+        if not -self.n_frames <= frame < self.n_frames:
+            raise RunError(self.result, f"has no frame {frame} (there are {self.n_frames})", "choose another frame")
+        data = self._read(f"frames/{name}", frame % self.n_frames)
+        if data.shape[:1] != (width,):
+            raise RunError(self.result, f"/frames/{name} has {data.shape[:1]} entries a frame, not {width}",
+                           "the file is damaged: run the case again")
+        return data
+
+    @cached_property
+    def _piece_end(self):
+        return self._read("frames/piece_end", ndim=1)
+
+    def _of_floes(self, name, frame, others=0):
+        """[N, ...] of the floes in a frame; others: bodies that follow the floes in the file."""
+        own = self.n_floes - self.n_pieces
+        data = self._frame(name, frame, own + others)[:own]
+        if not self.n_pieces:
+            return data
+        ends = self._piece_end
+        k = frame % self.n_frames
+        rows = slice(int(ends[k - 1]) if k else 0, int(ends[k]))
+        out = np.full((self.n_floes, *data.shape[1:]), np.nan)
+        out[:own] = data
+        out[own + self._file["frames/piece"][rows]] = self._file[f"frames/piece_{name}"][rows]
+        return out
+
+    def pose(self, frame):
+        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped); NaN for a floe that is absent."""
+        return self._of_floes("pose", frame)
+
+    def body_pose(self, frame):
+        """[B, 3] x m, y m, yaw rad of the bodies, as written."""
+        return self._frame("body_pose", frame, len(self.bodies)) if self.bodies else np.zeros((0, 3))
+
+    def contact_force(self, frame):
+        """[N] N, largest normal contact force on each floe in the step of the frame; NaN where that has no solution."""
+        return self._of_floes("contact_force", frame)
+
+    def least_contact_force(self, frame):
+        """The same for pictures: that of the last frame before whose step has a solution stands in for NaN, 0 at the
+        start, as in series."""
+        for k in range(frame % max(1, self.n_frames), -1, -1):
+            force = self.contact_force(k)
+            there = np.isfinite(self.pose(k)[:, 0]) if self.n_pieces else np.ones(len(force), bool)
+            if not np.isnan(force[there]).any():
+                return np.where(there, force, 0)
+        return np.zeros(self.n_floes)
+
+    def speed(self, frame):
+        """[N] m/s, speed of each floe."""
+        return self._of_floes("speed", frame, len(self.bodies))
+
+    def body_speed(self, frame):
+        """[B] m/s, speed of each body."""
+        return self._frame("speed", frame, self.n_floes + len(self.bodies))[self.n_floes:]
+
+    def wrap(self, xy, centre=None):
+        """Positions [n, 2] m moved by whole periods to within half a period of centre (default: of the domain).
+
+        Directions that are not periodic are left alone, to the bit.
+        """
+        x0, x1, y0, y1 = self.box
+        centre = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
+        xy = np.array(xy, dtype=float)
+        for axis, period in enumerate(self.period):
+            if period > 0:
+                xy[:, axis] -= period * np.floor((xy[:, axis] - centre[axis]) / period + 0.5)
+        return xy
+
+    def _world(self, pose):
+        """[V, 2] m, all vertices of the floes in the world frame."""
+        counts = np.diff(self.offsets)
+        c, s = np.repeat(np.cos(pose[:, 2]), counts), np.repeat(np.sin(pose[:, 2]), counts)
+        v = self.vertices
+        return np.stack([np.repeat(pose[:, 0], counts) + c * v[:, 0] - s * v[:, 1],
+                         np.repeat(pose[:, 1], counts) + s * v[:, 0] + c * v[:, 1]], axis=1)
+
+    @cached_property
+    def _padding(self):
+        """[N, M] index into vertices, outlines filled up to the longest one by repeating their last vertex."""
+        counts = np.diff(self.offsets)
+        return self.offsets[:-1, None] + np.minimum(np.arange(counts.max(initial=1)), counts[:, None] - 1)
+
+    def polygons(self, frame, centre=None):
+        """Floes of a frame in the world frame: list of N arrays [n_i, 2] m; wrapped as by wrap()."""
+        pose = self.pose(frame)
+        pose[:, :2] = self.wrap(pose[:, :2], centre)
+        return np.split(self._world(pose), self.offsets[1:-1]) if self.n_floes else []
+
+    def polygon_array(self, frame, centre=None):
+        """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]).
+
+        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. First come the floes that are
+        there, in order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
+        """
+        pose = self.pose(frame)
+        pose[:, :2] = self.wrap(pose[:, :2], centre)
+        outlines = self._world(pose)[self._padding] if self.n_floes else np.zeros((0, 1, 2))
+        index = np.flatnonzero(np.isfinite(pose[:, 0]))
+        if len(index) < self.n_floes:
+            outlines = outlines[index]
+        x0, x1, y0, y1 = self.box
+        middle = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
+        for axis, period in enumerate(self.period):
+            if period <= 0 or not len(outlines):
+                continue
+            shift = np.zeros(2)
+            shift[axis] = period
+            low = outlines[:, :, axis].min(axis=1) < middle[axis] - period / 2
+            high = outlines[:, :, axis].max(axis=1) > middle[axis] + period / 2
+            outlines = np.concatenate([outlines, outlines[low] + shift, outlines[high] - shift])
+            index = np.concatenate([index, index[low], index[high]])
+        return outlines, index
+
+    def body_polygons(self, frame, centre=None):
+        """Bodies of a frame in the world frame: list of arrays [n, 2] m in the order of bodies.
+
+        The towed body is wrapped as by wrap(); walls and fixed bodies stand where the file puts them.
+        """
+        pose = self.body_pose(frame)
+        if self.towed is not None:
+            pose[self.towed, :2] = self.wrap(pose[self.towed:self.towed + 1, :2], centre)[0]
+        return [place(body.vertices, p) for body, p in zip(self.bodies, pose)]
