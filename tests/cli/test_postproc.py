@@ -21,7 +21,6 @@ from bergtow.plot import scene, style
 from bergtow.plot import field as plot_field
 from bergtow.plot import force as plot_force
 from bergtow.reporting import run as report_run
-from bergtow.result import run as bergtow_read
 from bergtow.result.frames import place
 from bergtow.result.run import Run
 
