@@ -91,7 +91,7 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     const char *type = json_string_value(json_object_get(geometry, "type"));
     if (type && !strcmp(type, "MultiPolygon")) {
         if (json_array_size(polygon) != 1) {
-            *why = "it has several polygons (MultiPolygon); make each a feature of its own";
+            *why = "it has several polygons (MultiPolygon); make each a feature of its own, as `bergtow outlines` does";
             return NULL;
         }
         polygon = json_array_get(polygon, 0);
@@ -100,13 +100,14 @@ static const json_t *ring_of(const json_t *feature, const char **why)
         return NULL;
     }
     if (json_array_size(polygon) > 1) {
-        *why = "it has holes, and a floe has none here; take out all rings but the first";
+        *why = "it has holes, and a floe has none here; take out all rings but the first, as `bergtow outlines` does";
         return NULL;
     }
     const json_t *ring = json_array_get(polygon, 0);
     if (!json_is_array(ring))
         *why = "its coordinates are not a list of rings; write [[[east, north], [east, north], ...]]";
-    else if (json_array_size(ring) > BT_MOST_RING) *why = "it has more than 10000 vertices; simplify it";
+    else if (json_array_size(ring) > BT_MOST_RING)
+        *why = "it has more than 10000 vertices; `bergtow outlines` simplifies it";
     else return ring;
     return NULL;
 }
@@ -441,8 +442,8 @@ static void choose_coordinates(reader *in, const json_t *root)
     } else if (said && in->crs.kind == BT_MAP_WARPED) {
         bt_refuse(&in->r,
                   "its crs is %s, Mercator, whose metres are not those on the ground: shorter by the cosine of the "
-                  "latitude; transform the file to degrees (ogr2ogr -t_srs EPSG:4326) or to UTM",
-                  in->crs.name);
+                  "latitude; make degrees of them: bergtow outlines %s -o floes.geojson",
+                  in->crs.name, in->r.path);
     } else if (said) {
         in->kind = in->crs.kind == BT_MAP_DEGREES ? DEGREES : PLANE;
         if (in->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME)
@@ -453,10 +454,10 @@ static void choose_coordinates(reader *in, const json_t *root)
                 in->crs.name, in->kind == DEGREES ? "degrees" : "metres east and north");
     } else if (crs && key == BT_CRS_FILE) {
         bt_refuse(&in->r,
-                  "its crs, %.100s, is not known here as degrees or as metres east and north; transform the file to "
-                  "degrees (ogr2ogr -t_srs EPSG:4326), or set ice.outlines_crs: plane if its "
-                  "coordinates are metres east and north",
-                  name);
+                  "its crs, %.100s, is not known here as degrees or as metres east and north; make degrees of it: "
+                  "bergtow outlines %s -o floes.geojson, or set ice.outlines_crs: plane if its coordinates are metres "
+                  "east and north",
+                  name, in->r.path);
     } else if (metres) {
         choose_metres(in);
     } else {
