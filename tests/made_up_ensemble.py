@@ -53,7 +53,7 @@ def member(series, parameters, condition, **changes):
     of its end, None for one of its own; warnings, reasons: of note()."""
     return {
         "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
-        "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
+        "status": FINISHED, "reason": "", "hole": None, "warnings": [], "peaks": None, "hours": len(series) / 3600,
         "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "reasons": [], "more": {},
         "attributes": {}, "case": None, "state": None
     } | changes
@@ -173,7 +173,7 @@ def write(folder, members, title="made up", sampling="grid"):
         holes = {FAILED: "failed", WAITING: "died", FINISHED: ""}
         for key, texts in (("name", [name for *_, name in rows]), ("state_hash", states),
                            ("reason", [m["reason"] for m in members]),
-                           ("hole", [holes[m["status"]] * bool(m["reason"]) for m in members])):
+                           ("hole", [m["hole"] or holes[m["status"]] * bool(m["reason"]) for m in members])):
             f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
         for group in ("parameters", "summary"):
             f.create_group(group)

@@ -35,20 +35,22 @@ typedef enum {
 typedef struct bt_errors {
     char **text;
     size_t n, cap;
-    struct bt_note *note; ///< [n] what each is for a script; of warnings alone
+    struct bt_note *note; ///< [n] what each is for a script
 } bt_errors;
 
-/// A warning for a script: its code, which stays when the text changes, and the values in it, as a JSON object.
+/// A message for a script: its code, which stays when the text changes, and the values in it, as a JSON object.
 typedef struct bt_note {
-    const char *code; ///< not owned; NULL = none
-    char *values;     ///< NULL = none
+    char *code;   ///< NULL = none
+    char *values; ///< NULL = none; of warnings alone
 } bt_note;
 
 /// Append a message (printf-style). Aborts only when out of memory.
 void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 /// The same with a list of arguments.
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
-/// Print every message on stderr, one a line, prefixed "bergtow: ".
+/// The code of the last message. Code of errors: no_solution, of guard.no_solution (src/run/guard.h).
+void bt_errors_code(bt_errors *err, const char *code);
+/// Print every message on stderr, one a line, prefixed "bergtow: ", with its code in brackets behind it.
 void bt_errors_print(const bt_errors *err);
 /// Release the messages; the list is empty then.
 void bt_errors_free(bt_errors *err);

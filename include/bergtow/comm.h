@@ -63,8 +63,8 @@ void bt_comm_split_end(bt_comm *part);
 /// first.
 bt_status bt_comm_agree(const bt_comm *comm, bt_status status);
 
-/// Collective. All ranks' messages to rank 0, each text once, in the order of the ranks; the others' lists become
-/// empty.
+/// Collective. All ranks' messages to rank 0 with their codes, each text once, in the order of the ranks; the others'
+/// lists become empty.
 void bt_comm_errors(const bt_comm *comm, bt_errors *err);
 
 /// Collective. Copy bytes from rank 0 to all; any size.

@@ -3,11 +3,12 @@
 //
 // Folder. DIR/study.resolved.yml says what the members are, DIR/study.files what is in the files that they name
 // (src/run/study.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it holds a
-// file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit, failed
-// when it holds failed.txt (first line: exit code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where
-// that takes no file), and else waits. DIR/journal.jsonl has a line for each start and end, with wall times (null where
-// the process died before it wrote the line; the next call adds that). DIR/ensemble.h5 (src/run/ensemble_file.c) is
-// made anew from the members' files: nothing in it depends on order, ranks, or how often the ensemble was stopped.
+// file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit,
+// failed when it holds failed.txt (first line: exit code, and the code of a reason that has one; then the reasons;
+// beside the folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line
+// for each start and end, with wall times (null where the process died before it wrote the line; the next call adds
+// that). DIR/ensemble.h5 (src/run/ensemble_file.c) is made anew from the members' files: nothing in it depends on
+// order, ranks, or how often the ensemble was stopped.
 //
 // Fields. Where conditions have their ice in common (`fields: common`, or ice from a file), DIR/fields holds each field
 // that was made or read, under the digest of all it follows from (src/field/field_kept.h), until all is finished.
@@ -84,9 +85,9 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                           bt_errors *err);
 
 /// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of
-/// failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be
-/// NULL; *code: the first line.
-bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
+/// failed.txt without its first line, or that the process of a waiting one died; *code, *failure: the first line.
+/// Texts are freed by the caller, and NULL where there is none; the pointers may be NULL.
+bt_member_state bt_ensemble_state(const char *folder, int *code, char **failure, char **why);
 
 #ifdef __cplusplus
 }

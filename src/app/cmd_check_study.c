@@ -35,8 +35,7 @@ typedef struct {
 } numbers;
 
 typedef struct {
-    char *text;
-    const char *code;     // of a warning
+    char *text, *code;          // code: of a warning, NULL = none
     int64_t first, last, count; // conditions
 } fault;
 
@@ -60,7 +59,8 @@ static void take_faults(faults *found, int64_t condition, bt_errors *err)
         while (k < found->n && !is_same(&found->list[k], err->text[i], err->note[i].code)) k++;
         if (k == found->n) {
             found->list = bt_realloc(found->list, found->n + 1, sizeof *found->list);
-            found->list[found->n++] = (fault){bt_text_copy(err->text[i]), err->note[i].code, condition, -1, 0};
+            found->list[found->n++] = (fault){err->text[i], err->note[i].code, condition, -1, 0};
+            err->text[i] = err->note[i].code = NULL;
         }
         found->list[k].count += found->list[k].last != condition;
         found->list[k].last = condition;
@@ -85,6 +85,7 @@ static void tell_faults(faults *found, const bt_study *study, bt_errors *err)
         bt_member_free(&member);
         free(where);
         free(found->list[k].text);
+        free(found->list[k].code);
     }
     free(found->list);
 }

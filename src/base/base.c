@@ -135,9 +135,14 @@ void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
     err->text[err->n++] = text;
 }
 
+void bt_errors_code(bt_errors *err, const char *code) { err->note[err->n - 1].code = bt_text_copy(code); }
+
 void bt_errors_print(const bt_errors *err)
 {
-    for (size_t i = 0; i < err->n; i++) fprintf(stderr, "bergtow: %s\n", err->text[i]);
+    for (size_t i = 0; i < err->n; i++) {
+        const char *code = err->note[i].code;
+        fprintf(stderr, "bergtow: %s%s%s%s\n", err->text[i], code ? " [" : "", code ? code : "", code ? "]" : "");
+    }
 }
 
 void bt_errors_move(bt_errors *to, bt_errors *from)
@@ -154,6 +159,7 @@ void bt_errors_free(bt_errors *err)
 {
     for (size_t i = 0; i < err->n; i++) {
         free(err->text[i]);
+        free(err->note[i].code);
         free(err->note[i].values);
     }
     free(err->text);

@@ -268,13 +268,15 @@ static bool has(const bt_errors *err, const char *text)
     return false;
 }
 
+static const char *code_of(const bt_errors *err, size_t i) { return err->note[i].code ? err->note[i].code : ""; }
+
 void bt_comm_errors(const bt_comm *comm, bt_errors *err)
 {
     if (comm->size == 1) return;
     int n = 0, *counts = NULL, *starts = NULL, all = 0;
-    for (size_t i = 0; i < err->n; i++) n += (int)strlen(err->text[i]) + 1;
+    for (size_t i = 0; i < err->n; i++) n += (int)(strlen(code_of(err, i)) + strlen(err->text[i])) + 2;
     char *mine = bt_alloc((size_t)n, 1), *texts = NULL, *end = mine;
-    for (size_t i = 0; i < err->n; i++) end = stpcpy(end, err->text[i]) + 1;
+    for (size_t i = 0; i < err->n; i++) end = stpcpy(stpcpy(end, code_of(err, i)) + 1, err->text[i]) + 1;
     bt_errors_free(err);
     if (comm->rank == 0) counts = bt_alloc(2 * (size_t)comm->size, sizeof *counts);
     MPI_Gather(&n, 1, MPI_INT, counts, 1, MPI_INT, 0, comm->mpi);
@@ -287,8 +289,13 @@ void bt_comm_errors(const bt_comm *comm, bt_errors *err)
         texts = bt_alloc((size_t)all, 1);
     }
     MPI_Gatherv(mine, n, MPI_CHAR, texts, counts, starts, MPI_CHAR, 0, comm->mpi);
-    for (int at = 0; at < all; at += (int)strlen(texts + at) + 1)
-        if (!has(err, texts + at)) bt_errors_add(err, "%s", texts + at);
+    for (int at = 0; at < all;) {
+        const char *code = texts + at, *text = code + strlen(code) + 1;
+        at = (int)(text - texts) + (int)strlen(text) + 1;
+        if (has(err, text)) continue;
+        bt_errors_add(err, "%s", text);
+        if (*code) bt_errors_code(err, code);
+    }
     free(mine);
     free(texts);
     free(counts);

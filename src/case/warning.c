@@ -61,7 +61,7 @@ void bt_warn(bt_errors *list, bt_warning w, const char *text, ...)
     put_values(&values, bt_warning_rows[w].values, text, ap);
     va_end(ap);
     bt_json_close(&values, '}');
-    list->note[list->n - 1] = (bt_note){bt_warning_rows[w].code, values.text};
+    list->note[list->n - 1] = (bt_note){bt_text_copy(bt_warning_rows[w].code), values.text};
 }
 
 /// The members of `one` behind the values of the last warning; frees it.

@@ -42,7 +42,7 @@ static void complete_journal(const bt_ensemble *ensemble)
     for (int64_t i = 0; i < ensemble->n; i++) {
         const bt_entry *entry = &ensemble->list[i];
         lacking[entry->index] =
-            bt_ensemble_state(entry->folder, NULL, NULL) == BT_MEMBER_FINISHED && !bt_member_held(entry->folder);
+            bt_ensemble_state(entry->folder, NULL, NULL, NULL) == BT_MEMBER_FINISHED && !bt_member_held(entry->folder);
     }
     bt_journal_strike_ended(ensemble->o->dir, ensemble->s->repeats, ensemble->n, lacking);
     for (int64_t i = 0; i < ensemble->n; i++)
@@ -364,7 +364,8 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     if (options->retry) bt_comm_rest(comm);
     if (options->retry)
         for (int64_t i = 0; i < ensemble.n; i++)
-            ensemble.list[i].settled = bt_ensemble_state(ensemble.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
+            ensemble.list[i].settled =
+                bt_ensemble_state(ensemble.list[i].folder, NULL, NULL, NULL) != BT_MEMBER_WAITING;
     bt_ensemble_count_settled(&ensemble);
     share_cores(&ensemble, open);
     if (comm->rank == 0 && !options->quiet && !options->job) {

@@ -4,8 +4,8 @@
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
 //     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a
 //                                                        waiting member's process died, or that its result is not sound
-//     /members/hole [M]                                  which of these, by a name that stays: failed, died, unsound,
-//                                                        unreadable
+//     /members/hole [M]                                  which of these, by a name that stays: failed, no_solution
+//                                                        (failed by guard.no_solution), died, unsound, unreadable
 //     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the
 //                                                        case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or
@@ -321,9 +321,9 @@ static void fill(table *t, const bt_study *study, const char *dir, bt_member_rec
         t->seed[m] = member.seed;
         t->name[m] = bt_text_copy(member.name);
         t->hash[m] = bt_text_copy("");
-        t->status[m] = bt_ensemble_state(folder, NULL, &t->reason[m]);
+        t->status[m] = bt_ensemble_state(folder, NULL, &t->hole[m], &t->reason[m]);
         const bool died = t->status[m] == BT_MEMBER_WAITING && t->reason[m];
-        put_text(&t->hole[m], t->status[m] == BT_MEMBER_FAILED ? "failed" : died ? "died" : "");
+        if (!t->hole[m]) put_text(&t->hole[m], t->status[m] == BT_MEMBER_FAILED ? "failed" : died ? "died" : "");
         if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
         if (!t->reason[m]) t->reason[m] = bt_text_copy("");
         free(folder);
@@ -382,7 +382,7 @@ static void describe_members(bt_h5 *h5)
                   {"/members/name", NULL, "folder of the member"},
                   {"/members/state_hash", NULL, "hash of the state at its end"},
                   {"/members/reason", NULL, "why it failed, died or is not sound"},
-                  {"/members/hole", NULL, "failed, died, unsound or unreadable"}};
+                  {"/members/hole", NULL, "failed, no_solution, died, unsound or unreadable"}};
     for (size_t k = 0; k < sizeof columns / sizeof *columns; k++)
         bt_h5_describe(h5, columns[k].name, "member", columns[k].units, columns[k].meaning);
     bt_h5_attr_text(h5, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");

@@ -139,7 +139,7 @@ static int by_turn(const void *a, const void *b)
 
 void bt_entry_look(bt_entry *entry)
 {
-    if (!entry->settled) entry->settled = bt_ensemble_state(entry->folder, NULL, NULL) != BT_MEMBER_WAITING;
+    if (!entry->settled) entry->settled = bt_ensemble_state(entry->folder, NULL, NULL, NULL) != BT_MEMBER_WAITING;
 }
 
 // --- soundness -------------------------------------------------------------------------------------------------------
@@ -158,7 +158,7 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
         const int run =
             fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(entry->folder, &busy, &again) : -1;
         bt_errors_free(&again);
-        if (run < 0 || bt_ensemble_state(entry->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+        if (run < 0 || bt_ensemble_state(entry->folder, NULL, NULL, NULL) != BT_MEMBER_FINISHED) {
             bt_errors_free(&why); // another process has found it out, too, or is at it
         } else if (bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &again) ==
                    BT_OK) {
@@ -202,7 +202,7 @@ static void check_members(bt_ensemble *ensemble)
     bt_errors warnings = {0};
     for (int64_t i = ensemble->world->rank; i < ensemble->n; i += ensemble->world->size) {
         bt_entry *entry = &ensemble->list[i];
-        if (bt_ensemble_state(entry->folder, NULL, NULL) != BT_MEMBER_FINISHED) continue;
+        if (bt_ensemble_state(entry->folder, NULL, NULL, NULL) != BT_MEMBER_FINISHED) continue;
         found[i / PER_WORD] |= (uint64_t)check_member(ensemble, entry, &warnings) << 2 * (i % PER_WORD);
     }
     bt_comm_reduce(ensemble->world, NULL, 0, NULL, 0, found, n);
@@ -339,7 +339,7 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
     char *why;
     bt_errors damage = {0};
     bt_status status = BT_OK;
-    const bt_member_state state = bt_ensemble_state(entry->folder, &code, &why);
+    const bt_member_state state = bt_ensemble_state(entry->folder, &code, NULL, &why);
     const bt_status sound = state == BT_MEMBER_FINISHED
                                 ? bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder,
                                                          &damage)

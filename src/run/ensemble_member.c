@@ -83,7 +83,10 @@ bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_
 {
     bt_text lines;
     bt_text_begin(&lines);
-    fprintf(lines.out, "%d\n", (int)code);
+    const char *failure = "";
+    for (size_t i = why->n; i-- > 0;)
+        if (why->note[i].code) failure = why->note[i].code;
+    fprintf(lines.out, "%d%s%s\n", (int)code, *failure ? " " : "", failure);
     for (size_t i = 0; i < why->n; i++) fprintf(lines.out, "%s\n", why->text[i]);
     char *text = bt_text_end(&lines);
     bt_status status = BT_ERR_IO;
@@ -107,16 +110,18 @@ void bt_member_forget_failure(const char *folder)
     }
 }
 
-static bool read_failure(const char *folder, int which, int *code, char **why)
+static bool read_failure(const char *folder, int which, int *code, char **failure, char **why)
 {
     char *path = record_path(folder, which), *text = NULL;
     size_t size;
     bt_errors none = {0};
     const bool there = access(path, F_OK) == 0;
     if (there && bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
-        char *rest = strchr(text, '\n');
-        if (code) *code = (int)strtol(text, NULL, 10);
+        char *rest = strchr(text, '\n'), *end;
+        const long number = strtol(text, &end, 10);
+        if (code) *code = (int)number;
         if (why && rest) *why = bt_text_copy(rest + 1);
+        if (failure && *end == ' ') *failure = bt_text_of("%.*s", (int)strcspn(end + 1, "\n"), end + 1);
     }
     free(text);
     free(path);
@@ -124,12 +129,14 @@ static bool read_failure(const char *folder, int which, int *code, char **why)
     return there;
 }
 
-bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
+bt_member_state bt_ensemble_state(const char *folder, int *code, char **failure, char **why)
 {
     if (why) *why = NULL;
+    if (failure) *failure = NULL;
     if (code) *code = 0;
     if (bt_file_there(folder, "finished")) return BT_MEMBER_FINISHED;
-    if (read_failure(folder, 0, code, why) || read_failure(folder, 1, code, why)) return BT_MEMBER_FAILED;
+    for (int k = 0; k < 2; k++)
+        if (read_failure(folder, k, code, failure, why)) return BT_MEMBER_FAILED;
     // the one under way has no end yet
     const int n = why ? bt_member_attempts(folder) : 0, died = n > 0 && bt_member_held(folder) ? n - 1 : n;
     if (died > 0)

@@ -295,6 +295,7 @@ bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *samp
                       "step %" PRId64 ": %" PRId64 " steps have no solution, since bodies are locked between others "
                       "that give way to nothing, and guard.no_solution allows %" PRId64 ": " BT_LOCKED_REMEDY,
                       world->step, guard->locked, guard->most_locked);
+        bt_errors_code(err, "no_solution");
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }

@@ -32,7 +32,7 @@ from bergtow.result.run import Run  # noqa: E402
 from bergtow.result.members import Members  # noqa: E402
 from bergtow.reporting.ensemble import OPTIONS  # noqa: E402
 
-ENDED = "step 13: 2 steps have no solution, since bodies are locked, and guard.no_solution allows 1: let ice give way"
+ENDED = "step 13: nothing gives way [no_solution]"
 
 
 # ---- the number
@@ -155,14 +155,14 @@ def field(k, share=0.0, **more):
                           window={"no_load_share": share, "verdict": "steady"}, **more)
 
 
-def failed(reason):
-    return field(0, status=made_up.FAILED, reason=reason)
+def failed(reason, hole=None):
+    return field(0, status=made_up.FAILED, reason=reason, hole=hole)
 
 
 def test_tows_that_ended_for_want_of_a_solution_bound_nothing(tmp_path):
     """Those that are left are the ones which the ice let pass. Red when such members are failures like any other, or
-    others like them."""
-    e = made(tmp_path / "a", [field(k) for k in range(6)] + [failed(ENDED)])
+    others like them, or when they are known by the words of their reason."""
+    e = made(tmp_path / "a", [field(k) for k in range(6)] + [failed("in other words", "no_solution")])
     s = statistics(e)
     (c,) = s["conditions"]
     assert c["without_bound"]["ended"] == ["c001-r007"] and c["without_bound"]["some"] == []
@@ -170,7 +170,8 @@ def test_tows_that_ended_for_want_of_a_solution_bound_nothing(tmp_path):
     assert isinstance(c["resistance"]["mean"], AtLeast) and np.isnan(c["resistance"]["t_95"]).all()
     text = ensemble_text.report(s)
     assert f"at least {text_table.number(float(c['resistance']['mean']))}" in text and "c001-r007" in text
-    other = statistics(made(tmp_path / "b", [field(k) for k in range(6)] + [failed("step 3: the world ended")]))
+    other = statistics(made(tmp_path / "b", [field(k) for k in range(6)]
+                            + [failed("step 3: it is none of guard.no_solution")]))
     assert other["conditions"][0]["without_bound"]["words"] == ""
     assert not isinstance(other["conditions"][0]["resistance"]["mean"], AtLeast)
 
@@ -191,7 +192,7 @@ def test_no_budget_and_no_capability_of_lower_bounds(tmp_path):
     runs = SimpleNamespace(given=[], make=lambda *_: [ENDED], seconds={}, end=np.inf, path=lambda *_: tmp_path)
     search = capability.Search(runs, "ice.concentration", "", 0.1, None, False)
     c = capability.Condition("case", "the case", np.nan, {}, capability.bracket.Bracket(0.2, 0.9, 0.1, 0.5, 6))
-    with pytest.raises(RunError, match="guard.no_solution"):
+    with pytest.raises(RunError, match="that of the other tows"):
         search.add(c, 0.2, 1)
 
 

@@ -130,6 +130,7 @@ def test_a_share_of_steps_without_a_solution_ends_the_run(tmp_path):
     case = changed(SCENES["a row at the wall"][0], guard__no_solution=0.3)
     r = run(tmp_path, case, code=NUMERIC)
     assert "steps have no solution" in r.result.stderr and "guard.no_solution allows 3" in r.result.stderr
+    assert " [no_solution]\n" in r.result.stderr
     lost = r.series("no_load")  # up to the step before the fourth
     assert lost.sum() == 3 and lost[-1] == 1
 
@@ -333,7 +334,7 @@ def test_a_load_that_is_no_number_counts_as_the_last_one():
 def test_a_tow_without_a_load_has_no_tail():
     share, none = [0.0, 0.2, np.nan], np.zeros(3, int)
     e = SimpleNamespace(tows=lambda rows: rows, number=lambda key, m: share[m], events=lambda m: [], condition=none,
-                        status=none, name=list("abc"))
+                        status=none, hole=[""] * 3, name=list("abc"))
     e.without_bound = lambda rows: Members.without_bound(e, rows)
     load = SimpleNamespace(name="ice_resistance", needs="")
     assert "no bound in some steps of 1 of 3 tows" in loads.cut_off(e, [0, 1, 2], load)

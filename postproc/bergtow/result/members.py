@@ -451,8 +451,8 @@ class Members:
         without them the mean would be that of the tows which the ice let pass."""
         tows = self.tows(rows)
         shares = np.nan_to_num([self.number("window_no_load_share", m) for m in tows])
-        ended = [self.name[m] for m in np.flatnonzero(np.isin(self.condition, self.condition[rows])
-                                                      & (self.status == FAILED)) if at_least.ended(self.reason[m])]
+        ended = [self.name[m] for m in np.flatnonzero(np.isin(self.condition, self.condition[rows]))
+                 if self.hole[m] == at_least.ENDED]
         return WithoutBound(float(shares.mean()) if len(tows) else np.nan,
                             [self.name[m] for m, x in zip(tows, shares) if x > 0], ended, len(tows) + len(ended))
 

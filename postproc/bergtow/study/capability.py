@@ -28,7 +28,7 @@ from bergtow.result.run import Run, case_value, parse_case, within
 from bergtow.stats import mean as stat_mean
 from bergtow.study import analysis, bracket, domain_width
 from bergtow.study.case_file import files, section
-from bergtow.study.runs import SPENT, CaseRuns, checked, locked
+from bergtow.study.runs import SPENT, CaseRuns, checked, code_of, locked
 
 import numpy as np
 
@@ -149,7 +149,7 @@ class Search:
         for i, w in zip(numbers, why):
             if w == SPENT:
                 return False
-            if at_least.ended(w):  # which tows it ends depends on their loads
+            if code_of(w) == at_least.ENDED:  # which tows it ends depends on their loads
                 raise RunError(self.runs.path(name, i), w, "without it the limit would be that of the other tows", CASE)
             if w:
                 failed.append(w)

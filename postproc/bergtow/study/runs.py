@@ -14,6 +14,7 @@ import ctypes
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -65,6 +66,12 @@ def errors_in(said):
     """The errors among the messages of the program, without its name."""
     return [line.removeprefix("bergtow: ") for line in said.strip().splitlines()
             if not line.startswith(WARNING)]
+
+
+def code_of(why):
+    """The code in brackets behind an error of the program, None where it has none."""
+    found = re.search(r" \[(\w+)\]$", why or "")
+    return found and found[1]
 
 
 def stopped_by_limit(code, took, limit):
