@@ -267,16 +267,42 @@ def test_a_remedy_does_not_repeat_what_was_given(budget, tmp_path, monkeypatch, 
     """The budget that it names is larger than that which was given. Red: the old words, "raise --budget"."""
     (tmp_path / "out").mkdir()
     made_up.write(tmp_path / "out", [made_up.member(np.ones(3), {}, 0)] * 1)
-    for name, value in (("seconds_a_field", 900.0), ("seconds_of_the_longest", 0.0), ("widths", {}),
-                        ("fields_settled", 1)):
+    for name, value in (("seconds_a_field", 900.0), ("widths", {}), ("fields_settled", 1)):
         monkeypatch.setattr(design, name, lambda *a, value=value: value)
     path = write_case(tmp_path, TOW)
     a = cli.arguments("design", path, "-o", tmp_path / "out", "--budget", str(budget), "--no-replay")
     a.concentrations, a.by_speed = [], {}
-    work = SimpleNamespace(ensemble=lambda study: True, jobs=1, end=design.time.monotonic() + 60 * budget)
+    work = SimpleNamespace(ensemble=lambda study: True, jobs=1, began=design.time.monotonic(), core=900.0)
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     said = capsys.readouterr().err
     assert float(re.search(r"--budget (\d+)", said)[1]) > budget and "run.duration" not in said
+
+
+@pytest.mark.parametrize("left, n, found", [
+    (100, 2, (6, 20.0)),   # three rounds of two, and the replay
+    (50, 2, (3, 0.0)),     # two rounds: the fifth field is worth more than a replay
+    (20, 2, (0, 20.0)), (-5, 2, (0, 20.0)), (np.inf, 2, (38, 20.0))
+])
+def test_fields_come_in_whole_rounds(left, n, found):
+    """Red: 1.5 rounds for three fields on two cores, of which the last one was stopped at the limit."""
+    assert design.more_fields(left, 20.0, n, 40, 1, 2) == found
+    assert answer.fields_in(100.0, 20.0, 3, 2) == 3 and answer.fields_in(39.0, 20.0, 3, 2) == 0
+
+
+def test_no_load_case_begins_that_would_not_end():
+    """By the pace of the runs before, with all runs of a pair at once; a shorter one may still fit. Red: the base was
+    run, and no time was left for the head sea; runs were begun until the limit stopped them."""
+    made, kept = [], set()
+    here = SimpleNamespace(jobs=2, end=design.time.monotonic() + 100, kept=lambda name, i, sets: name in kept,
+                           make=lambda name, fields, sets: made.append(name) or [None] * len(fields))
+    runs = load_cases.Runs(here, range(4), range(2), 600.0, 0.05)  # 30 s a run, 60 s four of them
+    assert runs.make({"base": {}, "head-sea": {}}) == "budget" and made == []
+    assert runs.make({"course-change": {"run.duration": "2400 s"}}, runs.few) == "budget" and made == []
+    assert runs.make({"course-change": {"run.duration": "1200 s"}}, runs.few) is None and made == ["course-change"]
+    assert runs.pace < 0.001  # it took no time
+    runs.pace = 0.05
+    kept.add("base")
+    assert runs.make({"base": {}, "head-sea": {}}) is None and made[1:] == ["base", "head-sea"]
 
 
 CASE = changed(TOW, run={"dt": 0.2, "duration": 40}, output__window_start=10, domain__length=14, domain__width=7,
@@ -424,8 +450,8 @@ def test_the_vessel_has_to_hold_the_largest_load_case():
 def bend(**case):
     """The course change of a tow of 3 km at 0.5 m/s that begins at (-1, 0) km of a domain of 3 by 1 km."""
     made = {}
-    def make(name, sets, fields):
-        made.update(sets)
+    def make(some, fields):
+        made.update(*some.values())
         return "run_failed"
     at = {"body.x": "-1000 m", "body.y": "0 m", "domain.x0": "-1500 m", "domain.y0": "-500 m",
           "domain.length": "3000 m",

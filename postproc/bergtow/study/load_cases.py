@@ -24,6 +24,7 @@ and is not in it.
 """
 import functools
 import math
+import time
 from dataclasses import dataclass
 
 from bergtow import towing
@@ -88,22 +89,37 @@ class Runs:
     runs: object
     fields: range           #: of paired runs, whose interval is that of these fields
     few: range              #: of those of which the largest value is taken
+    duration: float         #: s, of the case
+    pace: float             #: s of a core / s of a run, as measured last
     left_out: bool = False  #: none is to be made
     count: int = 0
-    spent: bool = False
 
-    def make(self, name, sets, fields=None):
-        """None where they are there, or the code of why they are not: "budget", "run_failed"."""
-        if self.left_out or self.spent:
-            return "left_out" if self.left_out else "budget"
-        why = self.runs.make(name, fields or self.fields, sets)
-        if SPENT in why:
-            self.spent = True
+    def make(self, some, fields=None):
+        """Runs of {name: sets}, none of which is begun unless by the pace all end in time. None where they are there,
+        or the code of why they are not: "budget", "run_failed"."""
+        if self.left_out:
+            return "left_out"
+        fields = fields or self.fields
+        takes = {name: self.takes(name, sets, fields) for name, sets in some.items()}
+        if sum(takes.values()) > max(0.0, self.runs.end - time.monotonic()):
             return "budget"
-        if any(why):
-            return "run_failed"
-        self.count += len(why)
+        for name, sets in some.items():
+            began = time.monotonic()
+            why = self.runs.make(name, fields, sets)
+            if SPENT in why:
+                return "budget"
+            if any(why):
+                return "run_failed"
+            self.count += len(why)
+            if takes[name] > 0:
+                self.pace *= (time.monotonic() - began) / takes[name]
         return None
+
+    def takes(self, name, sets, fields):
+        """s for the runs that are not there yet."""
+        missing = sum(not self.runs.kept(name, i, sets) for i in fields)
+        seconds = float(sets["run.duration"].split()[0]) if "run.duration" in sets else self.duration
+        return -(-missing // self.runs.jobs) * self.pace * seconds
 
     def measured(self, name, measure, fields=None):
         """[measure(run)] of the fields."""
@@ -237,7 +253,7 @@ def start(t, runs, say):
         name = f"start-{seconds:.6g}s"
         sets = {"tow.ramp": f"{seconds:.9g} s", "run.duration": f"{seconds + 4 * t.scale:.9g} s",
                 "output.window_start": f"{seconds:.9g} s"}
-        reason = runs.make(name, sets, runs.few)
+        reason = runs.make({name: sets}, runs.few)
         if reason:
             break
         n = max(runs.measured(name, lambda run: largest_mean(run, t.scale, 0.0, seconds + t.scale), runs.few))
@@ -299,7 +315,7 @@ def course_change(t, runs, degrees, radius):
             "output.window_start": f"{t.case_ramp + settle / 2:.9g} s"}
     values = {"angle_deg": degrees, "radius_m": r, "radius_given": bool(radius),
               "across_n": 0.0 if tension else t.mass * t.speed ** 2 / r}
-    if reason := runs.make("course-change", sets, runs.few):
+    if reason := runs.make({"course-change": sets}, runs.few):
         return none("course_change", reason, set=sets, values=values)
     begin = t.case_ramp + settle
     load = f"{stat_loads.TENSION}1" if tension else "tow_force"
@@ -340,7 +356,7 @@ def head_sea(t, runs, current=None, wind=None):
     sets = {f"water.current_{k}": f"{own[f'water.current_{k}'] - current * d[i]:.9g} m/s" for i, k in enumerate("xy")}
     sets |= {f"air.wind_{k}": f"{own[f'air.wind_{k}'] - wind * d[i]:.9g} m/s" for i, k in enumerate("xy")}
     values = {"current_m_s": current, "wind_m_s": wind, "given": given}
-    if reason := runs.make("base", {}) or runs.make("head-sea", sets):
+    if reason := runs.make({"base": {}, "head-sea": sets}):
         return none("head_sea", reason, set=sets, values=values)
     base, other = (runs.measured(name, mean_parts) for name in ("base", "head-sea"))
     if not np.isfinite([x for some in (base, other) for part in some for x in part.values()]).all():
@@ -366,13 +382,11 @@ def effect(t, r, runs):
         form = form_drag(t) if part == "water" else t.wind
         return out | {"by": "analytic", "n_per_tenth": assumed.TENTH * form,
                       "n_low": form * (float(r.low) / float(at) - 1), "n_high": form * (float(r.high) / float(at) - 1)}
-    reason = runs.make("base", {})
+    ends = {f"{key}-{end}": {key: getattr(r, end)} for end in ("low", "high")}
+    if reason := runs.make({"base": {}} | ends):
+        return out | {"by": "runs", "reason": reason}
     for end in ("low", "high"):
-        name = f"{key}-{end}"
-        reason = reason or runs.make(name, {key: getattr(r, end)})
-        if reason:
-            return out | {"by": "runs", "reason": reason}
-        base, other = (runs.measured(n, mean_parts) for n in ("base", name))
+        base, other = (runs.measured(n, mean_parts) for n in ("base", f"{key}-{end}"))
         n, ends, _ = changed(t, base, other)
         out |= {f"n_{end}": n - t.value, f"n_{end}_95": tuple(e - t.value for e in ends) if np.isfinite(ends).all()
                 else None}
