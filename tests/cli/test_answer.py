@@ -192,6 +192,13 @@ def test_forces_of_options(text, newtons):
     assert gear.force(text, "--vessel") == newtons
 
 
+@pytest.mark.parametrize("text", ["110", "3.5e6", " 7 "])
+def test_a_force_without_a_unit_is_refused(text):
+    """Red: --vessel 110 was a vessel of 110 N, and no tow was feasible."""
+    with pytest.raises(BergtowError, match="has no unit; give it as"):
+        gear.force(text, "--vessel")
+
+
 @pytest.mark.parametrize("option, text, value", [
     ("budget", "90", 90), ("budget", "1.5 h", 90), ("concentrations", "70 %,0.5", [0.5, 0.7]),
     ("efficiency", "80 %", 0.8), ("efficiency", "1", 1), ("line-length", "0.5 km", 500),
@@ -199,7 +206,8 @@ def test_forces_of_options(text, newtons):
     ("bend", "90", math.pi / 2), ("bend", "-30 deg", -math.pi / 6), ("speeds", "1 m/s,0.5", [1.0, 0.5]),
     ("budget", "3 kn", "a time"), ("concentrations", "97 %", "95 %"), ("efficiency", "1.2", "100 %"),
     ("line-length", "3 kg", "length"), ("head-wind", "-1", "below zero"), ("bend", "400", "150 degrees"),
-    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"), ("speeds", "1 kn,", "a speed")])
+    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"),
+    ("line-factor", "0.5", "below 1"), ("budget", "inf", "and finite"), ("speeds", "1 kn,", "a speed")])
 def test_options_take_units_and_say_what_is_wrong(option, text, value):
     """Red: a bare float() as the type, whose message names a function of the program."""
     words_of = ["design", "case.yml", f"--{option}={text}"]
@@ -299,10 +307,23 @@ def test_no_load_case_begins_that_would_not_end():
     assert runs.make({"base": {}, "head-sea": {}}) == "budget" and made == []
     assert runs.make({"course-change": {"run.duration": "2400 s"}}, runs.few) == "budget" and made == []
     assert runs.make({"course-change": {"run.duration": "1200 s"}}, runs.few) is None and made == ["course-change"]
-    assert runs.pace < 0.001  # it took no time
-    runs.pace = 0.05
     kept.add("base")
-    assert runs.make({"base": {}, "head-sea": {}}) is None and made[1:] == ["base", "head-sea"]
+    assert runs.make({"base": {}, "head-sea": {}}) is None and made[1:] == 2 * ["base"] + 2 * ["head-sea"]
+
+
+def test_the_pace_is_that_of_the_runs_themselves(monkeypatch):
+    """Red: a head sea takes six times as long, its second round was stopped at the limit, and the start after it was
+    held to be as slow."""
+    now, made = [0.0], []
+    monkeypatch.setattr(load_cases.time, "monotonic", lambda: now[0])
+    def make(name, fields, sets):
+        made.append(name)
+        now[0] += 180.0 if name == "head-sea" else 30.0
+        return [None] * len(fields)
+    here = SimpleNamespace(jobs=2, end=250.0, kept=lambda name, i, sets: False, make=make)
+    runs = load_cases.Runs(here, range(4), range(2), 600.0, 0.05)
+    assert runs.make({"head-sea": {}}) == "budget" and made == ["head-sea"]
+    assert runs.make({"start": {}}, runs.few) is None and now[0] == 210
 
 
 CASE = changed(TOW, run={"dt": 0.2, "duration": 40}, output__window_start=10, domain__length=14, domain__width=7,
@@ -377,6 +398,13 @@ def test_values_that_are_assumed_stay_beside_the_design_value(made):
     row = next(c for c in a["load_cases"] if c["id"] == "case.head_sea")
     row["in_design"] = False
     assert "†" in words.load_cases(a, False) and "assumed" in words.WORDS["beside"](row | row["values"], a)
+
+
+def test_the_band_names_the_ranges_that_it_lacks(made):
+    """Red: "over the ranges of what is assumed", of which the budget had reached one of three."""
+    said = words.WORDS["band"](made["band"] | {"without": ["ice.friction", "ice.rafting.kappa"]}, made)
+    assert "without ice.friction and ice.rafting.kappa, whose effect is not known" in said
+    assert "without" not in words.WORDS["band"](made["band"], made)
 
 
 def test_speeds_of_one_call(made):

@@ -310,12 +310,15 @@ def beside(work, a, row, t):
                 print(words, flush=True)
         cases, ramp = [], None
         towed = t.speed > 0  # or held
-        if towed:  # the course change first: two runs, and in the design value
+        # first what is in the design value, the cheapest first; the head sea, several times as dear, last if assumed
+        given = a.head_current is not None or a.head_wind is not None
+        if towed:
             cases.append(load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius))
-        cases.insert(0, load_cases.head_sea(t, runs, a.head_current, a.head_wind))
-        ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
-        if towed:  # the start last: its runs are the longest, and it has a closed form
             start, ramp = load_cases.start(t, runs, say)
+        head = given and load_cases.head_sea(t, runs, a.head_current, a.head_wind)
+        ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
+        cases.insert(0, head or load_cases.head_sea(t, runs))
+        if towed:
             cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
     return cases, ramp, ranges, runs.count
 
@@ -362,6 +365,13 @@ concentration = measure("%", lambda x: 0 <= x <= 0.95, "not from 0 to 95 %; give
 speed = measure("m/s", words="not above zero; give speeds as in \"0.8 kn,1 kn\" or 0.8kn:1.4kn:4")
 
 
+def factor(text):
+    """A safety factor, which lowers no load."""
+    if 0 < (value := above_zero(text)) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is below 1; give breaking load / tension, as 2 or 3")
+    return value
+
+
 def several(kind):
     """Type of an option with several values, in order."""
     return lambda text: sorted({kind(part) for part in text.split(",")})
@@ -396,7 +406,7 @@ def options(p):
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
     p.add_argument("--line-length", type=measure("m"), metavar="M", help="its length, for snap loads (default: that "
                    "of the case)")
-    p.add_argument("--line-factor", type=above_zero, metavar="X", help="safety factor of the line (default: none is "
+    p.add_argument("--line-factor", type=factor, metavar="X", help="safety factor of the line (default: none is "
                    "applied)")
     p.add_argument("--efficiency", type=measure("%", lambda x: 0 < x <= 1, "not above 0 and up to 100 %"),
                    default=1.0, metavar="X", help="share of the bollard pull that "

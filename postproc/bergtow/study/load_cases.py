@@ -25,7 +25,7 @@ and is not in it.
 import functools
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bergtow import towing
 from bergtow.case import quantities
@@ -90,9 +90,10 @@ class Runs:
     fields: range           #: of paired runs, whose interval is that of these fields
     few: range              #: of those of which the largest value is taken
     duration: float         #: s, of the case
-    pace: float             #: s of a core / s of a run, as measured last
+    pace: float             #: s of a core / s of a run, as measured in the fields of the case
     left_out: bool = False  #: none is to be made
     count: int = 0
+    own: dict = field(default_factory=dict)  #: {name: pace of these runs}: a head sea takes several times as long
 
     def make(self, some, fields=None):
         """Runs of {name: sets}, none of which is begun unless by the pace all end in time. None where they are there,
@@ -100,26 +101,29 @@ class Runs:
         if self.left_out:
             return "left_out"
         fields = fields or self.fields
-        takes = {name: self.takes(name, sets, fields) for name, sets in some.items()}
-        if sum(takes.values()) > max(0.0, self.runs.end - time.monotonic()):
-            return "budget"
-        for name, sets in some.items():
+        jobs = self.runs.jobs
+        rounds = [(name, fields[k:k + jobs]) for name in some for k in range(0, len(fields), jobs)]
+        for k, (name, here) in enumerate(rounds):
+            takes = sum(self.takes(other, some[other], these) for other, these in rounds[k:])
             began = time.monotonic()
-            why = self.runs.make(name, fields, sets)
+            if takes > max(0.0, self.runs.end - began):
+                return "budget"
+            expected = self.takes(name, some[name], here)
+            why = self.runs.make(name, here, some[name])
             if SPENT in why:
                 return "budget"
             if any(why):
                 return "run_failed"
             self.count += len(why)
-            if takes[name] > 0:
-                self.pace *= (time.monotonic() - began) / takes[name]
+            if expected > 0:
+                self.own[name] = self.own.get(name, self.pace) * (time.monotonic() - began) / expected
         return None
 
     def takes(self, name, sets, fields):
         """s for the runs that are not there yet."""
         missing = sum(not self.runs.kept(name, i, sets) for i in fields)
         seconds = float(sets["run.duration"].split()[0]) if "run.duration" in sets else self.duration
-        return -(-missing // self.runs.jobs) * self.pace * seconds
+        return -(-missing // self.runs.jobs) * self.own.get(name, self.pace) * seconds
 
     def measured(self, name, measure, fields=None):
         """[measure(run)] of the fields."""

@@ -120,6 +120,8 @@ def _band(v, a):
     if v["low_n"] is None:
         return "What is assumed was not looked at"
     out = f"Over the ranges of what is assumed the steady tow needs {kn(v['low_n'])} to {kn(v['high_n'])} kN"
+    if v["without"]:
+        out += f", without {' and '.join(v['without'])}, whose effect is not known"
     drag = next((r for r in a["assumed"] if r["key"] == "body.drag.water_form" and known(r["n_per_tenth"])), None)
     if drag:
         out += f"; each 10 % of the water's drag coefficient is worth {kn(drag['n_per_tenth'])} kN"
@@ -269,7 +271,7 @@ def plan(p):
 
 def took(a, markdown):
     c = a["cost"]
-    rows = [["wall time", f"{short(c['wall_s'] / 60, 2)} min"], ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
+    rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"], ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
             ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
     return table(["what", "took"], rows, markdown)
 
