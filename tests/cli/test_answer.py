@@ -157,6 +157,24 @@ def test_ramp_and_stop():
     assert load_cases.start_ramp(tow(line=line)) > ramp  # the line swings
 
 
+def test_the_ramp_of_a_berg_that_drag_holds_on_a_line():
+    """Most of the load is drag, which a berg at rest does not have: the equation of motion stays below the load, and
+    reaches nine tenths of it. Red: drag as a force that holds the berg at rest, and a ramp of 14 h."""
+    line = gear.Line("", 4e6, 1e8, 300.0)
+    t = tow(water=2.62e5, wind=0.0, ice=1.44e4, mass=1.74e8, speed=0.5, value=3.1e5, line=line)
+    ramp, dt, k = load_cases.start_ramp(t), 0.5, line.stiffness / line.length
+    assert ramp < 3 * 3600
+    end = body = v = pull = top = 0.0
+    for step in range(int(1.2 * ramp / dt)):
+        end += dt * t.speed * min(1.0, step * dt / ramp)
+        pull = max(0.0, k * (end - body))
+        top = max(top, pull)
+        held = t.ice if v > 0 else min(t.ice, pull)
+        v = max(0.0, v + dt / t.mass * (pull - held - t.water * (v / t.speed) ** 2))
+        body += dt * v
+    assert 0.9 * t.value < top < t.value
+
+
 def test_a_line_that_parts_and_one_that_snaps():
     """Of two springs of which one parts, by the energy of the swing."""
     two = tow(case={"tow.mode": "line", "tow.line.branches": "2"}, line=gear.Line("", 4e6, 2.6e8, 600.0))
@@ -398,6 +416,20 @@ def test_values_that_are_assumed_stay_beside_the_design_value(made):
     row = next(c for c in a["load_cases"] if c["id"] == "case.head_sea")
     row["in_design"] = False
     assert "†" in words.load_cases(a, False) and "assumed" in words.WORDS["beside"](row | row["values"], a)
+
+
+def test_a_load_case_above_the_steady_tow_does_not_hide_it(made):
+    """Red: the largest of two course changes in the sentence, and nothing of the fitted value and its interval."""
+    a = json.loads(json.dumps(made))
+    steady = next(c for c in a["conditions"] if c["id"] == a["load_cases"][0]["of"])
+    steady["value"] |= {"kind": "return_level", "n": 310e3, "interval_95": [308e3, 332e3]}
+    for row, codes in (("case.course_change", ["steady"]), ("case.steady", [])):
+        a["design"]["row"] = row
+        found = [part for part in answer.sentence(a) if part["code"] == "steady"]
+        assert [part["code"] for part in found] == codes
+        for part in found:
+            said = words.WORDS["steady"](part["values"], a)
+            assert said.startswith("The steady tow needs 310 kN (95 % interval over fields: 308 to 332 kN)")
 
 
 def test_the_band_names_the_ranges_that_it_lacks(made):

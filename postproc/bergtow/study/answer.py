@@ -271,6 +271,8 @@ def sentence(a):
                 "values": {k: d[k] for k in ("n", "interval_95", "kind", "reason")} | {"case": d["row"]},
                 "rows": ["design", d["row"]]})
     steady = rows[rows["case.steady"]["of"]]
+    if d["row"] != "case.steady" and steady["value"]["kind"] == "return_level":
+        out.append({"code": "steady", "values": steady["value"] | {"case": "case.steady"}, "rows": [steady["id"]]})
     if steady["value"]["kind"] == "largest_of_n":
         out.append({"code": "covers", "values": steady["value"], "rows": [steady["id"]]})
     if case.get("of"):

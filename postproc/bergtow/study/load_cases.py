@@ -6,8 +6,9 @@ With M the mass of the body with that of the water that it carries, V the speed,
 the mean ice resistance, F the design value of the steady tow, k = EA/L of the line:
 
     start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that asks for no more
-                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for. Runs with that
-                     ramp, and with shorter ones as long as these hold, show what the ice makes of it
+                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for, of the
+                     ice alone under F - D. Runs with that ramp, and with shorter ones as long as these hold,
+                     show what the ice makes of it
     course change    on a line its tension in runs through a bend of radius r; else along the course as in such runs,
                      across it M V^2/r: the root of the squares
     stop             the line stays taut as long as the ordered stop takes at least M V/(D + R)
@@ -186,7 +187,10 @@ def start_ramp(t):
     above = t.value - t.mean
     by_inertia = t.mass * t.speed / above if above > 0 else np.inf
     if np.isfinite(t.spring):
-        return max(by_inertia, towing.ramp_for(t.value, t.speed, t.spring, t.mass, resistance=t.mean))
+        # the ice holds a body at rest; drag grows with its way, over many periods of the line, and sets off no swing.
+        # Rejected: drag as part of what holds it, which takes hours where drag is most of the load
+        drag = t.water + t.wind
+        return max(by_inertia, towing.ramp_for(t.value - drag, t.speed, t.spring, t.mass, resistance=t.ice))
     return by_inertia
 
 

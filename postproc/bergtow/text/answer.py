@@ -99,6 +99,10 @@ def _needs(v, a):
             f"{_over(a)}{_in_case(v, a)}{exceeded}")
 
 
+def _steady(v, a):
+    return _needs(v, a).replace("The tow", "The steady tow", 1)
+
+
 def _largest(v, a):
     return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v, a)}"
 
@@ -175,7 +179,7 @@ def _against_weather(v, a):
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
-WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest,
+WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest, "steady": _steady,
          "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
          "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
@@ -271,7 +275,8 @@ def plan(p):
 
 def took(a, markdown):
     c = a["cost"]
-    rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"], ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
+    rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
+            ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
             ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
     return table(["what", "took"], rows, markdown)
 
