@@ -52,7 +52,7 @@ def finite(text):
 
 
 def above_zero(text):
-    return _within(text, float, lambda x: 0 < x < math.inf, "not above zero")
+    return _within(text, float, lambda x: 0 < x < math.inf, "not above zero and finite")
 
 
 def not_below_zero(text):

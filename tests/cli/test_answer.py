@@ -157,6 +157,24 @@ def test_ramp_and_stop():
     assert load_cases.start_ramp(tow(line=line)) > ramp  # the line swings
 
 
+def test_the_ramp_of_a_berg_that_drag_holds_on_a_line():
+    """Most of the load is drag, which a berg at rest does not have: the equation of motion stays below the load, and
+    reaches nine tenths of it. Red: drag as a force that holds the berg at rest, and a ramp of 14 h."""
+    line = gear.Line("", 4e6, 1e8, 300.0)
+    t = tow(water=2.62e5, wind=0.0, ice=1.44e4, mass=1.74e8, speed=0.5, value=3.1e5, line=line)
+    ramp, dt, k = load_cases.start_ramp(t), 0.5, line.stiffness / line.length
+    assert ramp < 3 * 3600
+    end = body = v = pull = top = 0.0
+    for step in range(int(1.2 * ramp / dt)):
+        end += dt * t.speed * min(1.0, step * dt / ramp)
+        pull = max(0.0, k * (end - body))
+        top = max(top, pull)
+        held = t.ice if v > 0 else min(t.ice, pull)
+        v = max(0.0, v + dt / t.mass * (pull - held - t.water * (v / t.speed) ** 2))
+        body += dt * v
+    assert 0.9 * t.value < top < t.value
+
+
 def test_a_line_that_parts_and_one_that_snaps():
     """Of two springs of which one parts, by the energy of the swing."""
     two = tow(case={"tow.mode": "line", "tow.line.branches": "2"}, line=gear.Line("", 4e6, 2.6e8, 600.0))
@@ -192,6 +210,13 @@ def test_forces_of_options(text, newtons):
     assert gear.force(text, "--vessel") == newtons
 
 
+@pytest.mark.parametrize("text", ["110", "3.5e6", " 7 "])
+def test_a_force_without_a_unit_is_refused(text):
+    """Red: --vessel 110 was a vessel of 110 N, and no tow was feasible."""
+    with pytest.raises(BergtowError, match="has no unit; give it as"):
+        gear.force(text, "--vessel")
+
+
 @pytest.mark.parametrize("option, text, value", [
     ("budget", "90", 90), ("budget", "1.5 h", 90), ("concentrations", "70 %,0.5", [0.5, 0.7]),
     ("efficiency", "80 %", 0.8), ("efficiency", "1", 1), ("line-length", "0.5 km", 500),
@@ -199,7 +224,8 @@ def test_forces_of_options(text, newtons):
     ("bend", "90", math.pi / 2), ("bend", "-30 deg", -math.pi / 6), ("speeds", "1 m/s,0.5", [1.0, 0.5]),
     ("budget", "3 kn", "a time"), ("concentrations", "97 %", "95 %"), ("efficiency", "1.2", "100 %"),
     ("line-length", "3 kg", "length"), ("head-wind", "-1", "below zero"), ("bend", "400", "150 degrees"),
-    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"), ("speeds", "1 kn,", "a speed")])
+    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"),
+    ("line-factor", "0.5", "below 1"), ("budget", "inf", "and finite"), ("speeds", "1 kn,", "a speed")])
 def test_options_take_units_and_say_what_is_wrong(option, text, value):
     """Red: a bare float() as the type, whose message names a function of the program."""
     words_of = ["design", "case.yml", f"--{option}={text}"]
@@ -267,16 +293,55 @@ def test_a_remedy_does_not_repeat_what_was_given(budget, tmp_path, monkeypatch, 
     """The budget that it names is larger than that which was given. Red: the old words, "raise --budget"."""
     (tmp_path / "out").mkdir()
     made_up.write(tmp_path / "out", [made_up.member(np.ones(3), {}, 0)] * 1)
-    for name, value in (("seconds_a_field", 900.0), ("seconds_of_the_longest", 0.0), ("widths", {}),
-                        ("fields_settled", 1)):
+    for name, value in (("seconds_a_field", 900.0), ("widths", {}), ("fields_settled", 1)):
         monkeypatch.setattr(design, name, lambda *a, value=value: value)
     path = write_case(tmp_path, TOW)
     a = cli.arguments("design", path, "-o", tmp_path / "out", "--budget", str(budget), "--no-replay")
     a.concentrations, a.by_speed = [], {}
-    work = SimpleNamespace(ensemble=lambda study: True, jobs=1, end=design.time.monotonic() + 60 * budget)
+    work = SimpleNamespace(ensemble=lambda study: True, jobs=1, began=design.time.monotonic(), core=900.0)
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     said = capsys.readouterr().err
     assert float(re.search(r"--budget (\d+)", said)[1]) > budget and "run.duration" not in said
+
+
+@pytest.mark.parametrize("left, n, found", [
+    (100, 2, (6, 20.0)),   # three rounds of two, and the replay
+    (50, 2, (3, 0.0)),     # two rounds: the fifth field is worth more than a replay
+    (20, 2, (0, 20.0)), (-5, 2, (0, 20.0)), (np.inf, 2, (38, 20.0))
+])
+def test_fields_come_in_whole_rounds(left, n, found):
+    """Red: 1.5 rounds for three fields on two cores, of which the last one was stopped at the limit."""
+    assert design.more_fields(left, 20.0, n, 40, 1, 2) == found
+    assert answer.fields_in(100.0, 20.0, 3, 2) == 3 and answer.fields_in(39.0, 20.0, 3, 2) == 0
+
+
+def test_no_load_case_begins_that_would_not_end():
+    """By the pace of the runs before, with all runs of a pair at once; a shorter one may still fit. Red: the base was
+    run, and no time was left for the head sea; runs were begun until the limit stopped them."""
+    made, kept = [], set()
+    here = SimpleNamespace(jobs=2, end=design.time.monotonic() + 100, kept=lambda name, i, sets: name in kept,
+                           make=lambda name, fields, sets: made.append(name) or [None] * len(fields))
+    runs = load_cases.Runs(here, range(4), range(2), 600.0, 0.05)  # 30 s a run, 60 s four of them
+    assert runs.make({"base": {}, "head-sea": {}}) == "budget" and made == []
+    assert runs.make({"course-change": {"run.duration": "2400 s"}}, runs.few) == "budget" and made == []
+    assert runs.make({"course-change": {"run.duration": "1200 s"}}, runs.few) is None and made == ["course-change"]
+    kept.add("base")
+    assert runs.make({"base": {}, "head-sea": {}}) is None and made[1:] == 2 * ["base"] + 2 * ["head-sea"]
+
+
+def test_the_pace_is_that_of_the_runs_themselves(monkeypatch):
+    """Red: a head sea takes six times as long, its second round was stopped at the limit, and the start after it was
+    held to be as slow."""
+    now, made = [0.0], []
+    monkeypatch.setattr(load_cases.time, "monotonic", lambda: now[0])
+    def make(name, fields, sets):
+        made.append(name)
+        now[0] += 180.0 if name == "head-sea" else 30.0
+        return [None] * len(fields)
+    here = SimpleNamespace(jobs=2, end=250.0, kept=lambda name, i, sets: False, make=make)
+    runs = load_cases.Runs(here, range(4), range(2), 600.0, 0.05)
+    assert runs.make({"head-sea": {}}) == "budget" and made == ["head-sea"]
+    assert runs.make({"start": {}}, runs.few) is None and now[0] == 210
 
 
 CASE = changed(TOW, run={"dt": 0.2, "duration": 40}, output__window_start=10, domain__length=14, domain__width=7,
@@ -353,6 +418,27 @@ def test_values_that_are_assumed_stay_beside_the_design_value(made):
     assert "†" in words.load_cases(a, False) and "assumed" in words.WORDS["beside"](row | row["values"], a)
 
 
+def test_a_load_case_above_the_steady_tow_does_not_hide_it(made):
+    """Red: the largest of two course changes in the sentence, and nothing of the fitted value and its interval."""
+    a = json.loads(json.dumps(made))
+    steady = next(c for c in a["conditions"] if c["id"] == a["load_cases"][0]["of"])
+    steady["value"] |= {"kind": "return_level", "n": 310e3, "interval_95": [308e3, 332e3]}
+    for row, codes in (("case.course_change", ["steady"]), ("case.steady", [])):
+        a["design"]["row"] = row
+        found = [part for part in answer.sentence(a) if part["code"] == "steady"]
+        assert [part["code"] for part in found] == codes
+        for part in found:
+            said = words.WORDS["steady"](part["values"], a)
+            assert said.startswith("The steady tow needs 310 kN (95 % interval over fields: 308 to 332 kN)")
+
+
+def test_the_band_names_the_ranges_that_it_lacks(made):
+    """Red: "over the ranges of what is assumed", of which the budget had reached one of three."""
+    said = words.WORDS["band"](made["band"] | {"without": ["ice.friction", "ice.rafting.kappa"]}, made)
+    assert "without ice.friction and ice.rafting.kappa, whose effect is not known" in said
+    assert "without" not in words.WORDS["band"](made["band"], made)
+
+
 def test_speeds_of_one_call(made):
     """A tow at another speed goes as far; the vessel of the call holds none of them."""
     slow, fast = made["speeds"]
@@ -424,8 +510,8 @@ def test_the_vessel_has_to_hold_the_largest_load_case():
 def bend(**case):
     """The course change of a tow of 3 km at 0.5 m/s that begins at (-1, 0) km of a domain of 3 by 1 km."""
     made = {}
-    def make(name, sets, fields):
-        made.update(sets)
+    def make(some, fields):
+        made.update(*some.values())
         return "run_failed"
     at = {"body.x": "-1000 m", "body.y": "0 m", "domain.x0": "-1500 m", "domain.y0": "-500 m",
           "domain.length": "3000 m",

@@ -154,7 +154,7 @@ def test_a_file_in_place_of_the_folder(tmp_path, command, place):
 def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
     before = {p.name: p.stat().st_mtime_ns for p in made.iterdir()}
     a = cli.arguments("design", str(made.parent / "case.yml"), "-o", made)
-    design.make_replay(design.Work(BERGTOW, made, [], 2, np.inf, True), a, -3.0)
+    design.make_replay(design.Work(BERGTOW, made, [], 2, np.inf, True, 0.0), a, -3.0)
     assert "no replay" in (said := capsys.readouterr().out) and "and 0 s of the budget are left" in said
     assert {p.name: p.stat().st_mtime_ns for p in made.iterdir()} == before
 
@@ -272,12 +272,11 @@ def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
             for c in range(2) for r in range(repeats)])
         return True
     (tmp_path / "out").mkdir()
-    for name, value in (("seconds_a_field", 1.0), ("seconds_of_the_longest", 0.0), ("widths", {})):
+    for name, value in (("seconds_a_field", 1.0), ("widths", {})):
         monkeypatch.setattr(design, name, lambda *a, value=value: value)
     a = cli.arguments("design", path, "-o", tmp_path / "out", "--fields", "8", "--no-replay", "--concentrations",
                       "0.2,0.4")
-    work = SimpleNamespace(ensemble=ensemble, jobs=2, end=np.inf, program=BERGTOW)
-    work.end = design.time.monotonic() + 1000
+    work = SimpleNamespace(ensemble=ensemble, jobs=2, began=design.time.monotonic(), core=0.0, program=BERGTOW)
     design.run_case(work, a, {name: {} for name in design.SECTIONS})
     assert asked == [2, 8] and design.fields_settled(tmp_path / "out") == 8
     assert "c001-r002" in Members(tmp_path / "out").holes()
@@ -290,7 +289,7 @@ def test_ice_that_is_read_gets_one_field(tmp_path, capsys):
     """Every other one would be the same run."""
     made_up.write(tmp_path / "out", [made_up.member(np.ones(9), {}, 0)])
     studies = []
-    work = SimpleNamespace(program=None, jobs=1, end=np.inf,
+    work = SimpleNamespace(program=None, jobs=1, began=0.0, core=0.0,
                            ensemble=lambda study: studies.append(yaml.safe_load(study.read_text())) or True)
     a = cli.arguments("design", tmp_path / "case.yml", "-o", tmp_path / "out")
     design.run_case(work, a, {name: {} for name in design.SECTIONS} | {"ice": {"outlines": "floes.geojson"}})

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray
 from osgeo import ogr
-from pyproj import Geod
+from pyproj import CRS, Geod
 
 from harness import DONE, IO, USAGE, area, call, changed, run
 from test_map import ARROW, BOX, LOCAL, ORIGIN, write
@@ -174,6 +174,8 @@ def test_trajectories_are_those_of_the_frames(tmp_path):
         assert [d[v].attrs["units"] for v in ("lon", "lat", "speed", "thickness")] == [
             "degrees_east", "degrees_north", "m s-1", "m"]
         assert "comment" not in d.time.attrs
+        datum = CRS.from_cf(d[d.speed.attrs["grid_mapping"]].attrs).ellipsoid
+        assert (datum.semi_major_metre, datum.inverse_flattening) == (6378137.0, 298.257223563)
         assert str(d.time.values[-1]).startswith("2027-03-01T06:00:30")
         with Run(there) as r:
             x = np.stack([r.pose(k) for k in range(r.n_frames)])[:, :, :2]

@@ -37,6 +37,8 @@ LAYERS = ("floes", "bodies", "tracks", "loads")
 #: layers that a file gets where --layer names none
 DEFAULT = {".gpkg": LAYERS, ".geojson": ("floes",), ".json": ("floes",), ".shp": ("floes",), ".csv": (), ".nc": ()}
 TRAJECTORIES = (".csv", ".nc")
+WGS84 = {"grid_mapping_name": "latitude_longitude", "semi_major_axis": 6378137.0, "inverse_flattening": 298.257223563,
+         "longitude_of_prime_meridian": 0.0}
 #: positions in the series: (name of the track, its x, its y)
 TRACKS = (("iceberg", "body_x", "body_y"), ("towing end", "carriage_x", "carriage_y"),
           ("vessel", "vessel_x", "vessel_y"))
@@ -378,7 +380,8 @@ def write_table(t, place, path, force):
 
 
 def dataset(t, place, start, title):
-    """Trajectories as xarray.Dataset: CF-1.8, section 9 and appendix H.4, multidimensional arrays."""
+    """Trajectories as xarray.Dataset: CF-1.8, section 9 and appendix H.4, multidimensional arrays; the times, which all
+    share, are an axis, as OpenDrift has it."""
     import xarray
     both = ("trajectory", "time")
     named = start or datetime.datetime(1970, 1, 1)
@@ -402,11 +405,13 @@ def dataset(t, place, start, title):
                         for k, (a, words) in enumerate(zip("xy", ("easting", "northing") if place.crs
                                                            or place.geographic else ("x of the basin",
                                                                                      "y of the basin")))}
-    if place.crs and not place.degrees:
+    if place.degrees:
+        variables["crs"] = ((), 0, WGS84)
+    elif place.crs:
         import pyproj
         variables["crs"] = ((), 0, pyproj.CRS(place.crs).to_cf())
-        for name in ("speed",):
-            variables[name][2]["grid_mapping"] = "crs"
+    if "crs" in variables:
+        variables["speed"][2]["grid_mapping"] = "crs"
     names = np.array(t.name, dtype="S")
     return xarray.Dataset(
         variables | {"trajectory_name": ("trajectory", names, {"cf_role": "trajectory_id",

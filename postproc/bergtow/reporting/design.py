@@ -10,9 +10,10 @@ condition are run, then as many as fit into what is left, by the time which thes
 conditions have equally many, and should the time run out all the same, the fields that are complete in every condition
 are taken. Members are independent: one process of one thread a core. The same call goes on where an earlier one ended.
 
-Of the budget CASES_SHARE at most is kept for the runs of load cases and ranges (study/load_cases.py, assumed.py),
-which are of the hardest condition at the speed that is asked for. A row that the budget does not reach has no load, and
-says so.
+Nothing begins that by the pace measured so far does not end within the budget: no round of fields, no run of a load
+case, no replay. Of the budget CASES_SHARE at most is kept for the runs of load cases and ranges
+(study/load_cases.py, assumed.py), which are of the hardest condition at the speed that is asked for. A row that the
+budget does not reach has no load, and says so.
 
 Where the domain of the case is too narrow for a concentration by the rule of `bergtow check`, that condition gets the
 width that the rule asks for: a load that rests on the periodic images of the body is none to design for. Walls are part
@@ -72,6 +73,11 @@ class Work:
     jobs: int
     end: float               #: inf without a budget
     quiet: bool
+    began: float             #: of the call
+    core: float = 0.0        #: s of a core that a run takes by the program's estimate
+    last: float = math.inf   #: end of all runs, load cases and replay among them
+    member: float = 0.0      #: s that a run of the ensemble takes, as measured
+    replay: float = 0.0      #: s that are kept for the replay
 
     def left(self):
         return self.end - time.monotonic()
@@ -183,21 +189,13 @@ def seconds_a_field(e):
     return sum(np.mean(some) for some in took.values())
 
 
-def seconds_of_the_longest(e):
-    """Wall time of the member that took longest: a replay takes no more."""
-    out = 0.0
-    for m in np.flatnonzero(e.status == FINISHED):
-        with Run(e.folder(m)) as run:
-            out = max(out, run.number("wall_time_s"))
-    return out
-
-
-def more_fields(left, rate, replay, n, most):
-    """Fields that n are followed by in `left` s, and the seconds that are kept for a replay: none, until there are
-    FEW."""
-    beside = min(int(MARGIN * (left - replay) / rate), most - n)
-    few = min(int(MARGIN * left / rate), min(FEW, most) - n)
-    return (beside, replay) if beside >= few else (few, 0.0)
+def more_fields(left, member, n, most, conditions, jobs):
+    """Fields that n are followed by in `left` s, and the seconds that are kept for a replay, which takes no longer than
+    a member: none, until there are FEW."""
+    def fit(seconds):
+        return answer.fields_in(MARGIN * seconds, member, conditions, jobs)
+    beside, few = min(fit(left - member), most - n), min(fit(left), min(FEW, most) - n)
+    return (beside, member) if beside >= few else (few, 0.0)
 
 
 def run_case(work, a, case):
@@ -206,36 +204,45 @@ def run_case(work, a, case):
         print("the ice is read, and no seed changes it: one field is run, which says nothing of the scatter between "
               "fields")
         a.fields = 1
-    n = min(max(FIRST, fields_settled(a.output)), a.fields)
+    settled = fields_settled(a.output)
+    n = min(max(FIRST, settled), a.fields)
     wider = a.wider = widths(work, a, case)
     for c, width in wider.items():
         print(f"at {100 * c:g} % the domain is made {width} wide: narrower, its periodic images would carry part "
               "of the load (--keep-width: leave it as it is)")
+    start = time.monotonic()
     whole_round = work.ensemble(write_study(a, case, n, wider))
     if not whole_round and fields_settled(a.output) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        f"raise --budget to {math.ceil(2 * a.budget)}; what was begun is kept, and the same call goes "
                        "on", SIGNAL)
-    rate = seconds_a_field(Members(a.output)) / work.jobs
-    replay = 0 if a.no_replay or reads_ice(case) else seconds_of_the_longest(Members(a.output))
-    print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
-    end = work.end
-    while whole_round and rate > 0 and n < a.fields:  # at 0 all have failed
-        more, kept = more_fields(end - time.monotonic(), rate, replay, n, a.fields)
+    e = Members(a.output)
+    conditions = len(e.conditions())
+    def took(fields):  # s a member, with all that is not the run itself
+        return (time.monotonic() - start) / math.ceil(fields * conditions / work.jobs) if fields > 0 else 0.0
+    member = max(seconds_a_field(e) / conditions, took(n - settled) if whole_round else 0.0)
+    print(f"a field of all conditions takes {member * conditions:.0f} s of a core")
+    end = set_ends(work, a, conditions, member)
+    while whole_round and member > 0 and n < a.fields:  # at 0 all have failed
+        more, kept = more_fields(end - time.monotonic(), member, n, a.fields, conditions, work.jobs)
+        work.replay = 0.0 if a.no_replay or reads_ice(case) else kept
         if more < 1:
             break
         work.end = end - kept
         start = time.monotonic()
         whole_round = work.ensemble(write_study(a, case, n + more, wider))
-        rate = (time.monotonic() - start) / more
+        member = took(more) if whole_round else member
         n += more
+    work.member = member
     if not whole_round:
         n = max(1, fields_settled(a.output))
         print(f"no time is left for further fields: the answer is from the {n} that are complete in every condition")
         work.end, work.quiet = np.inf, True  # nothing is left to run; the members are gathered once more
         work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):
-        need = a.budget + max(0.0, (FEW - n) * rate - max(0.0, end - time.monotonic())) / 60
+        share = 1 if a.no_load_cases else 1 - CASES_SHARE
+        lacks = math.ceil((FEW - n) * conditions / work.jobs) * member - max(0.0, end - time.monotonic())
+        need = a.budget + max(0.0, lacks) / share / 60
         print(f"bergtow design: warning: {n} fields say nothing of the scatter between them; {FEW} need some "
               f"{math.floor(need) + 1} min: --budget {math.floor(need) + 1}", file=sys.stderr)
 
@@ -260,7 +267,7 @@ def make_replay(work, a, left):
     with Run(e.folder(m)) as run:
         if read_ice_of(run.case):
             return
-        takes = run.number("wall_time_s")
+        takes = max(run.number("wall_time_s"), work.member)
         if takes > left:
             print(f"no replay: the tow takes {takes:.0f} s, and {max(0, left):.0f} s of the budget are left; the same "
                   "call with a larger --budget adds it")
@@ -280,7 +287,7 @@ def make_replay(work, a, left):
 # ---- load cases and ranges
 
 
-def beside(work, a, row, t, minutes):
+def beside(work, a, row, t):
     """(load cases without the steady one, ramp, ranges, how many runs): of a condition. Errors: RunError."""
     ice = row["values"].get("ice.concentration")
     given = list(a.set)
@@ -292,21 +299,26 @@ def beside(work, a, row, t, minutes):
         given += [f"{name}={value}" for name, value in ({key: text} | of[text]).items()]
     some = assumed.applies(a.assumed, lambda key, default: answer.case_value(t.case, key, default),
                            abs(t.wind) > load_cases.NO_WIND * abs(t.value))
-    end = time.monotonic() + 60 * minutes
+    end = work.last - work.replay
     with locked(a.output / "load-cases") as lock:
         n = (1, 1) if read_ice_of(t.case) else (PAIRED, OF_A_CASE)
+        duration = answer.case_value(t.case, "run.duration")
         runs = load_cases.Runs(CaseRuns(a.file, a.output, "load-cases", work.program, given, work.jobs, end, end,
-                                        lock=lock), *map(range, n), a.no_load_cases)
+                                        lock=lock), *map(range, n), duration, work.member / duration, a.no_load_cases)
         def say(words):
             if not a.quiet:
                 print(words, flush=True)
-        cases, ramp = [load_cases.head_sea(t, runs, a.head_current, a.head_wind)], None
+        cases, ramp = [], None
         towed = t.speed > 0  # or held
+        # first what is in the design value, the cheapest first; the head sea, several times as dear, last if assumed
+        given = a.head_current is not None or a.head_wind is not None
         if towed:
             cases.append(load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius))
-        ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
-        if towed:  # the start last: its runs are the longest, and it has a closed form
             start, ramp = load_cases.start(t, runs, say)
+        head = given and load_cases.head_sea(t, runs, a.head_current, a.head_wind)
+        ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
+        cases.insert(0, head or load_cases.head_sea(t, runs))
+        if towed:
             cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
     return cases, ramp, ranges, runs.count
 
@@ -329,8 +341,7 @@ def answer_of(work, a, plan, began):
     t = answer.tow_of(e, row, line, vessel) if row else None
     cases, ramp, ranges, count = ([], None, [], 0)
     if t is not None and plan is not None:
-        left = (began + 60 * a.budget - RESERVE[0] - time.monotonic()) / 60 if a.budget else np.inf
-        cases, ramp, ranges, count = beside(work, a, row, t, left)
+        cases, ramp, ranges, count = beside(work, a, row, t)
     now = time.monotonic()
     asked = {"concentrations": sorted({round(r["concentration"], 6) for r in rows}), "speed_m_s": asked_speed,
              "speeds_m_s": sorted({r["speed_m_s"] for r in rows}), "thicknesses_m": a.thicknesses,
@@ -352,6 +363,13 @@ def answer_of(work, a, plan, began):
 
 concentration = measure("%", lambda x: 0 <= x <= 0.95, "not from 0 to 95 %; give concentrations as in 0.6,0.8")
 speed = measure("m/s", words="not above zero; give speeds as in \"0.8 kn,1 kn\" or 0.8kn:1.4kn:4")
+
+
+def factor(text):
+    """A safety factor, which lowers no load."""
+    if 0 < (value := above_zero(text)) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is below 1; give breaking load / tension, as 2 or 3")
+    return value
 
 
 def several(kind):
@@ -388,7 +406,7 @@ def options(p):
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
     p.add_argument("--line-length", type=measure("m"), metavar="M", help="its length, for snap loads (default: that "
                    "of the case)")
-    p.add_argument("--line-factor", type=above_zero, metavar="X", help="safety factor of the line (default: none is "
+    p.add_argument("--line-factor", type=factor, metavar="X", help="safety factor of the line (default: none is "
                    "applied)")
     p.add_argument("--efficiency", type=measure("%", lambda x: 0 < x <= 1, "not above 0 and up to 100 %"),
                    default=1.0, metavar="X", help="share of the bollard pull that "
@@ -429,10 +447,16 @@ def options(p):
     arguments.add_force(p)
 
 
-def ending(a, began, conditions):
-    """When the runs are to end, by time.monotonic()."""
-    reserve = RESERVE[0] + RESERVE[1] * conditions
-    return began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
+def set_ends(work, a, conditions, member=None):
+    """When fields are to end: work.end, and all runs: work.last, by time.monotonic(). member: s of a run as measured;
+    where the program is slower than it estimates, so are the pages."""
+    estimated = SLOWER * work.core
+    slower = max(1.0, member / estimated) if member and estimated > 0 else 1.0
+    reserve = slower * (RESERVE[0] + RESERVE[1] * conditions)
+    work.end = work.last = work.began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
+    if a.budget and work.core and not a.no_load_cases:
+        work.end -= min(CASES_SHARE * (work.end - time.monotonic()), CASE_RUNS / a.jobs * (member or estimated))
+    return work.end
 
 
 def sets_of_study(a, asked):
@@ -454,13 +478,11 @@ def planned(a, case, found, began):
         raise RunError(a.file, "reads its ice, which has the thickness of its floes", "leave --thicknesses out", CASE)
     a.by_speed, a.varied = at_speeds(a, found), varied(a, found)
     n = math.prod(max(1, len(some)) for some in (a.concentrations, a.by_speed, *a.varied.values()))
-    end = ending(a, began, n)
-    plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
-    if np.isfinite(end) and not a.no_load_cases:
-        end -= min(CASES_SHARE * (end - time.monotonic()), CASE_RUNS / a.jobs * SLOWER * plan["core_s"])
-        plan = answer.plan(program_path(), a.file, a.set, n, a.jobs, (end - time.monotonic()) / 60, a.fields)
+    work = Work(program_path(), a.output, sets_of_study(a, asked), a.jobs, np.inf, a.quiet, began)
+    work.core = answer.plan(work.program, a.file, a.set, n, a.jobs, np.inf, a.fields)["core_s"]
+    left = set_ends(work, a, n) - time.monotonic()
+    plan = answer.plan(work.program, a.file, a.set, n, a.jobs, left / 60, a.fields)
     print(answer_text.plan(plan), flush=True)
-    work = Work(program_path(), a.output, sets_of_study(a, asked), a.jobs, end, a.quiet)
     return work, plan | {"speed_m_s": found["speed"]}
 
 
@@ -481,7 +503,8 @@ def perform(a):
     a.assumed = assumed.read(a.ranges) if a.ranges else assumed.RANGES
     a.output.mkdir(parents=True, exist_ok=True)
     if study:
-        work = Work(program_path(), a.output, a.set, a.jobs, ending(a, began, 1), a.quiet)
+        work = Work(program_path(), a.output, a.set, a.jobs, np.inf, a.quiet, began)
+        set_ends(work, a, 1)
         work.ensemble(a.file)
         plan = None
     else:
@@ -490,7 +513,7 @@ def perform(a):
         run_case(work, a, {name: section(layers, name) for name in SECTIONS})
     answer_of(work, a, plan, began)
     if not a.no_replay:
-        make_replay(work, a, began + 60 * a.budget - time.monotonic() if a.budget else np.inf)
+        make_replay(work, a, work.last - time.monotonic())
     report.write(a.output, [a.output / name for name in made], {name: getattr(a, name) for name in TITLE_BLOCK}, a.also,
                  force=a.force)
     print(f"{(time.monotonic() - began) / 60:.1f} min")

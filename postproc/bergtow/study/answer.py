@@ -57,12 +57,19 @@ def plan(program, path, given, conditions, jobs, minutes, most):
     gap = max((values["length"] + size) / speed if speed > 0 else 0.0, stat_loads.TIME_SCALE / slower)
     hours = stat_extreme.LEAST_BLOCKS * stat_load.LEAST_GAPS * gap / 3600
     needs = max(stat_profile.LEAST_FIELDS, math.ceil(3600 * hours / window)) if window > 0 else most + 1
-    core, rounds = found["cost"]["core_time_s"], conditions / jobs
-    gives = most if not np.isfinite(minutes) else min(most, int(60 * minutes / max(core * rounds, 1e-9)))
-    return {"needs_fields": needs, "needs_hours": hours, "needs_min": needs * core * rounds / 60,
+    core = found["cost"]["core_time_s"]
+    gives = min(most, fields_in(60 * minutes, core, conditions, jobs))
+    return {"needs_fields": needs, "needs_hours": hours, "needs_min": math.ceil(needs * conditions / jobs) * core / 60,
             "budget_fields": gives, "budget_hours": gives * window / 3600, "window_hours": window / 3600,
             "core_s": core, "gap_s": gap, "conditions": conditions, "most_fields": most,
             "gives": "return_level" if gives >= needs else "largest_of_n" if gives >= 1 else "nothing"}
+
+
+def fields_in(seconds, member, conditions, jobs):
+    """Fields of all conditions that end within so many s, at s a member; inf without an end."""
+    if not np.isfinite(seconds):
+        return np.inf
+    return int(max(0.0, seconds) / max(member, 1e-9)) * jobs // conditions
 
 
 def case_numbers(program, path, given):
@@ -264,6 +271,8 @@ def sentence(a):
                 "values": {k: d[k] for k in ("n", "interval_95", "kind", "reason")} | {"case": d["row"]},
                 "rows": ["design", d["row"]]})
     steady = rows[rows["case.steady"]["of"]]
+    if d["row"] != "case.steady" and steady["value"]["kind"] == "return_level":
+        out.append({"code": "steady", "values": steady["value"] | {"case": "case.steady"}, "rows": [steady["id"]]})
     if steady["value"]["kind"] == "largest_of_n":
         out.append({"code": "covers", "values": steady["value"], "rows": [steady["id"]]})
     if case.get("of"):

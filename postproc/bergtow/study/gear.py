@@ -41,14 +41,15 @@ class Line:
 
 def force(text, option):
     """N of "110 t" (tonnes-force), "1.1 MN"; None where the text is no number with such a unit. Errors: BergtowError
-    where it is none above zero."""
+    where it is none above zero, or has no unit: 110 may be meant as tonnes."""
     tonnes = re.sub(r"(?<=[\d.\s])(t|tonnes?)\s*$", "tf", text)
     try:
         value = read(tonnes, "N")
     except BergtowError:
         return None
-    if not value > 0:
-        raise BergtowError(f"{option} {text}: is not above zero; give it as \"110 t\" or \"1.1 MN\"", USAGE)
+    for wrong, why in ((not value > 0, "is not above zero"), (not re.search(r"[a-zA-Z]\s*$", text), "has no unit")):
+        if wrong:
+            raise BergtowError(f"{option} {text}: {why}; give it as \"110 t\" or \"1.1 MN\"", USAGE)
     return value
 
 

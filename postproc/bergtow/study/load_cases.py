@@ -6,8 +6,9 @@ With M the mass of the body with that of the water that it carries, V the speed,
 the mean ice resistance, F the design value of the steady tow, k = EA/L of the line:
 
     start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that asks for no more
-                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for. Runs with that
-                     ramp, and with shorter ones as long as these hold, show what the ice makes of it
+                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for, of the
+                     ice alone under F - D. Runs with that ramp, and with shorter ones as long as these hold,
+                     show what the ice makes of it
     course change    on a line its tension in runs through a bend of radius r; else along the course as in such runs,
                      across it M V^2/r: the root of the squares
     stop             the line stays taut as long as the ordered stop takes at least M V/(D + R)
@@ -24,7 +25,8 @@ and is not in it.
 """
 import functools
 import math
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 
 from bergtow import towing
 from bergtow.case import quantities
@@ -88,22 +90,41 @@ class Runs:
     runs: object
     fields: range           #: of paired runs, whose interval is that of these fields
     few: range              #: of those of which the largest value is taken
+    duration: float         #: s, of the case
+    pace: float             #: s of a core / s of a run, as measured in the fields of the case
     left_out: bool = False  #: none is to be made
     count: int = 0
-    spent: bool = False
+    own: dict = field(default_factory=dict)  #: {name: pace of these runs}: a head sea takes several times as long
 
-    def make(self, name, sets, fields=None):
-        """None where they are there, or the code of why they are not: "budget", "run_failed"."""
-        if self.left_out or self.spent:
-            return "left_out" if self.left_out else "budget"
-        why = self.runs.make(name, fields or self.fields, sets)
-        if SPENT in why:
-            self.spent = True
-            return "budget"
-        if any(why):
-            return "run_failed"
-        self.count += len(why)
+    def make(self, some, fields=None):
+        """Runs of {name: sets}, none of which is begun unless by the pace all end in time. None where they are there,
+        or the code of why they are not: "budget", "run_failed"."""
+        if self.left_out:
+            return "left_out"
+        fields = fields or self.fields
+        jobs = self.runs.jobs
+        rounds = [(name, fields[k:k + jobs]) for name in some for k in range(0, len(fields), jobs)]
+        for k, (name, here) in enumerate(rounds):
+            takes = sum(self.takes(other, some[other], these) for other, these in rounds[k:])
+            began = time.monotonic()
+            if takes > max(0.0, self.runs.end - began):
+                return "budget"
+            expected = self.takes(name, some[name], here)
+            why = self.runs.make(name, here, some[name])
+            if SPENT in why:
+                return "budget"
+            if any(why):
+                return "run_failed"
+            self.count += len(why)
+            if expected > 0:
+                self.own[name] = self.own.get(name, self.pace) * (time.monotonic() - began) / expected
         return None
+
+    def takes(self, name, sets, fields):
+        """s for the runs that are not there yet."""
+        missing = sum(not self.runs.kept(name, i, sets) for i in fields)
+        seconds = float(sets["run.duration"].split()[0]) if "run.duration" in sets else self.duration
+        return -(-missing // self.runs.jobs) * self.own.get(name, self.pace) * seconds
 
     def measured(self, name, measure, fields=None):
         """[measure(run)] of the fields."""
@@ -166,7 +187,10 @@ def start_ramp(t):
     above = t.value - t.mean
     by_inertia = t.mass * t.speed / above if above > 0 else np.inf
     if np.isfinite(t.spring):
-        return max(by_inertia, towing.ramp_for(t.value, t.speed, t.spring, t.mass, resistance=t.mean))
+        # the ice holds a body at rest; drag grows with its way, over many periods of the line, and sets off no swing.
+        # Rejected: drag as part of what holds it, which takes hours where drag is most of the load
+        drag = t.water + t.wind
+        return max(by_inertia, towing.ramp_for(t.value - drag, t.speed, t.spring, t.mass, resistance=t.ice))
     return by_inertia
 
 
@@ -237,7 +261,7 @@ def start(t, runs, say):
         name = f"start-{seconds:.6g}s"
         sets = {"tow.ramp": f"{seconds:.9g} s", "run.duration": f"{seconds + 4 * t.scale:.9g} s",
                 "output.window_start": f"{seconds:.9g} s"}
-        reason = runs.make(name, sets, runs.few)
+        reason = runs.make({name: sets}, runs.few)
         if reason:
             break
         n = max(runs.measured(name, lambda run: largest_mean(run, t.scale, 0.0, seconds + t.scale), runs.few))
@@ -299,7 +323,7 @@ def course_change(t, runs, degrees, radius):
             "output.window_start": f"{t.case_ramp + settle / 2:.9g} s"}
     values = {"angle_deg": degrees, "radius_m": r, "radius_given": bool(radius),
               "across_n": 0.0 if tension else t.mass * t.speed ** 2 / r}
-    if reason := runs.make("course-change", sets, runs.few):
+    if reason := runs.make({"course-change": sets}, runs.few):
         return none("course_change", reason, set=sets, values=values)
     begin = t.case_ramp + settle
     load = f"{stat_loads.TENSION}1" if tension else "tow_force"
@@ -340,7 +364,7 @@ def head_sea(t, runs, current=None, wind=None):
     sets = {f"water.current_{k}": f"{own[f'water.current_{k}'] - current * d[i]:.9g} m/s" for i, k in enumerate("xy")}
     sets |= {f"air.wind_{k}": f"{own[f'air.wind_{k}'] - wind * d[i]:.9g} m/s" for i, k in enumerate("xy")}
     values = {"current_m_s": current, "wind_m_s": wind, "given": given}
-    if reason := runs.make("base", {}) or runs.make("head-sea", sets):
+    if reason := runs.make({"base": {}, "head-sea": sets}):
         return none("head_sea", reason, set=sets, values=values)
     base, other = (runs.measured(name, mean_parts) for name in ("base", "head-sea"))
     if not np.isfinite([x for some in (base, other) for part in some for x in part.values()]).all():
@@ -366,13 +390,11 @@ def effect(t, r, runs):
         form = form_drag(t) if part == "water" else t.wind
         return out | {"by": "analytic", "n_per_tenth": assumed.TENTH * form,
                       "n_low": form * (float(r.low) / float(at) - 1), "n_high": form * (float(r.high) / float(at) - 1)}
-    reason = runs.make("base", {})
+    ends = {f"{key}-{end}": {key: getattr(r, end)} for end in ("low", "high")}
+    if reason := runs.make({"base": {}} | ends):
+        return out | {"by": "runs", "reason": reason}
     for end in ("low", "high"):
-        name = f"{key}-{end}"
-        reason = reason or runs.make(name, {key: getattr(r, end)})
-        if reason:
-            return out | {"by": "runs", "reason": reason}
-        base, other = (runs.measured(n, mean_parts) for n in ("base", name))
+        base, other = (runs.measured(n, mean_parts) for n in ("base", f"{key}-{end}"))
         n, ends, _ = changed(t, base, other)
         out |= {f"n_{end}": n - t.value, f"n_{end}_95": tuple(e - t.value for e in ends) if np.isfinite(ends).all()
                 else None}

@@ -23,7 +23,8 @@ REASONS = {
     "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above",
     "no_window": "no window that is long enough", "no_member": "no run",
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
-    "budget": "the budget was spent", "run_failed": "the run failed", "domain_too_short": "the domain is too short",
+    "budget": "the budget does not reach so far", "run_failed": "the run failed",
+    "domain_too_short": "the domain is too short",
     "case_has_path": "the case has a path of its own: it is in the steady tow",
     "case_has_programme": "the case has a programme of its own",
     "environment_from_table": "the case has current or wind from a table",
@@ -98,6 +99,10 @@ def _needs(v, a):
             f"{_over(a)}{_in_case(v, a)}{exceeded}")
 
 
+def _steady(v, a):
+    return _needs(v, a).replace("The tow", "The steady tow", 1)
+
+
 def _largest(v, a):
     return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v, a)}"
 
@@ -119,6 +124,8 @@ def _band(v, a):
     if v["low_n"] is None:
         return "What is assumed was not looked at"
     out = f"Over the ranges of what is assumed the steady tow needs {kn(v['low_n'])} to {kn(v['high_n'])} kN"
+    if v["without"]:
+        out += f", without {' and '.join(v['without'])}, whose effect is not known"
     drag = next((r for r in a["assumed"] if r["key"] == "body.drag.water_form" and known(r["n_per_tenth"])), None)
     if drag:
         out += f"; each 10 % of the water's drag coefficient is worth {kn(drag['n_per_tenth'])} kN"
@@ -172,7 +179,7 @@ def _against_weather(v, a):
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
-WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest,
+WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest, "steady": _steady,
          "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
          "start": _start,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
@@ -268,7 +275,8 @@ def plan(p):
 
 def took(a, markdown):
     c = a["cost"]
-    rows = [["wall time", f"{short(c['wall_s'] / 60, 2)} min"], ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
+    rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
+            ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
             ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
     return table(["what", "took"], rows, markdown)
 

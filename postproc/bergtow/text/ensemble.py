@@ -210,6 +210,11 @@ def sensitivity(s, markdown):
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
 
+def in_conditions(s):
+    n = len(s["conditions"])
+    return f"{n} condition{'s' * (n != 1)}"
+
+
 def counted(n):
     return f"{n} member{'' if n == 1 else 's'}"
 
@@ -223,7 +228,7 @@ def report(s, markdown=False):
     lines = [
         f"{mark}{s['title']}", "", heading("Design tow force"), "", loads_text.design(s, markdown), "",
         heading("Members"), "",
-        (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."
+        (f"{n} of " if n < whole else "") + f"{counted(whole)} in {in_conditions(s)}."
     ]
     if s["waiting"]:
         lines.append(
