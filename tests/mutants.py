@@ -317,6 +317,8 @@ MUTANTS = {
     ]),
     "src/solve/rounds.c": (SOLVE + ["unit/test_rounds", COPIES, "scenes:few_sweeps,periodic_dense"], [
         ("if (!(m->against <= 0)) {", "if (m->against > 1e300) {", "momentum never restarts"),
+        ("small *= bt_max(LEAST_LOWERED, BT_NEAR * problem->tolerance / work->residual);", ";",
+         "rounds of one sweep after a small update"),
         ("0.5 * (1 + sqrt(1 + 4 * m->theta * m->theta))", "m->theta + 1", "another momentum"),
         ("now = now + beta * (now - last);", "now = now + beta * beta * (now - last);", "bodies have less momentum"),
         ("memcpy(&before[i], &now, sizeof now);", "", "what was before the first sweep stays"),

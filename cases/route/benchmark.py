@@ -3,11 +3,14 @@
 """What a planned route gains against the straight line, field by field: concentration x width of the berg / size of the
 floes, one tow each of the straight line and of the planned routes through the ice that they were planned on.
 
-    /usr/bin/python3 cases/route/benchmark.py [-o DIR] [--fields N] [--minutes M] [--ratios 1,3,10]
+    /usr/bin/python3 cases/route/benchmark.py [-o DIR] [--fields N] [--minutes M] [--ratios 1,3,10] [--again]
 
 Goes on where it stopped: a field that is done is not towed again. Perfect knowledge of the ice: an upper bound of
 the gain. The route is the planner's first choice, which may be the straight line, whatever its tow says, so that
 nothing is chosen after the fact.
+
+--again tows every route twice more, through members of the map with the default errors. The rank correlation of these
+two tows is what a prediction can hope for: no cost ranks routes better than the same route ranks itself.
 """
 import argparse
 import contextlib
@@ -49,9 +52,9 @@ def case(out):
     return path
 
 
-def one(out, concentration, ratio, field, end):
+def one(out, concentration, ratio, field, end, members=1):
     """route.json of a field, made unless it is there; None where it is not, after the end."""
-    folder = out / f"c{round(100 * concentration):02d}-r{ratio}" / f"f{field:03d}"
+    folder = out / f"c{round(100 * concentration):02d}-r{ratio}" / f"f{field:03d}{'-again' if members > 1 else ''}"
     try:
         found = json.loads((folder / "route.json").read_text(encoding="utf-8"))
         if found["verdict"]:
@@ -61,7 +64,7 @@ def one(out, concentration, ratio, field, end):
     if time.monotonic() > end:
         return None
     with contextlib.redirect_stdout(io.StringIO()):
-        return bergtow.route(case(out), folder, to=((2 + WAY) * WIDTH, 0), members=1, routes=2, no_page=True,
+        return bergtow.route(case(out), folder, to=((2 + WAY) * WIDTH, 0), members=members, routes=2, no_page=True,
                              set=settings(concentration, ratio, field), force=True)
 
 
@@ -86,6 +89,13 @@ def row(concentration, ratio, some):
             "gain_95": {n: [float(v) for v in t_interval(np.array(g))] for n, g in gains.items()}}
 
 
+def of_itself(some):
+    """Rank correlation of the work of two tows of a route, over all routes; nan below three."""
+    x = np.array([[m["work"] for m in r["members"]] for found in some for r in found["routes"]
+                  if all(m["arrived"] for m in r["members"])])
+    return float(scipy.stats.spearmanr(*x.T)[0]) if len(x) > 2 else np.nan
+
+
 def percent(mean, ends):
     return "–" if mean != mean else f"{100 * mean:+.1f}" + (
         "" if ends[0] != ends[0] else f" ({100 * ends[0]:+.1f} to {100 * ends[1]:+.1f})")
@@ -98,26 +108,30 @@ def main():
     p.add_argument("--concentrations", default="0.2,0.4,0.6,0.8")
     p.add_argument("--ratios", default="1,3,10", help="width of the berg / size of the floes")
     p.add_argument("--minutes", type=float, default=60, help="after which no field is begun")
+    p.add_argument("--again", action="store_true", help="tow every route twice more, with errors of the map")
     a = p.parse_args()
     a.output.mkdir(parents=True, exist_ok=True)
-    end, done = time.monotonic() + 60 * a.minutes, {}
+    end, done, again = time.monotonic() + 60 * a.minutes, {}, {}
     for field in range(a.fields):  # every condition has as many as the others, whenever it ends
         for ratio in map(int, a.ratios.split(",")):
             for concentration in map(float, a.concentrations.split(",")):
                 try:
                     found = one(a.output, concentration, ratio, field, end)
+                    twice = one(a.output, concentration, ratio, field, end, 2) if a.again else None
                 except bergtow.BergtowError as error:
                     print(f"{concentration:g}, {ratio}, field {field}: {error}", file=sys.stderr)
                     continue
                 if found:
                     done.setdefault((concentration, ratio), []).append(found)
-    rows = [row(*key, some) for key, some in sorted(done.items())]
+                if twice:
+                    again.setdefault((concentration, ratio), []).append(twice)
+    rows = [row(*key, some) | {"of_itself": of_itself(again.get(key, []))} for key, some in sorted(done.items())]
     write_json({"conditions": rows}, a.output / "benchmark.json", True)
     print(table(["ice, %", "width / floe", "fields", "straight is planned", "lost to straight",
-                 "less work, % (95 %)", "less time, %", "lower peak, %", "rank correlation"],
+                 "less work, % (95 %)", "less time, %", "lower peak, %", "rank correlation", "of two tows"],
                 [[f"{100 * r['concentration']:.0f}", str(r["ratio"]), str(r["fields"]),
                   str(r["straight"]), f"{r['lost']} of {r['fields'] - r['straight']}",
-                  *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}"]
+                  *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}", f"{r['of_itself']:.2f}"]
                  for r in rows], True))
 
 

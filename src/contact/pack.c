@@ -210,7 +210,8 @@ uint64_t bt_contacts_load(const bt_cell *cell)
 {
     uint64_t sum = 0;
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        const double x[3] = {cell->contacts[i].ln[0], cell->contacts[i].ln[1], cell->contacts[i].lt};
+        // + 0: a contact that bears nothing has 0 or −0, and −0 goes when it is made anew
+        const double x[3] = {cell->contacts[i].ln[0] + 0.0, cell->contacts[i].ln[1] + 0.0, cell->contacts[i].lt + 0.0};
         uint64_t bits[3];
         memcpy(bits, x, sizeof bits);
         sum += bits[0] + bits[1] + bits[2];

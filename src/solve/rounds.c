@@ -20,6 +20,7 @@
 #define NO_MOMENTUM 0.3 // of the limit of work, beyond it: without momentum
 #define HARD 0.5        // of the limit of work: from here on the best unknowns are kept
 #define FAR 4           // tolerances: a residual that is not left at the limit of work
+#define LEAST_LOWERED 0.5 // of the update that ends a round
 #define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MORE = 2 };
 
@@ -289,11 +290,10 @@ static void gather(double cap, momentum *m)
     }
 }
 
-/// With `on`, the momentum of the round before goes on. Returns true when the last update was small.
+/// With `on`, the momentum of the round before goes on. Returns true when the last update was no more than `small`.
 static bool run_round(bt_world *world, const bt_problem *problem, int length, double cap, bool on, double limit,
-                      momentum *m, bt_work *work)
+                      double small, momentum *m, bt_work *work)
 {
-    const double small = problem->plain ? problem->tolerance : BT_NEAR * problem->tolerance;
     if (!on) *m = (momentum){.theta = 1};
     for (int n = 0;; n++) {
         const bool moves_on = !problem->plain && (n > 0 || on);
@@ -363,7 +363,7 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
     }
     pace a = {.cap = problem->cap, .mark = INFINITY, .length = problem->plain ? INT_MAX : problem->length};
     momentum m = {.theta = 1};
-    double best = INFINITY;
+    double best = INFINITY, small = (problem->plain ? 1 : BT_NEAR) * problem->tolerance; // update that ends a round
     const double all_work = problem->limit * (problem->plain ? 1 : (double)(work->contacts + 1));
     // between the two no momentum
     double fast = spent(problem, work) + all_work, limit = fast + (problem->plain ? 0 : NO_MOMENTUM * all_work);
@@ -380,9 +380,12 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
         const bool part = !problem->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed,
                    on = all && !part && !settled;
         if (part) keep_near_bad(world);
-        settled = run_round(world, problem, a.length, a.cap, on, last ? limit : fast, &m, work) && !part;
+        const bool ended = run_round(world, problem, a.length, a.cap, on, last ? limit : fast, small, &m, work);
+        settled = ended && !part;
         all = !part;
         bt_rounds_residual(world, problem, settled ? BT_SETTLES : BT_SWEPT, work);
+        if (ended && !problem->plain && work->residual > problem->tolerance)
+            small *= bt_max(LEAST_LOWERED, BT_NEAR * problem->tolerance / work->residual);
         if (problem->keep && !problem->plain && spent(problem, work) > fast - HARD * all_work)
             keep_better(world, problem, work, &best);
         if (!settled && work->residual <= problem->tolerance) {

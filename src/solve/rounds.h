@@ -16,6 +16,12 @@
 // combination, so each body needs but its velocity before, no impulse is applied again, and ghosts, which have the same
 // velocities, are moved alike without a message.
 //
+// A round ends early once an update is small: no more than 0.7 of the tolerance. The residual of a contact is what its
+// own exact solution would change, whatever its neighbours do; along a chain that moves slowly it is a few times the
+// update, and the factor hardly changes. So where the residual is still too large the update that ends a round is
+// lowered by that factor, by no more than a half at a time. Otherwise each of the next rounds is one sweep without
+// momentum between two residual passes (the dearest step at 95 % took 80 such rounds).
+//
 // The momentum goes on from round to round: a contact that leaves or enters the lists, and a floe that they newly
 // reach, is at rest then. It starts anew where velocities have been formed from the impulses, and around a round over a
 // part of the field.

@@ -307,8 +307,8 @@ def test_a_closed_box_locks(tmp_path, friction):
 
 def test_locks_are_the_same_on_ranks_and_after_a_resume(tmp_path):
     """Red when loads without a number are refused in a checkpoint, or ranks prove different things."""
-    write_case(tmp_path, jam(1, 0.9, output={"window_start": 0, "panels": True, "sample_every": 2,
-                                                "frame_interval": 0.1}))
+    write_case(tmp_path, jam(1, 0.9, run__duration=3.2, output={"window_start": 0, "panels": True,
+                                                                  "sample_every": 2, "frame_interval": 0.1}))
     done(1, "run", tmp_path / "case.yml", "-o", tmp_path / "whole", "--quiet")
     whole = Run(tmp_path / "whole", None)
     assert whole.summary["no_load_steps"] > 3

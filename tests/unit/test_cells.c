@@ -207,7 +207,7 @@ static bt_world *tow_in_current(double u, double v, double speed, int steps, int
     p.water_v = p.air_v = v;
     bt_world *w = bt_world_create(&p);
     add_field(w, 6.5, 0.5, 50, SIDE, u, v);
-    add_hitter(w, 2, 3, 10.3, u + speed, v, BT_KINEMATIC, true);
+    add_hitter(w, 2, 3, 10.4, u + speed, v, BT_KINEMATIC, true);
     *active = *points = 0;
     for (int n = 0; n < steps; n++) {
         bt_world_step(w);
