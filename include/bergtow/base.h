@@ -57,6 +57,12 @@ void bt_errors_free(bt_errors *err);
 /// All messages of `from` behind those of `to`; from is empty then.
 void bt_errors_move(bt_errors *to, bt_errors *from);
 
+/// Ending of a noun that n counts.
+static inline const char *bt_plural(int64_t n)
+{
+    return n == 1 ? "" : "s";
+}
+
 /// malloc/realloc/calloc that end the program with a message and BT_ERR_NUMERIC when memory runs out.
 void *bt_alloc(size_t n, size_t size);             ///< zeroed
 void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size

@@ -306,15 +306,16 @@ static void print_study(const bt_study *study, const numbers *sums, const bt_err
     printf("base                 %s\n", study->base);
     print_sets("set", study->set, study->n_set);
     print_varied(study);
-    printf("members              %" PRId64 " conditions x %" PRId64 " fields = %" PRId64 "%s%s", study->n_conditions,
-           study->repeats, bt_study_n_members(study), study->sampling == BT_SAMPLING_LATIN_HYPERCUBE
+    printf("members              %" PRId64 " condition%s x %" PRId64 " field%s = %" PRId64 "%s%s", study->n_conditions,
+           bt_plural(study->n_conditions), study->repeats, bt_plural(study->repeats), bt_study_n_members(study),
+           study->sampling == BT_SAMPLING_LATIN_HYPERCUBE
            ? ", a Latin hypercube" : "", study->common_fields ? ", the same fields in all conditions" : "");
     if (study->ranks > 1) printf(", %" PRId64 " ranks each", study->ranks);
     printf("\n");
     if (fixed)
-        printf("                     in %" PRId64 " conditions the ice does not depend on the seed, as it is read, or "
+        printf("                     in %" PRId64 " condition%s the ice does not depend on the seed, as it is read, or "
                "there is none: the fields of each are one run\n",
-               fixed);
+               fixed, bt_plural(fixed));
     if (study->n_conditions <= MOST_ROWS) print_table(study, sums);
     else print_range(study, sums);
     print_work(study, memory, disk, seconds, ranks);

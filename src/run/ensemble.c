@@ -272,7 +272,7 @@ static bool wait_for_others(bt_ensemble *ensemble, bool reported)
     bt_comm_bcast(ensemble->world, &n, sizeof n);
     if (n == 0) return false;
     if (!reported && !ensemble->o->quiet && ensemble->jobs == 1 && ensemble->world->rank == 0) {
-        printf("waiting for %" PRId64 " members that other processes are at work on (--no-wait does not)\n", n);
+        printf("waiting for %" PRId64 " member%s at work in other processes (--no-wait does not)\n", n, bt_plural(n));
         fflush(stdout);
     }
     nanosleep(&(struct timespec){.tv_nsec = 500000000}, NULL);
@@ -369,9 +369,10 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     bt_ensemble_count_settled(&ensemble);
     share_cores(&ensemble, open);
     if (comm->rank == 0 && !options->quiet && !options->job) {
-        printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64
+        printf("%" PRId64 " member%s: %" PRId64 " condition%s x %" PRId64 " field%s, %" PRId64
                " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
-               ensemble.n, study->n_conditions, study->repeats, ensemble.before, ensemble.n_groups * ensemble.jobs,
+               ensemble.n, bt_plural(ensemble.n), study->n_conditions, bt_plural(study->n_conditions), study->repeats,
+               bt_plural(study->repeats), ensemble.before, ensemble.n_groups * ensemble.jobs,
                study->ranks, ensemble.threads);
         fflush(stdout);
     }

@@ -398,23 +398,25 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
         if (worst == BT_OK) worst = of;
     }
     if (n.failed > BT_MOST_REPORTED)
-        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt",
-                      n.failed - BT_MOST_REPORTED, ensemble->o->dir);
+        bt_errors_add(err, "and %" PRId64 " more failed member%s; see %s/members/*/failed.txt",
+                      n.failed - BT_MOST_REPORTED, bt_plural(n.failed - BT_MOST_REPORTED), ensemble->o->dir);
     if (n.unsound > BT_MOST_REPORTED)
-        bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - BT_MOST_REPORTED);
+        bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MOST_REPORTED,
+                      bt_plural(n.unsound - BT_MOST_REPORTED));
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " members that are left",
-                      bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left);
+        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " member%s left",
+                      bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left,
+                      bt_plural(n.left));
     else if (n.at_work)
         bt_errors_add(err,
-                      "%" PRId64 " members are being worked on by other processes; the same call takes them in when "
-                      "those have ended",
-                      n.at_work);
+                      "%" PRId64 " member%s at work in other processes; the same call takes in what those finish", n.at_work,
+                      bt_plural(n.at_work));
     else if (n.left && worst == BT_OK)
-        bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
+        bt_errors_add(err, "%" PRId64 " member%s left; the same call runs the rest", n.left, bt_plural(n.left));
     if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
     if (!ensemble->o->quiet) {
-        printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
+        printf("%" PRId64 " member%s finished, %" PRId64 " failed, %" PRId64 " left", n.finished, bt_plural(n.finished),
+               n.failed, n.left);
         if (n.unsound) printf(", %" PRId64 " not sound", n.unsound);
         printf("; %s/ensemble.h5\n", ensemble->o->dir);
         report_warnings(ensemble);

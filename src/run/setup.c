@@ -624,7 +624,7 @@ static bool check_apart(const bt_case *input, bt_world *world, const bt_roster *
                   "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g "
                   "m), deepest %s and %s; move or "
                   "shrink the floes given by hand, or make the field for this body and domain",
-                  input->path ? input->path : "case", (long long)overlaps.pairs, overlaps.pairs == 1 ? "" : "s",
+                  input->path ? input->path : "case", (long long)overlaps.pairs, bt_plural(overlaps.pairs),
                   overlaps.deepest, allowed, a, b);
     return false;
 }

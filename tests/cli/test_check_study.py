@@ -84,7 +84,7 @@ def test_many_conditions_are_a_range(tmp_path):
     assert "\ncondition" not in text and line(text, "floes") == " to ".join(floes) and line(
         text, "one run") == f"rough estimate {one[0]} to {one[1]} on one core"
     assert re.match(r"TOO LARGE in \d+ conditions", line(text, "time step")) and line(
-        text, "members") == "40 conditions x 1 fields = 40"
+        text, "members") == "40 conditions x 1 field = 40"
     assert line(text, "tow.speed").endswith("... 0.9 (20 values)")
 
 
@@ -98,7 +98,7 @@ def test_a_hypercube_and_variants(tmp_path):
     assert line(text, "ice.friction") == "log-uniform from 0.1 to 0.4" and line(
         text, "variant") == "squares, cells" and line(text, "  squares") == "ice.shape=rectangles, ice.aspect=1"
     assert line(text, "members"
-                ) == "30 conditions x 1 fields = 30, a Latin hypercube, the same fields in all conditions, 2 ranks each"
+                ) == "30 conditions x 1 field = 30, a Latin hypercube, the same fields in all conditions, 2 ranks each"
 
 
 def test_ends_of_a_distribution_stand_with_their_unit(tmp_path):

@@ -289,12 +289,12 @@ def test_a_member_that_another_run_is_at_stays_open(tmp_path):
     run_lock = open(member / "run.lock", "w")  # as src/base/fileio.c has it
     fcntl.flock(run_lock, fcntl.LOCK_EX)
     result = ensemble(tmp_path, "--no-wait")
-    assert result.returncode == SIGNAL and "1 members are being worked on by other processes" in result.stderr, result
+    assert result.returncode == SIGNAL and "1 member at work in other processes" in result.stderr, result
     assert not (member / "failed.txt").exists() and statuses(tmp_path)["c002-r001"] == 0
     assert "2 members finished, 0 failed, 1 left" in result.stdout
     waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
                                env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
-    assert any("waiting for 1 members" in line for line in waiting.stdout)
+    assert any("waiting for 1 member at work" in line for line in waiting.stdout)
     run_lock.close()
     out = waiting.communicate(timeout=60)[0]
     assert waiting.returncode == DONE and "3 members finished, 0 failed, 0 left" in out

@@ -80,7 +80,7 @@ def test_so_many_steps_of_each_member_in_a_call(quiet, tmp_path, ranks):
                                  "80"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), capture_output=True,
                                 text=True, timeout=120)
         if k < 2:
-            assert result.returncode == SIGNAL and "12 members are left; the same call goes on" in result.stderr
+            assert result.returncode == SIGNAL and "12 members left; the same call runs the rest" in result.stderr
             done = [json.loads(p.read_text())["n_steps"] for p in tmp_path.glob("all/members/*/summary.json")]
             assert done == [80 * (k + 1)] * 12
             assert not list(tmp_path.glob("all/members/*/finished"))

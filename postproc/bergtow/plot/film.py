@@ -90,7 +90,7 @@ class Film:
             draw_ice(axes, run, self.factor, unit)
         axes.set_xlabel("time (s)")
         for line in axes.lines:
-            if line.get_label().startswith("running mean"):
+            if line.get_gid() == "running mean":
                 line.set_alpha(0.35)
         self.past = Line2D([], [], color=style.ICE, linewidth=2.2, zorder=5, animated=True)
         self.cursor = Line2D([], [], color=style.INK, linewidth=1.0, zorder=6, animated=True)

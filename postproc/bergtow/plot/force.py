@@ -66,7 +66,8 @@ def draw_ice(axes, run, factor, unit, top=None):
     many = len(time) > 2000
     axes.plot(time, ice / factor, color=style.ICE, alpha=0.22 if many else 0.45, linewidth=0.6 if many else 0.8,
               label="each sample", rasterized=len(time) > style.MANY)
-    axes.plot(time, smooth / factor, color=style.ICE, label=f"running mean over {style.short(seconds, 2)} s")
+    axes.plot(time, smooth / factor, color=style.ICE, gid="running mean",
+              label=f"running mean over {style.short(seconds, 2)} s")
     if np.isfinite(mean) and run.window:
         start, end = run.window
         steady = run.verdict[0] == "steady"

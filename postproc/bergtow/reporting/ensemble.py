@@ -231,7 +231,7 @@ def kinds_of_warnings(some):
     for row in some:
         for kind, text in reversed(row["kinds"].items()):
             found.setdefault(kind, [text, 0])[1] += 1
-    return [f"{text} ({n} member{'s' if n > 1 else ''})" for text, n in found.values()]
+    return [f"{text} ({ensemble_text.counted(n)})" for text, n in found.values()]
 
 
 def study_text(e):
