@@ -409,8 +409,8 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
                       bt_plural(n.left));
     else if (n.at_work)
         bt_errors_add(err,
-                      "%" PRId64 " member%s at work in other processes; the same call takes in what those finish", n.at_work,
-                      bt_plural(n.at_work));
+                      "%" PRId64 " member%s at work in other processes; the same call takes in what those finish",
+                      n.at_work, bt_plural(n.at_work));
     else if (n.left && worst == BT_OK)
         bt_errors_add(err, "%" PRId64 " member%s left; the same call runs the rest", n.left, bt_plural(n.left));
     if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
