@@ -10,7 +10,7 @@ the gain. The route is the planner's first choice, which may be the straight lin
 nothing is chosen after the fact.
 
 --again tows every route twice more, through members of the map with the default errors. The rank correlation of these
-two tows is what a prediction can hope for: no cost ranks routes better than the same route ranks itself.
+two tows says what a prediction can hope for: one that knew the mean of every route would have about its root.
 """
 import argparse
 import contextlib
