@@ -93,6 +93,18 @@ static void add(load_list *list, const load_row *row)
     list->row[list->n++] = *row;
 }
 
+/// `more` is given away: the first list is not copied.
+static void append(load_list *list, load_list *more)
+{
+    if (list->n == 0) {
+        free(list->row);
+        *list = *more;
+        return;
+    }
+    for (size_t k = 0; k < more->n; k++) add(list, &more->row[k]);
+    free(more->row);
+}
+
 static bool may_split(const bt_world *world, bt_idx i)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -287,8 +299,7 @@ static void add_cells(bt_world *world, pass what, load_list *to)
 #pragma omp for schedule(dynamic, 16) nowait
         for (bt_idx i = 0; i < cells->n_order; i++) add_cell(world, &cells->cell[cells->order[i]], what, &mine);
 #pragma omp critical
-        for (size_t i = 0; i < mine.n; i++) add(to, &mine.row[i]);
-        free(mine.row);
+        append(to, &mine);
     }
 }
 
