@@ -131,7 +131,8 @@ def main():
                  "less work, % (95 %)", "less time, %", "lower peak, %", "rank correlation", "of two tows"],
                 [[f"{100 * r['concentration']:.0f}", str(r["ratio"]), str(r["fields"]),
                   str(r["straight"]), f"{r['lost']} of {r['fields'] - r['straight']}",
-                  *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}", f"{r['of_itself']:.2f}"]
+                  *(percent(r["gain"][n], r["gain_95"][n]) for n in NAMES), f"{r['rank_correlation']:.2f}",
+                  f"{r['of_itself']:.2f}"]
                  for r in rows], True))
 
 

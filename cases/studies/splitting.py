@@ -77,8 +77,9 @@ def long(a):
             way = 0.5 * times[k] / 1e3
             axes.step(size, np.arange(1, len(size) + 1), label=f"{way:.1f} km")
             before = r.splits["time"] <= times[k]
-            rows.append([f"{way:.1f}", str(len(size)), str(int(before.sum())), f"{size[np.searchsorted(share, 0.5)]:.1f}",
-                         f"{np.quantile(size, 0.1):.1f}", f"{size.min():.1f}"])
+            rows.append([f"{way:.1f}", str(len(size)), str(int(before.sum())),
+                         f"{size[np.searchsorted(share, 0.5)]:.1f}", f"{np.quantile(size, 0.1):.1f}",
+                         f"{size.min():.1f}"])
         crack = r.summary["splitting"]["crack_length_m"]
     axes.set(xscale="log", yscale="log", xlabel="size √A, m", ylabel="floes of this size and more")
     axes.legend(title="tow")
