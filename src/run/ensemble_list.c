@@ -404,7 +404,7 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
         bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MOST_REPORTED,
                       bt_plural(n.unsound - BT_MOST_REPORTED));
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " member%s left",
+        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " remaining member%s",
                       bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left,
                       bt_plural(n.left));
     else if (n.at_work)

@@ -165,7 +165,7 @@ def from_layer(path, source, how):
             add_feature(found, feature, column)
     except RuntimeError as error:
         raise RunError(path, f"cannot be read ({first_line(error)})",
-                       "mend --where, or the file (ogrinfo tells more)") from None
+                       f"mend {'--where, or ' if how.where else ''}the file (ogrinfo tells more)") from None
     if how.stairs == "undo":
         retrace(found.shapes)
     if not found.shapes:

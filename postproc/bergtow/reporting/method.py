@@ -13,7 +13,7 @@ from bergtow.stats import profile as stat_profile
 from bergtow.table import number, quantity
 from bergtow.text import capability as capability_text
 from bergtow.text import loads as loads_text
-from bergtow.text.ensemble import in_conditions
+from bergtow.text.ensemble import counted
 
 KAPPA, PRESSURE = "ice.rafting.kappa", "ice.crushing.pressure"
 
@@ -36,7 +36,7 @@ def _amount(s, cases):
     """The amount of simulation, in a sentence."""
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
     n = sum(c["members"]["used"] for c in s["conditions"])
-    said = f"{n} tows in {in_conditions(s)}{_fields(s, cases)}"
+    said = f"{n} tows in {counted(len(s['conditions']), 'condition')}{_fields(s, cases)}"
     if tows:
         fields, hours = _span([d["fields"] for d in tows]), _span([d["hours"] for d in tows], number)
         said += f"; {fields} fields and {hours} hours of tow a condition, the start-up left out"

@@ -97,8 +97,8 @@ class Runs:
     own: dict = field(default_factory=dict)  #: {name: pace of these runs}: a head sea takes several times as long
 
     def make(self, some, fields=None):
-        """Runs of {name: sets}, none of which is begun unless by the pace all end in time. None where they are there,
-        or the code of why they are not: "budget", "run_failed"."""
+        """Runs of {name: sets}. They begin only if, at the pace measured so far, all end in time. None where they are
+        there, or the code of why they are not: "budget", "run_failed"."""
         if self.left_out:
             return "left_out"
         fields = fields or self.fields

@@ -91,16 +91,16 @@ def _in_case(v, a):
     return case + "".join(f" ({c['label']})" for c in here if c["id"] == of and len(here) > 1)
 
 
-def _needs(v, a):
+def _needs(v, a, tow="The tow"):
     interval = ends(v["n"], v["interval_95"])
     exceeded = f", which {percent(a['asked']['probability'])} of tows of {short(a['asked']['tow_hours'], 2)} h exceed" \
         if v["kind"] == "return_level" else ""
-    return (f"The tow needs {force(v['n'])}{f' (95 % interval over fields: {interval} kN)' if interval else ''} "
+    return (f"{tow} needs {force(v['n'])}{f' (95 % interval over fields: {interval} kN)' if interval else ''} "
             f"{_over(a)}{_in_case(v, a)}{exceeded}")
 
 
 def _steady(v, a):
-    return _needs(v, a).replace("The tow", "The steady tow", 1)
+    return _needs(v, a, "The steady tow")
 
 
 def _largest(v, a):

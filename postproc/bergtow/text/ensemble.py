@@ -198,7 +198,7 @@ def sensitivity(s, markdown):
         *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))
     ]
     notes = [(f"{counted(x['members'])}. " if x["of"] == "members" else
-              f"Means of {x['samples']} conditions, of {counted(x['members'])}. ") + "Brackets: 95 %."]
+              f"Means of {counted(x['samples'], 'condition')}, of {counted(x['members'])}. ") + "Brackets: 95 %."]
     for of, k in kinds:
         notes.append(
             f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
@@ -210,13 +210,8 @@ def sensitivity(s, markdown):
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
 
-def in_conditions(s):
-    n = len(s["conditions"])
-    return f"{n} condition{'s' * (n != 1)}"
-
-
-def counted(n):
-    return f"{n} member{'' if n == 1 else 's'}"
+def counted(n, noun="member"):
+    return f"{n} {noun}{'' if n == 1 else 's'}"
 
 
 def report(s, markdown=False):
@@ -228,7 +223,7 @@ def report(s, markdown=False):
     lines = [
         f"{mark}{s['title']}", "", heading("Design tow force"), "", loads_text.design(s, markdown), "",
         heading("Members"), "",
-        (f"{n} of " if n < whole else "") + f"{counted(whole)} in {in_conditions(s)}."
+        (f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."
     ]
     if s["waiting"]:
         lines.append(
