@@ -498,13 +498,35 @@ def test_the_vessel_has_to_hold_the_largest_load_case():
     """Red: "can tow" by the steady tow, beside a bollard pull that the design value does not leave."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
     some = [{"speed_m_s": 0.5, "needs_n": 2e5, "has_n": 4.9e5, "feasible": "yes"}]
-    def case(name, n, interval=None):
-        return {"id": name, "n": n, "interval_95": interval}
+    def case(name, n, interval=None, kind="changed"):
+        return {"id": name, "n": n, "interval_95": interval, "kind": kind}
     t = tow(water=1e5, wind=0.0)
     assert answer.feasible(some, 0.5, v, 1.0, t, case("case.steady", 2e5))["not_above_m_s"] > 0.5
-    for n, interval, verdict in ((6e5, None, "no"), (3e5, None, "yes"), (4e5, (3e5, 6e5), "open")):
+    for n, interval, verdict in ((6e5, None, "no"), (3e5, (2e5, 4e5), "yes"), (4e5, (3e5, 6e5), "open")):
         found = answer.feasible(some, 0.5, v, 1.0, t, case("case.head_sea", n, interval))
         assert (found["verdict"], found["not_above_m_s"]) == (verdict, None)
+
+
+def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
+    """The largest of two course changes outranks the fitted value of the steady tow: a larger one can come, and the
+    upper end of the steady tow's interval counts all the same. Red: "can tow", by two runs."""
+    v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
+    def row(n, kind, interval=None):
+        return {"id": "case.course_change", "speed_m_s": 0.5, "concentration": 0.7, "value": {
+            "n": n, "kind": kind, "interval_95": interval}, "n": n, "kind": kind, "interval_95": interval}
+    def verdict(steady, top):
+        return answer.feasible(answer.speeds([steady], v, 1.0), 0.5, v, 1.0, tow(), top)["verdict"]
+    sure, bound = row(3e5, "return_level", (2e5, 4e5)), row(3.5e5, "largest_of_n")
+    assert verdict(sure, bound) == "open" and verdict(sure, row(6e5, "largest_of_n")) == "no"
+    assert verdict(row(3e5, "return_level", (2e5, 6e5)), row(3.5e5, "changed", (3e5, 4e5))) == "open"
+    for kind, feasible in (("largest_of_n", "open"), ("at_least", "open"), ("constant", "yes")):
+        assert answer.speeds([row(3e5, kind)], v, 1.0)[0]["feasible"] == feasible
+    a = json.loads(json.dumps(made))
+    found = next(c for c in a["load_cases"] if c["id"] == "case.course_change")
+    assert found["values"]["share_below"] == pytest.approx(0.05 ** 0.5)
+    assert "largest simulated of 2 ‡" in words.load_cases(a, False)
+    assert "of 2 runs: a lower bound, below which at least 22 % of such runs" in words.WORDS["needs_largest"](
+        {"n": found["n"], "case": found["id"]}, a)
 
 
 def bend(**case):

@@ -31,6 +31,7 @@ from bergtow.study.runs import checked
 import numpy as np
 
 FORMAT = 1
+LOWER = "largest_of_n", "at_least", "changed"  # kinds of loads that nothing bounds from above without an interval
 HALF = 0.5               # of a run is its window, where the case does not say where that begins: assumed
 #: parts of a mean tow force: name, key of the summary; None: parts of the drag
 PARTS = (("ice", "mean_ice_resistance_n"), ("water", None), ("wind", None),
@@ -222,6 +223,11 @@ def steady_case(row):
                           interval_95=value.get("interval_95"), reason=value.get("reason"))
 
 
+def bounds(row):
+    """Ends of a load for a verdict. The largest of a few runs is a lower bound, which no pull is known to hold."""
+    return row.get("interval_95") or ((row["n"], None) if row["kind"] in LOWER else None)
+
+
 def speeds(rows, v, efficiency):
     """What the hardest ice of each speed needs, against what the vessel has."""
     out = []
@@ -233,20 +239,21 @@ def speeds(rows, v, efficiency):
         value = r["value"]
         out.append({"id": f"speed.{len(out) + 1}", "of": r["id"], "speed_m_s": speed, "needs_n": value["n"],
                     "kind": value["kind"], "interval_95": value.get("interval_95"), "has_n": has,
-                    "feasible": gear.verdict(value["n"], value.get("interval_95"), has)})
+                    "feasible": gear.verdict(value["n"], bounds(value), has)})
     return out
 
 
 def feasible(some, asked, v, efficiency, t, top=None):
     """Can the vessel do it at the speed that is asked, and up to which? Where another load case than the steady tow,
-    top, asks for more, the vessel has to hold that, and up to which speed it does nobody has looked at."""
+    top, asks for more, the vessel has to hold both, and up to which speed it does nobody has looked at."""
     here = next((s for s in some if math.isclose(s["speed_m_s"], asked, rel_tol=1e-6)), None)
     out = {"id": "feasible", "speed_m_s": asked, "verdict": here["feasible"] if here else "not_asked",
            "not_above_m_s": None, "by": None, "reason": None}
     if not np.isfinite(v.pull):
         return out | {"verdict": "not_asked", "reason": "no_vessel"}
     if here and here["feasible"] != "no" and top and top["id"] != "case.steady":
-        return out | {"verdict": gear.verdict(top["n"], top["interval_95"], here["has_n"]), "reason": "other_load_case"}
+        return out | {"verdict": min(here["feasible"], gear.verdict(top["n"], bounds(top), here["has_n"]),
+                                     key=("no", "open", "yes").index), "reason": "other_load_case"}
     if len(some) > 1:
         limit = gear.limit_speed([s["speed_m_s"] for s in some], [s["needs_n"] for s in some],
                                  [s["has_n"] for s in some])
@@ -316,7 +323,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
               "needed_interval_95": needed[1:] or None, "needed_t": needed[0] / gear.TONNE,
               "speed_m_s": asked["speed_m_s"], "free_speed_m_s": v.free_speed, "free_speed_from": v.free_from,
               "efficiency": efficiency, "given_n": v.pull, "has_n": pull,
-              "holds": gear.verdict(n, interval, pull), "own_resistance": None, "needed_with_ice_n": None}
+              "holds": gear.verdict(n, top and bounds(top), pull), "own_resistance": None, "needed_with_ice_n": None}
     own = gear.own_resistance(v, case_value(t.case, "ice.thickness", 0.0), worst["concentration"],
                               asked["speed_m_s"]) if t else None
     if own:
@@ -326,7 +333,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     line = {"id": "line", "name": l.name or None, "row": hold and hold["id"], "design_tension_n": load,
             "factor": factor, "needed_breaking_load_n": load * (factor or 1.0), "given_n": l.breaking,
             "utilisation": load * (factor or 1.0) / l.breaking,
-            "holds": gear.verdict(load * (factor or 1.0), None, l.breaking)}
+            "holds": gear.verdict(load, hold and bounds(hold), l.breaking / (factor or 1.0))}
     out = {"format": FORMAT, "asked": {k: x for k, x in asked.items() if k != "line_found"}, "plan": plan,
            "conditions": rows, "load_cases": cases, "ramp": ramp, "design": design, "assumed": ranges, "band": band,
            "vessel": vessel, "line": line, "speeds": by_speed,

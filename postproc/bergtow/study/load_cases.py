@@ -31,6 +31,7 @@ from dataclasses import dataclass, field
 from bergtow import towing
 from bergtow.case import quantities
 from bergtow.result.run import Run, case_value, within
+from bergtow.stats import largest as stat_largest
 from bergtow.stats import load as stat_load
 from bergtow.stats import loads as stat_loads
 from bergtow.study import assumed
@@ -238,6 +239,11 @@ def line_parted(t):
 # ---- runs
 
 
+def few(runs):
+    """What the largest of the runs of a load case says of such tows: a lower bound, as that of the steady tows."""
+    return {"n_tows": len(runs.few), "share_below": stat_largest.share_below(len(runs.few))}
+
+
 def start(t, runs, say):
     """(row, ramp): the shortest ramp tried whose start takes no more than the steady tow."""
     first = start_ramp(t)
@@ -280,11 +286,11 @@ def start(t, runs, say):
             best = min(tried, key=lambda x: x["n"])
             found |= {"n": best["n"], "kind": "largest_of_n", "by": "runs", "runs": len(tried) * len(runs.few)}
             ramp |= {"s": best["ramp_s"], "n": best["n"], "by": "runs"}
-        return found | {"values": found["values"] | {"tried": tried}}, ramp
+        return found | {"values": found["values"] | (few(runs) if tried else {}) | {"tried": tried}}, ramp
     ramp |= {"s": held["ramp_s"], "n": held["n"], "by": "runs", "verified": True}
     return row("start", held["n"], "largest_of_n", "runs", runs=len(tried) * len(runs.few), set=held["set"],
-               values=own | {"n_tows": len(runs.few), "ramp_s": held["ramp_s"], "closed_form_s": first,
-                             "mass_kg": t.mass, "tried": tried}), ramp
+               values=own | few(runs) | {"ramp_s": held["ramp_s"], "closed_form_s": first, "mass_kg": t.mass,
+                                             "tried": tried}), ramp
 
 
 def inside(case, place, margin):
@@ -330,7 +336,7 @@ def course_change(t, runs, degrees, radius):
     along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2,
                                                                         load), runs.few))
     return row("course_change", math.hypot(along, values["across_n"]), "largest_of_n", "runs", runs=len(runs.few),
-               set=sets, formula="tension" if tension else "hypot", values=values | {"along_n": along})
+               set=sets, formula="tension" if tension else "hypot", values=values | few(runs) | {"along_n": along})
 
 
 def combined_interval(t, n, ends, r):

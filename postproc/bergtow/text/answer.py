@@ -104,7 +104,10 @@ def _steady(v, a):
 
 
 def _largest(v, a):
-    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v, a)}"
+    few = next(c["values"] for c in a["load_cases"] if c["id"] == v["case"])
+    of = (f", of {few['n_tows']} runs: a lower bound, below which at least {percent(few['share_below'])} of such runs "
+          "stay with 95 % confidence") if "share_below" in few else ""
+    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v, a)}{of}"
 
 
 def _covers(v, a):
@@ -154,12 +157,15 @@ def _line(v, a):
 
 def _feasible(v, a):
     at = speed(v["speed_m_s"])
+    why = "its pull lies within the interval" if a["design"]["interval_95"] else "a larger load than the largest " \
+        "simulated can come"
     out = {"yes": f"The vessel named can tow at {at}", "no": f"The vessel named cannot tow at {at}",
-           "open": f"Whether the vessel named can tow at {at} is open, since its pull lies within the interval"
-           }[v["verdict"]]
+           "open": f"Whether the vessel named can tow at {at} is open, since {why}"}[v["verdict"]]
     if known(v["not_above_m_s"]):
         by = ", if the drag alone grows with the speed (assumed)" if v["by"] == "drag_alone" else ""
-        out += f"{'; it can' if v['verdict'] == 'no' else ', and'} up to {speed(v['not_above_m_s'])}{by}"
+        out += f", at most at {speed(v['not_above_m_s'])}{by}"
+    if v["verdict"] == "yes" and known(a["band"]["high_n"]) and a["band"]["high_n"] > a["vessel"]["has_n"]:
+        out += f"; at the upper end of what is assumed its pull of {kn(a['vessel']['has_n'])} kN is not enough"
     return out
 
 
@@ -225,13 +231,16 @@ def _behind(row):
 
 def load_cases(a, markdown):
     top = (a["design"] or {}).get("row")
+    lower = any("share_below" in c["values"] for c in a["load_cases"])
     rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]),
-             ends(c["n"], c["interval_95"]) or "–", KINDS[c["kind"]],
+             ends(c["n"], c["interval_95"]) or "–", KINDS[c["kind"]] + (
+                 f" of {c['values']['n_tows']} ‡" if "share_below" in c["values"] else ""),
              {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
               "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
     return table(["load case", "kN", "95 % interval", "kind", "by", "with"], rows, markdown) + \
         ("\n\n* design value" if top else "") + \
-        ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "")
+        ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "") + \
+        ("; ‡ of so few runs it is a lower bound, not a design value" if lower else "")
 
 
 def parts(a, markdown):
