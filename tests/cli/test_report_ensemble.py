@@ -197,6 +197,22 @@ def test_page_stands_alone_and_text_stays_text(page):
     assert page.execute_script("return document.documentElement.scrollWidth") <= 380
 
 
+def test_the_labels_of_the_keys_fit_into_the_columns_of_a_printed_page(page):
+    """Red: "assumed" was wider than its cell, and the edge of the paper cut it in the last column."""
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                         {"width": 665, "height": 990, "deviceScaleFactor": 1, "mobile": False})  # A4 less its margins
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        left = page.execute_script("""return [...document.querySelectorAll("table.keys .kind")].map((s) => {
+            s.textContent = s.className = "assumed"; s.classList.add("kind")
+            return s.parentElement.getBoundingClientRect().width - s.getBoundingClientRect().width})""")
+        assert left and min(left) >= 0
+        assert page.execute_script("return getComputedStyle(document.querySelector('table.keys td:last-child')"
+                                   ").display") == "none"
+    finally:
+        page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
 @pytest.mark.slow
 def test_members_of_other_builds_and_lost_folders_are_reported(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:

@@ -65,10 +65,13 @@ def pull_of(cases, answer):
 
 def held(s, pull, what):
     """In words, which of the conditions a vessel holds by its pull."""
-    some = [(c["label"], load(c)) for c in s["conditions"] if load(c) is not None]
-    yes, no = ([name for name, n in some if (n <= pull) == holds] for holds in (True, False))
+    places = {"within": [], "the largest simulated, a lower bound, within": [], "above": []}
+    for c in s["conditions"]:
+        if (n := load(c)) is not None:
+            place = "above" if n > pull else list(places)["value" not in c["design"]["tow"]]
+            places[place].append(c["label"])
     return "; ".join([f"{where} {quantity(pull, 'N')}, {what}: {loads_text.several(names)}"
-                      for where, names in (("within", yes), ("above", no)) if names])
+                      for where, names in places.items() if names])
 
 
 def operation(s, cases, values, answer):

@@ -67,6 +67,11 @@ def speed(v):
     return f"{short(v / KNOT)} kn"
 
 
+def plain(x):
+    """A number that was given or assumed: without the zeros that would make it look measured."""
+    return f"{float(short(x)):g}"
+
+
 def minutes(s):
     return f"{short(s / 60, 2)} min"
 
@@ -181,7 +186,7 @@ def _start(v, a):
 
 
 def _against_weather(v, a):
-    return (f"Against a current of {short(v['current_m_s'])} m/s and a wind of {short(v['wind_m_s'])} m/s, which are "
+    return (f"Against a current of {plain(v['current_m_s'])} m/s and a wind of {plain(v['wind_m_s'])} m/s, which are "
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
@@ -213,7 +218,7 @@ def _behind(row):
     v, said = row["values"], []
     def add(key, words):
         if known(v.get(key)):
-            said.append(words.format(v[key], short(v[key]), minutes(v[key])))
+            said.append(words.format(v[key], plain(v[key]), minutes(v[key])))
     add("ramp_s", "ramp {2}")
     add("slack_below_s", "line slack if stopped in less than {2}")
     add("coasts_m", "the body drifts on for {1} m")
