@@ -273,11 +273,10 @@ def sentence(a):
     if d is None:
         return [{"code": "no_value", "values": {}, "rows": []}]
     rows = {row["id"]: row for row in a["load_cases"] + a["conditions"]}
-    case = rows[d["row"]]
+    case, steady = rows[d["row"]], rows[rows["case.steady"]["of"]]  # the time scale is that of the condition
     out.append({"code": {"at_least": "needs_at_least", "largest_of_n": "needs_largest"}.get(d["kind"], "needs"),
                 "values": {k: d[k] for k in ("n", "interval_95", "kind", "reason")} | {"case": d["row"]},
-                "rows": ["design", d["row"]]})
-    steady = rows[rows["case.steady"]["of"]]
+                "rows": ["design", d["row"], steady["id"]]})
     if d["row"] != "case.steady" and steady["value"]["kind"] == "return_level":
         out.append({"code": "steady", "values": steady["value"] | {"case": "case.steady"}, "rows": [steady["id"]]})
     if steady["value"]["kind"] == "largest_of_n":
