@@ -539,12 +539,14 @@ def local(geometry):
 
 
 @pytest.mark.parametrize("changes, words, code, said", [
-    ({}, ["--to", "8.5,0", "--no-go", "land.geojson"], CASE, "--to: the goal lies in an area to keep out of"),
+    ({}, ["--to", "8.5,0", "--no-go", "land.geojson"], CASE,
+     r"--to: the goal lies in an area to keep out of.* \(x 8.5 m, y 0 m, polygon 1, needed .* m\)"),
     ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* area to keep out of"),
     ({}, ["--to", "20E,76N"], USAGE, "in degrees, and the map of this case has no place; set ice.origin_lon"),
     ({}, ["--to", "8.5,0", "--no-go", "degrees.geojson"], CASE, "the map of this case has no place"),
     ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "no GeoJSON of polygons"),
-    ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "no way leads from the start to the goal"),
+    ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "--to: no way leads from the start to the goal"),
+    ({}, ["--to", "8.5,0", "--no-go", "list.geojson"], CASE, r"polygons \(it is built otherwise\)"),
     ({}, ["--to", "50,0"], CASE, "--to: the goal lies outside the domain"),
     ({}, ["--to", "2.5,0"], CASE, "--to 2.5,0: is reached where the tow starts"),
     ({}, ["--to", "3,0.1"], CASE, "--to 3,0.1: is reached where the tow starts"),
@@ -573,7 +575,7 @@ def test_wrong_use_is_said(tmp_path, changes, words, code, said):
              "barrier": local(LAND | {"coordinates": barrier}), "empty": local(LAND) | {"features": []},
              "nan": local(LAND | {"coordinates": [[[0, 0], [1, np.nan], [1, 1], [0, 0]]]}),
              "flat": local(LAND | {"type": "MultiPolygon", "coordinates": [
-                 LAND["coordinates"], [[[0, 1], [1, 2], [2, 3], [0, 1]]]]}), "nowhere": local(None)}
+                 LAND["coordinates"], [[[0, 1], [1, 2], [2, 3], [0, 1]]]]}), "nowhere": local(None), "list": [1]}
     for name, what in files.items():
         (tmp_path / f"{name}.geojson").write_text(json.dumps(what))
     (tmp_path / "text.geojson").write_text("x")

@@ -51,7 +51,7 @@ STATUS = {
                         "start elsewhere, or take a lower speed or a higher limit"),
     "goal_too_thick": ("--to", "the ice about the goal takes more than --force-limit at every speed",
                        "choose another goal, or take a lower speed or a higher limit"),
-    "no_route": ("bergtow route", "no way leads from the start to the goal",
+    "no_route": ("--to", "no way leads from the start to the goal",
                  "take a smaller --radius, --clearance or --width, or a higher --force-limit"),
     "at_goal": ("--to", "the tow starts at its goal", "choose a goal elsewhere"),
     "goal_drifts_away": ("--to", "the goal drifts away from the ice faster than the body is towed",
@@ -173,7 +173,9 @@ def refuse(plan, found, path, force):
         return
     writing.write_json(found | {"status": plan.status, "status_data": plan.data, "routes": []}, path, force)
     what, why, remedy = STATUS[plan.status]
-    numbers = ", ".join(f"{k} {v:.4g}" for k, v in plan.data.items() if isinstance(v, (int, float)))
+    units = {"x": " m", "y": " m", "needed": " m", "force": " N", "limit": " N"}
+    numbers = ", ".join(f"{k} {v + (k == 'polygon'):.4g}{units.get(k, '')}" for k, v in plan.data.items()
+                        if isinstance(v, (int, float)))
     raise RunError(what, why + (f" ({numbers})" if numbers else ""), remedy, CASE)
 
 

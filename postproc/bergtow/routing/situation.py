@@ -116,7 +116,7 @@ def no_go_file(path, place):
         features = found["features"] if found.get("type") == "FeatureCollection" else [found]
         geometries = [f.get("geometry", f) for f in features]
         if any(g is None or g["type"] not in ("Polygon", "MultiPolygon") for g in geometries):
-            raise ValueError("a geometry is no polygon")
+            raise ValueError("a geometry is no polygon, or a feature has none")
         polygons = [p for g in geometries for p in ([g["coordinates"]] if g["type"] == "Polygon" else g["coordinates"])]
         rings = []
         for k, polygon in enumerate(polygons):
@@ -132,7 +132,8 @@ def no_go_file(path, place):
     except OSError as error:
         raise RunError(path, f"cannot be read ({error.strerror})", "name a GeoJSON file of polygons") from None
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        raise RunError(path, f"is no GeoJSON of polygons ({error})", "write Polygon or MultiPolygon features, in "
+        why = error if type(error) in (ValueError, json.JSONDecodeError) else "it is built otherwise"
+        raise RunError(path, f"is no GeoJSON of polygons ({why})", "write Polygon or MultiPolygon features, in "
                        "degrees", CASE) from None
     if crs not in ("", LOCAL) and not crs.upper().endswith("CRS84"):
         raise RunError(path, f"its coordinates are {crs}", f"convert it with ogr2ogr -t_srs EPSG:4326, or give metres "
