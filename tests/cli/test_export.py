@@ -15,7 +15,7 @@ import xarray
 from osgeo import ogr
 from pyproj import CRS, Geod
 
-from harness import DONE, IO, USAGE, area, call, changed, run
+from harness import DONE, IO, TOW as BASIN, USAGE, area, call, changed, run
 from test_map import ARROW, BOX, LOCAL, ORIGIN, write
 from test_outlines import field, same_ring
 
@@ -198,6 +198,30 @@ def test_trajectories_are_those_of_the_frames(tmp_path):
     bergtow.export(there, floes, time="all")
     at = [(f["properties"]["id"], f["properties"]["time_s"]) for f in json.loads(floes.read_text())["features"]]
     assert len(at) == 2 * 7 - 1 and (1, 15) not in at and (0, 15) in at
+
+
+def test_floes_that_split_have_trajectories(tmp_path):
+    """A piece has one while it is there, and the iceberg its speed beside the pieces. Red: pieces counted among the
+    floes before the bodies, and "the file is damaged"."""
+    there = run(tmp_path, changed(BASIN, ice__splitting={"toughness": 100, "least_size": 0.1},
+                                  output__frame_interval=2)).dir
+    bergtow.export(there, tmp_path / "drift.csv")
+    bergtow.export(there, tmp_path / "last.gpkg")
+    with open(tmp_path / "drift.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    with Run(there) as r:
+        assert r.n_pieces > 0
+        pose = np.stack([r.pose(k) for k in range(r.n_frames)])
+        body = r.body_speed(-1)[r.towed]
+        assert body == pytest.approx(math.hypot(r["body_vx"][-1], r["body_vy"][-1]))
+        assert ogr.Open(str(tmp_path / "last.gpkg")).GetLayer("floes").GetFeatureCount() == np.isfinite(
+            pose[-1, :, 0]).sum()
+        floes = [row for row in rows if row["name"].startswith("floe")]
+        assert len(floes) == np.isfinite(pose[:, :, 0]).sum()
+        for row in floes:
+            k, i = r.frame_at(float(row["time_s"])), int(row["name"].split()[1])
+            assert (float(row["x_m"]), float(row["y_m"])) == tuple(pose[k, i, :2])
+    assert [float(row["speed_m_s"]) for row in rows if row["name"] == "iceberg"][-1] == body
 
 
 def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):

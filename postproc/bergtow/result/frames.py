@@ -190,7 +190,8 @@ class Frames:
 
     def body_speed(self, frame):
         """[B] m/s, speed of each body."""
-        return self._frame("speed", frame, self.n_floes + len(self.bodies))[self.n_floes:]
+        own = self.n_floes - self.n_pieces  # pieces are not in this data set
+        return self._frame("speed", frame, own + len(self.bodies))[own:]
 
     def wrap(self, xy, centre=None):
         """Positions [n, 2] m moved by whole periods to within half a period of centre (default: of the domain).
