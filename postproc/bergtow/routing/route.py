@@ -294,11 +294,11 @@ def numbers(found):
 
 def draw(found, plan, some, s, goal, bold):
     from bergtow.plot import route as picture
-    shown = [(c.label, c.track, c.tug, c.name == bold) for c in some
+    shown = [c for c in some
              if not np.isfinite(c.speed) or c.speed == max(x.speed for x in some if np.isfinite(x.speed))]
     e = plan.cover_extent
     return picture.figure(f"{found['title']}: routes", words.answer(found), s.place, s.extent, plan.cover,
-                          e, s.ice.outlines, s.no_go, shown, goal)
+                          e, s.ice.outlines, s.no_go, shown, bold, goal)
 
 
 class Files:
