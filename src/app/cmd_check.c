@@ -383,13 +383,11 @@ static bt_status print_twin(bt_case *input, double ratio, bt_errors *err)
 static bt_status check_study(const options *opt, bt_errors *err)
 {
     if (!(opt->scale > 0) && !opt->json) return bt_check_study(&opt->file, bt_comm_world()->size, err);
-    if (opt->json)
-        bt_errors_add(err, "%s: is a study, and --json is for a case; check its base case, with --set for what varies",
-                      opt->file.path);
-    else
-        bt_errors_add(err, "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
-                      opt->file.path);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE,
+                   opt->json
+                       ? "%s: is a study, and --json is for a case; check its base case, with --set for what varies"
+                       : "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
+                   opt->file.path);
 }
 
 int bt_cmd_check(int argc, char **argv)

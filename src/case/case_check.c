@@ -403,7 +403,7 @@ static void check_floe(const bt_check *check, int index)
     char where[256];
     const char *file = input->floes_path ? input->floes_path : input->path;
     if (floe->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", file ? file : "case", floe->line, index);
-    else snprintf(where, sizeof where, "%.180s: floes[%d]", input->path ? input->path : "case", index);
+    else snprintf(where, sizeof where, "%.180s: floes[%d]", bt_case_name(input), index);
     bool polygon = floe->shape == BT_BODY_POLYGON;
     const size_t before = check->err->n;
     if (polygon && !floe->n_vertices)

@@ -167,12 +167,10 @@ bool bt_case_is_unused(const bt_case *input, const char *key)
 bool bt_case_changed(const bt_case *c, const char *key)
 {
     const bt_key *k = row_of(key);
-    const void *at = (const char *)c + k->offset;
-    double value = 0;
     if (k->type == BT_KEY_POINTS) return *(const int *)(const void *)((const char *)c + k->offset_count) > 0;
-    if (k->type == BT_KEY_REAL) memcpy(&value, at, sizeof value);
+    if (k->type == BT_KEY_REAL && isnan(bt_value_number(k, c))) return false;
     const bt_case d = with_default(c, k);
-    return !isnan(value) && memcmp(at, (const char *)&d + k->offset, size_of(k)) != 0;
+    return memcmp((const char *)c + k->offset, (const char *)&d + k->offset, size_of(k)) != 0;
 }
 
 /// Calls found for each key that is not used although its value is not the default.
@@ -443,8 +441,7 @@ static void refuse_limit(const bt_check *check, const limit *l)
     static const char *const broken[] = {[BELOW] = "not below", [AT_MOST] = "more than", [AT_LEAST] = "less than"};
     const bt_key *row = row_of(l->key);
     const bool is_key = l->of && !strchr(l->of, ' ');
-    double value = 1;
-    if (row->type == BT_KEY_REAL) memcpy(&value, (const char *)check->c + row->offset, sizeof value);
+    const double value = row->type == BT_KEY_REAL ? bt_value_number(row, check->c) : 1;
     const bool bad[] = {[REFUSED] = true,
                         [NEEDED] = !(value > 0),
                         [BELOW] = value >= l->bound,

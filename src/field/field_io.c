@@ -317,13 +317,11 @@ bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconve
     const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
     if (checked != BT_OK) return checked;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
-    if (H5Fis_hdf5(path) <= 0) {
-        bt_errors_add(err,
-                      "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`, or name "
-                      "outlines (GeoJSON) with ice.outlines",
-                      path);
-        return BT_ERR_CASE;
-    }
+    if (H5Fis_hdf5(path) <= 0)
+        return bt_fail(err, BT_ERR_CASE,
+                       "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`, or name "
+                       "outlines (GeoJSON) with ice.outlines",
+                       path);
     int errnum = 0; // of a read that failed: then what was found in the file says nothing of it
     bt_errors found = {0};
     reader in = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};

@@ -42,8 +42,7 @@
 
 static bt_status refuse(const char *path, const char *reason, bt_errors *err)
 {
-    bt_errors_add(err, "%s: the contact problem is not written: %s", path, reason);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE, "%s: the contact problem is not written: %s", path, reason);
 }
 
 static bt_status check_problem(const char *path, const bt_fclib_problem *p, bt_errors *err)

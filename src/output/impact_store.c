@@ -290,11 +290,10 @@ static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
         if (old->status == BT_OK && rows_sound(store)) {
             write_rows(store);
         } else if (old->status == BT_OK) {
-            bt_errors_add(old->err,
-                          "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is "
-                          "damaged: restore it",
-                          old->path);
-            old->status = BT_ERR_CASE;
+            old->status = bt_fail(old->err, BT_ERR_CASE,
+                "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is "
+                "damaged: restore it",
+                old->path);
         }
     }
     free(x);

@@ -178,11 +178,10 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
     bt_errors why = {0};
     bt_status status = BT_OK;
     int64_t n_steps = 0;
-    if (first && entry->attempts >= BT_MAX_ATTEMPTS) {
-        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", entry->m.name,
-                      entry->attempts);
-        status = BT_ERR_NUMERIC;
-    }
+    if (first && entry->attempts >= BT_MAX_ATTEMPTS)
+        status = bt_fail(&why, BT_ERR_NUMERIC,
+                         "%s: its process died in each of %d attempts; run the case alone to see why", entry->m.name,
+                         entry->attempts);
     if (first) {
         if (entry->attempts == 0) bt_member_forget_attempts(entry->folder);
         if (entry->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(entry->folder);

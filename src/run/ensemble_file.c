@@ -257,15 +257,8 @@ static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
         bt_case input;
         bt_case_defaults(&input);
         char why[BT_WHY];
-        value[m] = NAN;
-        if (number && bt_value_read(key, &input, text[m], true, why)) {
-            const char *at = (const char *)&input + key->offset;
-            int64_t whole;
-            bool yes;
-            if (key->type == BT_KEY_REAL) memcpy(&value[m], at, sizeof value[m]);
-            else if (key->type == BT_KEY_INT) memcpy(&whole, at, sizeof whole), value[m] = (double)whole;
-            else memcpy(&yes, at, sizeof yes), value[m] = yes;
-        }
+        const bool read = number && bt_value_read(key, &input, text[m], true, why);
+        value[m] = read ? bt_value_number(key, &input) : (double)NAN;
         bt_case_free(&input);
         bt_member_free(&member);
     }
@@ -457,13 +450,11 @@ bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_r
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
     }
-    if (status == BT_OK && t.unread) {
-        bt_errors_add(err,
-                      "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
-                                     "correct that, and call again",
-                      path, t.unread);
-        status = BT_ERR_IO;
-    }
+    if (status == BT_OK && t.unread)
+        status = bt_fail(err, BT_ERR_IO,
+            "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
+            "correct that, and call again",
+            path, t.unread);
     bt_member_notes_free(warnings);
     *warnings = t.warnings;
     t.warnings = (bt_member_notes){0};

@@ -167,8 +167,8 @@ bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
     if (status == BT_OK && !json_is_object(*root)) {
         json_decref(*root);
         *root = NULL;
-        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; check the disk", path, why.line, why.text);
-        status = BT_ERR_CASE;
+        status = bt_fail(err, BT_ERR_CASE,
+                         "%s: cannot be read as JSON: line %d: %s; check the disk", path, why.line, why.text);
     }
     free(text);
     free(path);

@@ -262,7 +262,7 @@ static bool begin_drift(const bt_case *input, bt_world *world, const bt_roster *
         bt_errors_add(err,
                       "%s: ice.start: for %d bodies no velocity was found at which wind, water, Coriolis and slope "
                       "balance; set it to rest, or check drag, current and wind",
-                      input->path ? input->path : "case", (int)lost);
+                      bt_case_name(input), (int)lost);
     return lost == 0;
 }
 
@@ -509,7 +509,7 @@ static bool check_prescribed(const bt_case *input, const bt_world *world, const 
                     err,
                     "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
                     "fixed floe, or tow on a line",
-                    input->path ? input->path : "case", roster->names[j - roster->n_floes],
+                    bt_case_name(input), roster->names[j - roster->n_floes],
                     towed && j != bt_world_towed(world) ? "the towed body" : "a fixed floe of the list floes");
                 sound = false;
             }
@@ -528,7 +528,7 @@ static bool check_closing(const bt_case *input, const bt_field *field, bt_errors
     bt_errors_add(err,
                   "%s: domain.%s_closing: by the end of the run the walls leave less room than rigid floes take, %s; "
                   "slow them, shorten run.duration, or set ice.crushing.pressure or ice.rafting.kappa",
-                  input->path ? input->path : "case", input->domain.ends_closing > 0 ? "ends" : "sides", how);
+                  bt_case_name(input), input->domain.ends_closing > 0 ? "ends" : "sides", how);
     return false;
 }
 
@@ -568,7 +568,7 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
                           "%s: domain.%s: the period of %g m has no room for the largest body, as it turns, beside "
                           "floes[%d], which is fixed, and its image, %.4g m; cut that floe in two: fixed floes that "
                           "lie flush act as one",
-                          input->path ? input->path : "case", k ? "width" : "length", periods[k],
+                          bt_case_name(input), k ? "width" : "length", periods[k],
                           (int)(longest[k] - n_field), beside);
             sound = false;
         }
@@ -577,7 +577,7 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
                 err,
                 "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
                 "turn, %.4g m; enlarge it or take smaller bodies",
-                input->path ? input->path : "case", k ? "width" : "length", periods[k], need);
+                bt_case_name(input), k ? "width" : "length", periods[k], need);
             sound = false;
         }
     }
@@ -596,7 +596,7 @@ static bool check_inside(const bt_case *input, const bt_field *field, bt_errors 
             (over_y || (y >= input->domain.y0 && y <= input->domain.y0 + input->domain.width)))
             continue;
         bt_errors_add(err, "%s: floe %d at (%g, %g) m is outside the domain; make the field for this domain",
-                      input->ice.field ? input->ice.field : input->path ? input->path : "case", (int)i, x, y);
+                      input->ice.field ? input->ice.field : bt_case_name(input), (int)i, x, y);
         return false;
     }
     return true;
@@ -624,7 +624,7 @@ static bool check_apart(const bt_case *input, bt_world *world, const bt_roster *
                   "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g "
                   "m), deepest %s and %s; move or "
                   "shrink the floes given by hand, or make the field for this body and domain",
-                  input->path ? input->path : "case", (long long)overlaps.pairs, bt_plural(overlaps.pairs),
+                  bt_case_name(input), (long long)overlaps.pairs, bt_plural(overlaps.pairs),
                   overlaps.deepest, allowed, a, b);
     return false;
 }

@@ -80,10 +80,8 @@ static bt_status refuse_within(void)
 static bt_status read_case(bt_case *input, const bt_simulation_options *options, bt_errors *err)
 {
     *input = (bt_case){0};
-    if (!options->path && !options->text) {
-        bt_errors_add(err, "no case: give its file in path, or the case itself in text");
-        return BT_ERR_USAGE;
-    }
+    if (!options->path && !options->text)
+        return bt_fail(err, BT_ERR_USAGE, "no case: give its file in path, or the case itself in text");
     const char **place = bt_alloc((size_t)options->n_set, sizeof *place);
     for (int i = 0; i < options->n_set; i++) place[i] = ""; // messages name the value itself, and no option --set
     const bt_status status =
@@ -144,14 +142,13 @@ static bt_status begin(bt_simulation *sim, bt_errors *err)
 
 static bt_status check_numbers(const bt_simulation_options *options, bt_errors *err)
 {
-    if (options->n_set < 0 || (options->n_set > 0 && !options->set)) {
-        bt_errors_add(err, "n_set: %d is not a number of texts; give 0 with set NULL, or their number", options->n_set);
-        return BT_ERR_USAGE;
-    }
+    if (options->n_set < 0 || (options->n_set > 0 && !options->set))
+        return bt_fail(err, BT_ERR_USAGE,
+                       "n_set: %d is not a number of texts; give 0 with set NULL, or their number", options->n_set);
     if (options->threads >= 0 && options->threads <= BT_MOST_THREADS) return BT_OK;
-    bt_errors_add(err, "threads: %d are not available; give 1 to %d, or 0 for run.threads of the case or all cores",
-                  options->threads, BT_MOST_THREADS);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE,
+                   "threads: %d are not available; give 1 to %d, or 0 for run.threads of the case or all cores",
+                   options->threads, BT_MOST_THREADS);
 }
 
 /// The end of create and resume.
@@ -189,11 +186,9 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
                       options->dir);
     if (err.n > 0) status = BT_ERR_USAGE;
     else status = bt_resume_begin(&resume, bt_comm_world(), &sim->o, &err);
-    if (status == BT_OK && resume.finished) {
-        bt_errors_add(&err, "%s is finished: all %lld steps are done", options->dir,
-                      (long long)bt_case_steps(&resume.c));
-        status = BT_ERR_USAGE;
-    }
+    if (status == BT_OK && resume.finished)
+        status = bt_fail(&err, BT_ERR_USAGE, "%s is finished: all %lld steps are done", options->dir,
+                         (long long)bt_case_steps(&resume.c));
     sim->m.lock = resume.lock;
     sim->m.held = true;
     sim->c = resume.c; // ours from here on
@@ -231,10 +226,9 @@ bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
     for (; n > 0 && sim->status == BT_OK && bt_running_goes_on(&sim->r); n--)
         sim->status = bt_running_step(&sim->r, &err);
     stepping = NULL;
-    if (sim->status == BT_OK && bt_halt_stops(sim->r.asked)) {
-        bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)sim->r.w->step);
-        sim->status = BT_ERR_SIGNAL;
-    }
+    if (sim->status == BT_OK && bt_halt_stops(sim->r.asked))
+        sim->status = bt_fail(&err, BT_ERR_SIGNAL,
+                              "asked to stop after step %lld; end the simulation", (long long)sim->r.w->step);
     if (keeps_failure(sim))
         bt_errors_add(&err, "the end of the simulation writes the state before that step to %s/%s", sim->dir,
                       BT_FAILURE_FILE);
