@@ -209,9 +209,7 @@ bt_status bt_file_read_to(const char *path, const char *what, size_t most, char 
 
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
 {
-    const size_t size = strlen(path) + sizeof ".tmp", n = strlen(text);
-    char *temporary = bt_alloc(size, 1);
-    snprintf(temporary, size, "%s.tmp", path);
+    char *temporary = bt_text_of("%s.tmp", path);
     if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) {
         free(temporary);
         return BT_ERR_IO;
@@ -221,7 +219,7 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     // which the rename replaces.
     unlink(temporary);
     const int fd = bt_file_descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
-    int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, n);
+    int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, strlen(text));
     // a full disk shows at the sync or at the close as often as at the write itself
     if (!reason) reason = bt_file_sync(fd);
     const int closed = fd < 0 ? 0 : bt_file_close(fd);

@@ -73,10 +73,10 @@ static void describe(bt_h5 *h5, const bt_record_bodies *bodies)
     bt_h5_describe(h5, "/bodies/area", "body", "m2", "area of each body");
     bt_h5_describe(h5, "/xdmf/floes", "floe_cell", "1", "polygons of the floes as XDMF's mixed topology");
     bt_h5_describe(h5, "/xdmf/bodies", "body_cell", "1", "polygons of the other bodies as XDMF's mixed topology");
-    bt_h5_write_names(h5, "/bodies/names", (hsize_t)(bodies->n_bodies - bodies->n_floes), bodies->names);
-    bt_h5_describe(h5, "/bodies/names", "body", NULL, "what each body is");
-    bt_h5_write(h5, "/bodies/towed", H5T_NATIVE_INT64, 1, 0, &towed);
-    bt_h5_describe(h5, "/bodies/towed", "one", "1", "which of these bodies is towed, -1 = none");
+    bt_h5_put_names(h5, "/bodies/names", (hsize_t)(bodies->n_bodies - bodies->n_floes), bodies->names, "body",
+                    "what each body is");
+    bt_h5_put(h5, "/bodies/towed", H5T_NATIVE_INT64, 1, 0, &towed, "one", "1",
+              "which of these bodies is towed, -1 = none");
 }
 
 /// Bodies from .. from + n of the block `bodies` to rows first .. first + n of the datasets; `before`: vertices of the
