@@ -300,7 +300,7 @@ static void print_cost(const bt_case *input, const bt_comm *comm, const bt_check
 static const char *warned(size_t n, char out[64])
 {
     out[0] = '\0';
-    if (n) snprintf(out, 64, ", with %zu warning%s", n, n > 1 ? "s" : "");
+    if (n) snprintf(out, 64, ", with %zu warning%s", n, bt_plural((int64_t)n));
     return out;
 }
 

@@ -85,8 +85,10 @@ static void write_problem(bt_h5 *h5, const bt_fclib_problem *x)
     put_int(h5, "/fclib_local/W/nz", COMPRESSED_ROWS, "kind of storage: -2, compressed rows");
     bt_h5_put(h5, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
         "row i has the entries p[i] up to p[i + 1]");
-    bt_h5_put(h5, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1", "column of each entry");
-    bt_h5_put(h5, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1", "entries of W");
+    bt_h5_put(h5, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1",
+              "column of each entry");
+    bt_h5_put(h5, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1",
+              "entries of W");
     bt_h5_group(h5, "/fclib_local/vectors");
     put_rows(h5, "/fclib_local/vectors/q", m, x->q, "m/s", "velocities without impulses: u = W r + q");
     bt_h5_put(h5, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)x->n, 0, x->mu, "contact", "1", "friction");
@@ -121,7 +123,8 @@ static void write_more(bt_h5 *h5, const bt_fclib_problem *p)
 {
     const hsize_t n = (hsize_t)p->n;
     if (p->bound)
-        bt_h5_put(h5, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
+        bt_h5_put(h5, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s",
+                  "upper bound of the normal impulse");
     if (p->disc)
         bt_h5_put(h5, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
             "sheets: their impulse is the sum of a point of the disc of this radius and of a point of the line from "
