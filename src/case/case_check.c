@@ -123,7 +123,7 @@ static bool is_basin(const bt_case *input) { return input->domain.frame == BT_FR
 /// May the run use the value of this key?
 static bool is_used(const bt_case *input, const char *key, bool by_hand)
 {
-    if (bt_case_is_unused(input, key)) return false;
+    if (bt_case_why_unused(input, key)) return false;
     if (!strcmp(key, "ice.thickness")) return bt_case_makes_ice(input) || by_hand || input->ice.outlines;
     if (!strcmp(key, "tow.speed")) return input->body.shape != BT_BODY_ABSENT && input->tow.mode != BT_TOW_NONE;
     return true;

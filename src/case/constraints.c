@@ -123,9 +123,9 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          "without a named line"},
         {input->water.tilt != BT_TILT_SLOPE, ALWAYS, "water.slope_x water.slope_y", "water.tilt",
          "without water.tilt: slope"},
-        {input->water.table.n > 0, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
+        {input->water.current_table, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
          "water.current_table", "with water.current_table, which gives all of it"},
-        {input->air.table.n > 0, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
+        {input->air.wind_table, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
          "with air.wind_table, which gives all of it"},
         {!input->ice.outlines, ALWAYS, "ice.outlines_crs", "ice.outlines", "without ice.outlines"},
         {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that is made, whose floes are convex"},
@@ -153,15 +153,15 @@ static bt_case with_default(const bt_case *c, const bt_key *key)
     return d;
 }
 
-bool bt_case_is_unused(const bt_case *input, const char *key)
+const char *bt_case_why_unused(const bt_case *input, const char *key)
 {
     idle rules[IDLE];
     char name[BT_LONGEST_KEY];
     list_idle(input, rules);
     for (int i = 0; i < IDLE; i++)
         for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
-            if (!strcmp(name, key)) return true;
-    return false;
+            if (!strcmp(name, key)) return rules[i].why;
+    return NULL;
 }
 
 bool bt_case_changed(const bt_case *c, const char *key)

@@ -16,6 +16,8 @@
 #include "base/units.h"
 #include "case/arch.h"
 #include "case/case_base.h"
+#include "case/constraints.h"
+#include "case/schema.h"
 #include "field/map_crs.h"
 #include "output/checkpoint.h"
 #include "bergtow/quantity.h"
@@ -474,6 +476,25 @@ bt_status bt_case_check_text(const bt_simulation_options *options, char **resolv
     *values = status == BT_OK ? bt_case_resolved_json(&input) : NULL;
     bt_case_free(&input);
     return reported(status, &err);
+}
+
+char *bt_case_unused(const char *text)
+{
+    double row[2][3] = {{0}, {1e300}}; // in place of tables that the text names
+    const bt_table table = {.n = 2, .row = row[0]};
+    bt_errors unheard = {0};
+    bt_case input;
+    bt_case_read_kept(&input, "case", text, &table, &table, &unheard);
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    for (int k = 0; k < bt_n_case_keys; k++) {
+        const char *why = bt_case_why_unused(&input, bt_case_keys[k].name);
+        if (why) bt_json_string(&json, bt_case_keys[k].name, why);
+    }
+    bt_json_close(&json, '}');
+    bt_case_free(&input);
+    bt_errors_free(&unheard);
+    return json.text;
 }
 
 char *bt_simulation_progress(const bt_simulation *sim)
