@@ -43,7 +43,4 @@ bool bt_setup_check_bodies(const bt_case *input, bt_world *world, const bt_roste
 /// The tow at time zero of a case that was checked; release with bt_tow_free.
 bt_tow *bt_setup_tow(const bt_case *input);
 
-/// Displacement from the start after this way of the tow, m.
-void bt_setup_tow_displacement(const bt_case *input, const bt_tow *tow, double way, double d[2]);
-
 #endif

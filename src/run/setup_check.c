@@ -11,6 +11,7 @@
 #include "case/case_derived.h"
 #include "case/case_tow.h"
 #include "case/ice_bounds.h"
+#include "base/elementary.h"
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
@@ -120,11 +121,24 @@ static bool images_apart(const bt_world *world, bt_idx a, bt_idx b, const double
     return apart;
 }
 
+/// Displacement from the start after this way of the tow, m.
+static void tow_displacement(const bt_case *input, const bt_tow *tow, double way, double d[2])
+{
+    d[0] = way * bt_cos(input->tow.direction);
+    d[1] = way * bt_sin(input->tow.direction);
+    if (tow->path.n == 0) return;
+    double start[2], tangent[2];
+    bt_path_at(&tow->path, 0, start, tangent);
+    bt_path_at(&tow->path, way, d, tangent);
+    d[0] -= start[0];
+    d[1] -= start[1];
+}
+
 /// Displacement of body m, of prescribed velocity, from the start until time t.
 static void displacement(const bt_case *input, const bt_world *world, bt_idx m, double t, double d[2])
 {
     d[0] = world->bodies.vel[m].x * t, d[1] = world->bodies.vel[m].y * t;
-    if (m == bt_world_towed(world)) bt_setup_tow_displacement(input, world->tow, bt_case_tow_led(input, t), d);
+    if (m == bt_world_towed(world)) tow_displacement(input, world->tow, bt_case_tow_led(input, t), d);
 }
 
 /// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
