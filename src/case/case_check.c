@@ -124,9 +124,7 @@ static bool is_basin(const bt_case *input) { return input->domain.frame == BT_FR
 static bool is_used(const bt_case *input, const char *key, bool by_hand)
 {
     if (bt_case_why_unused(input, key)) return false;
-    if (!strcmp(key, "ice.thickness")) return bt_case_makes_ice(input) || by_hand || input->ice.outlines;
-    if (!strcmp(key, "tow.speed")) return input->body.shape != BT_BODY_ABSENT && input->tow.mode != BT_TOW_NONE;
-    return true;
+    return strcmp(key, "ice.thickness") || bt_case_makes_ice(input) || by_hand || input->ice.outlines;
 }
 
 /// Numbers that nobody gave, that have an effect, and whose default is a model basin's, become NaN. by_hand: there are

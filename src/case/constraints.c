@@ -24,8 +24,8 @@
 
 // --- keys without effect ---------------------------------------------------------------------------------------------
 
-/// When keys without effect are refused.
-typedef enum { TOGETHER, ALWAYS } refusal;
+/// When keys without effect are refused; NEVER: nor is there a warning, as the program itself gives them a value.
+typedef enum { TOGETHER, ALWAYS, NEVER } refusal;
 
 /// Keys that are not used.
 typedef struct idle {
@@ -40,7 +40,7 @@ typedef struct idle {
     "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
     "tow.branch2.breaking_load"
 
-enum { IDLE = 36 };
+enum { IDLE = 38 };
 
 static void list_idle(const bt_case *input, idle out[IDLE])
 {
@@ -114,6 +114,9 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          "impact.conversion", "without impact.conversion: crushing"},
         {input->impact.conversion == BT_IMPACT_NONE, TOGETHER, "impact.least_speed", "impact.conversion",
          "where collisions are not told apart (impact.conversion)"},
+        {input->domain.ends != BT_BOUND_MOVING, NEVER, "domain.ahead", "domain.ends", "without a moving window"},
+        {input->body.shape == BT_BODY_ABSENT || input->tow.mode == BT_TOW_NONE, NEVER, "tow.speed", "tow.mode",
+         "without a tow"},
         {input->domain.ends != BT_BOUND_WALL, ALWAYS, "domain.ends_closing", "domain.ends", "without a wall to move"},
         {input->domain.sides != BT_BOUND_WALL, ALWAYS, "domain.sides_closing", "domain.sides",
          "without a wall to move"},
@@ -180,7 +183,7 @@ static void look(const bt_case *input, void (*found)(void *to, const char *key, 
     char name[BT_LONGEST_KEY];
     list_idle(input, rules);
     for (int i = 0; i < IDLE; i++)
-        for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
+        for (const char *keys = rules[i].keys; rules[i].so && rules[i].refused != NEVER && bt_next_name(&keys, name);)
             if (bt_case_changed(input, name)) found(to, name, &rules[i]);
 }
 
