@@ -92,10 +92,11 @@ MUTANTS = {
         ("turned[2 * k + 1] = s * v[0] + c * v[1];", "turned[2 * k + 1] = v[1];", "the outline is not turned"),
         ("world->tow->travel_x += to[0] - pose->x;", "", "the way of a body that is put elsewhere"),
     ]),
-    "src/run/setup.c": ([EDGES + "a_wall_goes_on_around_the_period_as_far_as_a_long_body_reaches",
-                         EDGES + "a_pier_is_met_on_any_lap", "cli/test_tow.py"], [
+    "src/run/setup.c": ([EDGES + "a_wall_goes_on_around_the_period_as_far_as_a_long_body_reaches"], [
         ("thick = bt_max(thick, 1.1 * world->bodies.radius[i]);",
          "thick = bt_max(thick, 0 * world->bodies.radius[i]);", "walls end at the seam"),
+    ]),
+    "src/run/setup_check.c": ([EDGES + "a_pier_is_met_on_any_lap", "cli/test_tow.py"], [
         ("high[k] = (int64_t)floor((bt_max(way[k], 0)", "high[k] = 0 * (int64_t)floor((bt_max(way[k], 0)",
          "piers ahead of the first lap"),
     ]),
@@ -988,12 +989,6 @@ MUTANTS = {
         ("        halt->saves_seen = saves_asked;\n        bits", "        bits",
          "a checkpoint at every step after a signal"),
     ]),
-    "src/route/shorten.c": ([PLAN + "a_slalom_is_a_taut_string", "cli/test_route_planner.py"], [
-        ("any = move_all(planner, way, &tried) || any;", "(void)move_all;", "corners stay as they were found"),
-        ("bool any = leave_out(planner, way, &tried);", "bool any = false; (void)leave_out;", "no corner is left out"),
-        ("any = put_in(planner, way, &tried) || any;", "(void)put_in;", "no corner is put in"),
-        ("goal[0] = g[0] - u[0] * t,", "goal[0] = g[0] + u[0] * t,", "the goal drifts to the wrong side"),
-    ]),
     "src/route/lattice.c": ([PLAN + "what_keeps_out_elsewhere_changes_no_plan",
                              PLAN + "a_maze_is_crossed_by_its_openings", "cli/test_route_planner.py"], [
         ("(1 - 1e-9) * lattice->per_step * steps)", "2 * lattice->per_step * steps)", "a bound above the cost"),
@@ -1004,15 +999,12 @@ MUTANTS = {
          "routes found before do not repel"),
         ("a < cut - 1e-9 * lattice->h || b < cut - 1e-9 * lattice->h ||", "", "turns that their arcs do not fit into"),
     ]),
-    "src/route/no_go.c": ([PLAN + "the_gap_that_the_hull_fits_through",
+    "src/route/swath.c": ([PLAN + "the_ice_of_a_bend_is_that_of_a_ring", PLAN + "the_gap_that_the_hull_fits_through",
                            "cli/test_route_planner.py"], [
         ("at[1] + u[1] * now) - no_go->need;", "at[1] + u[1] * now);", "the centre may go where the hull may not"),
         ("at[0] + u[0] * now, at[1] + u[1] * now) - no_go->need;", "at[0], at[1]) - no_go->need;",
          "polygons stay where the ice goes by"),
         ("if (inside) return true;", "", "inside is free"),
-    ]),
-    "src/route/swath.c": ([PLAN + "the_ice_of_a_bend_is_that_of_a_ring",
-                           "cli/test_route_planner.py"], [
         ("bt_max(0, 1 - leg->turn * aside)", "1", "the inner side of an arc counts as the outer one"),
         ("(best.over && !cost.over) ||", "", "a speed above the force limit is kept"),
         ("const double wider = half > 0 ? sqrt(2 * half / bt_sin(2 * half)) : 1,", "const double wider = 1,",
@@ -1025,7 +1017,12 @@ MUTANTS = {
         ("bt_atan2(xy, half)", "0", "a long floe lies along the axes"),
         ("(1 + task->added_mass) * v * v", "v * v", "the water that floes take along is left out"),
     ]),
-    "src/route/plan.c": ([PLAN + "routes_are_a_width_apart", "cli/test_route_planner.py"], [
+    "src/route/plan.c": ([PLAN + "routes_are_a_width_apart", PLAN + "a_slalom_is_a_taut_string",
+                          "cli/test_route_planner.py"], [
+        ("any = move_all(planner, way, &tried) || any;", "(void)move_all;", "corners stay as they were found"),
+        ("bool any = leave_out(planner, way, &tried);", "bool any = false; (void)leave_out;", "no corner is left out"),
+        ("any = put_in(planner, way, &tried) || any;", "(void)put_in;", "no corner is put in"),
+        ("goal[0] = g[0] - u[0] * t,", "goal[0] = g[0] + u[0] * t,", "the goal drifts to the wrong side"),
         ("kept = kept && apart(route, &plan->route[a]) > t->width;", "(void)apart;", "routes on top of each other"),
         ("    if (w.n == 0) {", "    if (false) {", "no way-point where the search ends where it begins"),
         ("plan->route[b].cost < plan->route[b - 1].cost", "false", "routes in the order in which they are found"),

@@ -278,6 +278,9 @@ typedef struct bt_case {
     int n_extra;                 ///< keys that had been added when it was read: it knows of no others
 } bt_case;
 
+/// What messages call it.
+static inline const char *bt_case_name(const bt_case *input) { return input->path ? input->path : "case"; }
+
 /// Read and check a case file, with those that it is based on (its key `base`); every error of the files is appended to
 /// err with file, line, key and remedy.
 /// overrides: [n] texts "key=value" that replace the file's values. *input is overwritten, not released before; after

@@ -169,6 +169,11 @@ bt_status bt_case_check_text(const bt_simulation_options *options, char **resolv
 /// with bt_release.
 char *bt_simulation_case(const bt_simulation *sim);
 
+/// The keys without effect in a case that was run, by its text (case.resolved.yml, /case of result.h5), as one JSON
+/// object {"section.key": why}; why completes "has no effect ". Files that the text names are not read, and what is
+/// wrong with it is passed over. Release with bt_release.
+char *bt_case_unused(const char *text);
+
 /// What a file holds, by its keys: "case", "study", or "" of any other and of one that cannot be read.
 const char *bt_file_holds(const char *path);
 

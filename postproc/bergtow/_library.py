@@ -118,6 +118,7 @@ _SIGNATURES = {
     "bt_simulation_case": (c_void_p, c_void_p),
     "bt_simulation_contacts": (c_int64, c_void_p, POINTER(c_double), c_int64),
     "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p), POINTER(c_void_p)),
+    "bt_case_unused": (c_void_p, c_char_p),
     "bt_file_holds": (c_char_p, c_char_p),
     "bt_folder_lock": (Status, c_char_p, POINTER(c_int)),
     "bt_seal_check": (Status, c_char_p, c_char_p),
@@ -268,6 +269,11 @@ def listed(what: str) -> dict[str, Any]:
 def limit(name: str) -> Any:
     """A number by which the program judges windows, domains and maps, or a size of its inputs and outputs."""
     return listed("limits")[name]
+
+
+def unused(text: str) -> dict[str, str]:
+    """The keys without effect in the text of a case, with why: bt_case_unused."""
+    return json.loads(take_text(library().bt_case_unused(text.encode(errors="surrogateescape"))))
 
 
 def id_of_towed(towed: int | None) -> int:

@@ -34,9 +34,8 @@ enum { FIRST = 21, MOST = 118 }; // columns of a line
 static bool is_followed(const bt_case *input, const bt_key *key, double *value)
 {
     if (key->type != BT_KEY_REAL || !key->preset || key->preset[0] != '=') return false;
-    if (!strcmp(key->name, "domain.ahead") && input->domain.ends != BT_BOUND_MOVING) return false;
-    memcpy(value, (const char *)input + key->offset, sizeof *value);
-    return isfinite(*value) && !bt_case_is_unused(input, key->name) && !bt_case_changed(input, key->name);
+    *value = bt_value_number(key, input);
+    return isfinite(*value) && !bt_case_why_unused(input, key->name) && !bt_case_changed(input, key->name);
 }
 
 void bt_check_print_defaults(const bt_case *input)

@@ -300,7 +300,7 @@ static void print_cost(const bt_case *input, const bt_comm *comm, const bt_check
 static const char *warned(size_t n, char out[64])
 {
     out[0] = '\0';
-    if (n) snprintf(out, 64, ", with %zu warning%s", n, n > 1 ? "s" : "");
+    if (n) snprintf(out, 64, ", with %zu warning%s", n, bt_plural((int64_t)n));
     return out;
 }
 
@@ -383,13 +383,11 @@ static bt_status print_twin(bt_case *input, double ratio, bt_errors *err)
 static bt_status check_study(const options *opt, bt_errors *err)
 {
     if (!(opt->scale > 0) && !opt->json) return bt_check_study(&opt->file, bt_comm_world()->size, err);
-    if (opt->json)
-        bt_errors_add(err, "%s: is a study, and --json is for a case; check its base case, with --set for what varies",
-                      opt->file.path);
-    else
-        bt_errors_add(err, "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
-                      opt->file.path);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE,
+                   opt->json
+                       ? "%s: is a study, and --json is for a case; check its base case, with --set for what varies"
+                       : "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
+                   opt->file.path);
 }
 
 int bt_cmd_check(int argc, char **argv)

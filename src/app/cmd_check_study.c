@@ -274,7 +274,7 @@ static void print_work(const bt_study *study, double memory, double disk, double
                            study->ranks, study->ranks);
     else if (ranks > 1)
         printf("ranks                %d: %" PRId64 " member%s at a time, %" PRId64 " rank%s each%s\n", ranks, groups,
-               groups > 1 ? "s" : "", study->ranks, study->ranks > 1 ? "s" : "",
+               bt_plural(groups), study->ranks, bt_plural(study->ranks),
                ranks % study->ranks ? "; some ranks are left over" : "");
     printf("memory               about %.3g MB for one member", memory / 1e6);
     if (groups > 1) printf(", %.3g MB for %" PRId64 " at a time", memory / 1e6 * (double)groups, groups);

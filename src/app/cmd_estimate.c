@@ -82,12 +82,11 @@ int bt_cmd_estimate(int argc, char **argv)
     bt_field_init(&field);
     bt_status status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
     if (status == BT_OK && bt_case_reads_field(&input)) status = bt_field_load(&input, &field, &err);
-    if (status == BT_OK && input.tow.mode == BT_TOW_NONE) {
-        bt_errors_add(&err, "%s: %s, and the estimates are of the force on a towed body; %s", opt.file.path,
-                      input.body.shape == BT_BODY_ABSENT ? "body.shape: none" : "tow.mode: none",
-                      input.body.shape == BT_BODY_ABSENT ? "give it a body and a tow" : "set tow.mode and tow.speed");
-        status = BT_ERR_CASE;
-    }
+    if (status == BT_OK && input.tow.mode == BT_TOW_NONE)
+        status = bt_fail(&err, BT_ERR_CASE,
+            "%s: %s, and the estimates are of the force on a towed body; %s", opt.file.path,
+            input.body.shape == BT_BODY_ABSENT ? "body.shape: none" : "tow.mode: none",
+            input.body.shape == BT_BODY_ABSENT ? "give it a body and a tow" : "set tow.mode and tow.speed");
     if (status == BT_OK) {
         bt_estimate_input in;
         bt_estimate_conditions(&input, &in);

@@ -69,13 +69,11 @@ int bt_cmd_field(int argc, char **argv)
     bt_status status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
     // A field that is read and written in the same form is the file there is.
     const bool outlines = ends_in(opt.output, ".geojson", ".json"), fixed = ends_in(opt.output, ".yml", ".yaml");
-    if (status == BT_OK && input.ice.field && !outlines && !fixed) {
-        bt_errors_add(&err,
-                      "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines "
-                      "with -o FIELD.geojson",
-                      opt.file.path, input.ice.field);
-        status = BT_ERR_CASE;
-    }
+    if (status == BT_OK && input.ice.field && !outlines && !fixed)
+        status = bt_fail(&err, BT_ERR_CASE,
+            "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines "
+            "with -o FIELD.geojson",
+            opt.file.path, input.ice.field);
     const bool ours =
         outlines ? bt_field_outlines_ours(opt.output)
         : fixed  ? bt_field_fixed_ours(opt.output)

@@ -79,9 +79,8 @@ static bt_status check_dump(const bt_run_options *run, const bt_case *input, bt_
 {
     const int64_t all = bt_case_steps(input), last = run->max_steps > 0 && run->max_steps < all ? run->max_steps : all;
     if (run->dump_step <= last) return BT_OK;
-    bt_errors_add(err, "--dump-contacts: step %" PRId64 " is not computed: the last one is %" PRId64,
-                  run->dump_step, last);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE, "--dump-contacts: step %" PRId64 " is not computed: the last one is %" PRId64,
+                   run->dump_step, last);
 }
 
 int bt_cmd_run(int argc, char **argv)

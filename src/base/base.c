@@ -119,6 +119,15 @@ void bt_errors_add(bt_errors *err, const char *fmt, ...)
     va_end(ap);
 }
 
+bt_status bt_fail(bt_errors *err, bt_status status, const char *fmt, ...)
+{
+    va_list ap;
+    va_start(ap, fmt);
+    bt_errors_add_list(err, fmt, ap);
+    va_end(ap);
+    return status;
+}
+
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
 {
     if (err->n == err->cap) {

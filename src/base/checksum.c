@@ -70,10 +70,8 @@ bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST]
     const bool gone = reason == ENOENT || reason == ENXIO, odd = !reason && !S_ISREG(st.st_mode);
     if (!reason && !odd && !digest(fd, st.st_size, out)) reason = errno;
     if (fd >= 0) close(fd);
-    if (gone || odd) {
-        bt_errors_add(err, "%s: %s", path, gone ? "is missing" : "is no regular file");
-        return BT_ERR_CASE;
-    }
+    if (gone || odd)
+        return bt_fail(err, BT_ERR_CASE, "%s: %s", path, gone ? "is missing" : "is no regular file");
     *bytes = reason ? 0 : (int64_t)st.st_size;
     return reason ? bt_file_fail(path, "read the file", reason, err) : BT_OK;
 }

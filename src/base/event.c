@@ -2,6 +2,8 @@
 // The list of events; see bergtow/event.h.
 #include "bergtow/event.h"
 
+#include "base/inside.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,10 +16,7 @@ const char *const bt_event_names[BT_EVENT_KINDS] = {
 
 void bt_events_add(bt_events *events, double time, bt_event_kind kind, int64_t subject, double value)
 {
-    if (events->n == events->cap) {
-        events->cap = events->cap ? 2 * events->cap : 16;
-        events->event = bt_realloc(events->event, (size_t)events->cap, sizeof *events->event);
-    }
+    BT_MAKE_ROOM(events->event, events->n, events->cap, 16);
     events->event[events->n++] = (bt_event){time, kind, subject, value};
 }
 

@@ -38,9 +38,8 @@ const char *bt_file_remedy(int errnum)
 
 bt_status bt_file_fail(const char *path, const char *action, int errnum, bt_errors *err)
 {
-    bt_errors_add(err, "%s: cannot %s: %s; %s", path, action, errnum ? strerror(errnum) : "unknown reason",
-                  bt_file_remedy(errnum));
-    return BT_ERR_IO;
+    return bt_fail(err, BT_ERR_IO, "%s: cannot %s: %s; %s", path, action, errnum ? strerror(errnum) : "unknown reason",
+                   bt_file_remedy(errnum));
 }
 
 char *bt_file_folder(const char *path)
@@ -121,9 +120,9 @@ bt_status bt_file_may_take(const char *path, bt_errors *err)
     const char *kind = stat(path, &st) == 0 && !S_ISDIR(st.st_mode) ? kind_of(st.st_mode) : NULL;
     if (!kind && (is_own_descriptor(path) || !strncmp(path, "/dev/std", 8))) kind = "an open descriptor";
     if (!kind) return BT_OK; // a folder in the way is reported by the system
-    bt_errors_add(err, "%s: is %s, not a regular file, and is not replaced; move it away, or give another name",
-                  path, kind);
-    return BT_ERR_IO;
+    return bt_fail(err, BT_ERR_IO,
+                   "%s: is %s, not a regular file, and is not replaced; move it away, or give another name",
+                   path, kind);
 }
 
 /// text: as bt_file_read_to and bt_file_read word it; streams: pipes that this process was given are accepted.
@@ -188,17 +187,13 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
     if (n >= 3 && !memcmp(*text, "\xef\xbb\xbf", 3)) memmove(*text, *text + 3, n -= 3);
     (*text)[n] = 0;
     *size = n;
-    if (broken) {
-        bt_errors_add(err, "%s: reading failed: %s; check the disk", path, strerror(broken));
-        return BT_ERR_IO;
-    }
-    if (n > most) {
-        bt_errors_add(err,
-                      "%s: larger than %zu MiB, which %s never is; check the name (large fields belong in an HDF5 file "
-                      "that ice.field names)",
-                      path, most >> 20, what);
-        return BT_ERR_CASE;
-    }
+    if (broken)
+        return bt_fail(err, BT_ERR_IO, "%s: reading failed: %s; check the disk", path, strerror(broken));
+    if (n > most)
+        return bt_fail(err, BT_ERR_CASE,
+            "%s: larger than %zu MiB, which %s never is; check the name (large fields belong in an HDF5 file "
+            "that ice.field names)",
+            path, most >> 20, what);
     return BT_OK;
 }
 
@@ -214,9 +209,7 @@ bt_status bt_file_read_to(const char *path, const char *what, size_t most, char 
 
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
 {
-    const size_t size = strlen(path) + sizeof ".tmp", n = strlen(text);
-    char *temporary = bt_alloc(size, 1);
-    snprintf(temporary, size, "%s.tmp", path);
+    char *temporary = bt_text_of("%s.tmp", path);
     if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) {
         free(temporary);
         return BT_ERR_IO;
@@ -226,7 +219,7 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     // which the rename replaces.
     unlink(temporary);
     const int fd = bt_file_descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
-    int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, n);
+    int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, strlen(text));
     // a full disk shows at the sync or at the close as often as at the write itself
     if (!reason) reason = bt_file_sync(fd);
     const int closed = fd < 0 ? 0 : bt_file_close(fd);

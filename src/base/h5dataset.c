@@ -91,6 +91,26 @@ void bt_h5_describe(bt_h5 *h5, const char *dataset, const char *axes, const char
     if (axes) bt_h5_axes(h5, dataset, axes);
 }
 
+void bt_h5_put(bt_h5 *h5, const char *name, hid_t type, hsize_t n, hsize_t width, const void *data, const char *axes,
+               const char *units, const char *meaning)
+{
+    bt_h5_write(h5, name, type, n, width, data);
+    bt_h5_describe(h5, name, axes, units, meaning);
+}
+
+void bt_h5_put_names(bt_h5 *h5, const char *name, hsize_t n, const char *const *names, const char *axis,
+                     const char *meaning)
+{
+    bt_h5_write_names(h5, name, n, names);
+    bt_h5_describe(h5, name, axis, NULL, meaning);
+}
+
+void bt_h5_put_text(bt_h5 *h5, const char *name, const char *text, const char *meaning)
+{
+    bt_h5_write_text(h5, name, text);
+    bt_h5_describe(h5, name, NULL, NULL, meaning);
+}
+
 void bt_h5_describe_file(bt_h5 *h5, const char *title)
 {
     bt_h5_attr_text(h5, "/", "Conventions", "CF-1.8");

@@ -24,6 +24,15 @@ void bt_h5_units(bt_h5 *h5, const char *dataset, const char *units);
 /// not named.
 void bt_h5_describe(bt_h5 *h5, const char *dataset, const char *axes, const char *units, const char *meaning);
 
+/// bt_h5_write and bt_h5_describe.
+void bt_h5_put(bt_h5 *h5, const char *name, hid_t type, hsize_t n, hsize_t width, const void *data, const char *axes,
+               const char *units, const char *meaning);
+/// The same of texts [n].
+void bt_h5_put_names(bt_h5 *h5, const char *name, hsize_t n, const char *const *names, const char *axis,
+                     const char *meaning);
+/// The same of one text.
+void bt_h5_put_text(bt_h5 *h5, const char *name, const char *text, const char *meaning);
+
 /// The axes alone, where a coordinate is made after the dataset.
 void bt_h5_axes(bt_h5 *h5, const char *dataset, const char *axes);
 

@@ -91,8 +91,7 @@ bt_status bt_h5_open(bt_h5_reader *reader, const char *path, const char *kind, b
     if (reader->file < 0 || *reader->errnum) {
         fail(reader, "as HDF5 it");
     } else if (!sound) {
-        bt_errors_add(err, "%s", found.text[0]);
-        reader->status = BT_ERR_CASE;
+        reader->status = bt_fail(err, BT_ERR_CASE, "%s", found.text[0]);
     }
     bt_errors_free(&found);
     return reader->status;

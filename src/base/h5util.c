@@ -295,18 +295,25 @@ static hid_t opened(bool packed)
     return p;
 }
 
-hid_t bt_h5_dataset(bt_h5 *h5, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk)
+/// most: NULL = as now; chunk: NULL = contiguous.
+static hid_t create_dataset(bt_h5 *h5, const char *name, hid_t type, int rank, const hsize_t *now, const hsize_t *most,
+                            const hsize_t *chunk, bool packed)
 {
-    if (idle(h5)) return -1;
-    const hid_t space = H5Screate_simple(rank, dims, NULL);
-    const hid_t create = layout(h5, rank, chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0),
-                access = opened(chunk > 0);
+    const hid_t space = H5Screate_simple(rank, now, most), create = layout(h5, rank, chunk, packed),
+                access = opened(packed);
     const hid_t d = H5Dcreate2(h5->file, name, type, space, H5P_DEFAULT, create, access);
     bt_h5_check(h5, d >= 0);
     if (access != H5P_DEFAULT) H5Pclose(access);
     H5Pclose(create);
     H5Sclose(space);
     return d;
+}
+
+hid_t bt_h5_dataset(bt_h5 *h5, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk)
+{
+    if (idle(h5)) return -1;
+    return create_dataset(h5, name, type, rank, dims, NULL,
+                          chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0);
 }
 
 static hid_t text_type(size_t size)
@@ -381,14 +388,7 @@ hid_t bt_h5_growing(bt_h5 *h5, const char *name, hid_t type, int rank, const hsi
         most[k] = now[k] ? now[k] : 1;
         piece[k] = k == 1 ? chunk[1] : most[k];
     }
-    const hid_t space = H5Screate_simple(rank, now, most), create = layout(h5, rank, piece, packed),
-                access = opened(packed);
-    const hid_t d = H5Dcreate2(h5->file, name, type, space, H5P_DEFAULT, create, access);
-    bt_h5_check(h5, d >= 0);
-    if (access != H5P_DEFAULT) H5Pclose(access);
-    H5Pclose(create);
-    H5Sclose(space);
-    return d;
+    return create_dataset(h5, name, type, rank, now, most, piece, packed);
 }
 
 static int extent(hid_t dataset, hsize_t size[3])

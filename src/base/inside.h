@@ -19,6 +19,12 @@ void bt_point_end(void *before);
 /// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
 void bt_leave_by(void (*by)(int code));
 
+/// Room in a list for one entry more than n: cap entries, twice as many each time, `first` to begin with.
+#define BT_MAKE_ROOM(list, n, cap, first)                                                                              \
+    do {                                                                                                               \
+        if ((n) == (cap)) (list) = bt_realloc(list, (size_t)((cap) = (cap) ? 2 * (cap) : (first)), sizeof *(list));    \
+    } while (0)
+
 // Order of doubles for qsort.
 
 static inline int bt_ascending(const void *a, const void *b)

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/inside.h"
+#include "base/name.h"
 
 static void put(bt_json *json, const char *s, size_t n)
 {
@@ -27,28 +28,11 @@ static void put(bt_json *json, const char *s, size_t n)
 
 static void puts_(bt_json *json, const char *s) { put(json, s, strlen(s)); }
 
-/// Length of the valid UTF-8 sequence at s (RFC 3629), 0 when there is none.
-static size_t utf8_length(const unsigned char *s)
-{
-    if (s[0] < 0x80) return 1;
-    const size_t n = s[0] >= 0xc2 && s[0] <= 0xdf   ? 2
-                     : (s[0] & 0xf0) == 0xe0        ? 3
-                     : s[0] >= 0xf0 && s[0] <= 0xf4 ? 4
-                                                    : 0;
-    for (size_t i = 1; i < n; i++)
-        if ((s[i] & 0xc0) != 0x80) return 0;
-    if (s[0] == 0xe0 && s[1] < 0xa0) return 0; // longer than needed
-    if (s[0] == 0xed && s[1] > 0x9f) return 0; // surrogates
-    if (s[0] == 0xf0 && s[1] < 0x90) return 0;
-    if (s[0] == 0xf4 && s[1] > 0x8f) return 0; // beyond U+10FFFF
-    return n;
-}
-
 static void put_string(bt_json *json, const char *value)
 {
     puts_(json, "\"");
     for (const unsigned char *s = (const unsigned char *)value; *s; ) {
-        const size_t n = utf8_length(s);
+        const size_t n = bt_utf8_length(s);
         if (n == 0) {
             puts_(json, "\\ufffd");
             s++;

@@ -15,6 +15,22 @@ bool bt_is_name(const char *s, int most)
     return *s && strlen(s) <= (size_t)most;
 }
 
+size_t bt_utf8_length(const unsigned char *s)
+{
+    if (s[0] < 0x80) return 1;
+    const size_t n = s[0] >= 0xc2 && s[0] <= 0xdf   ? 2
+                     : (s[0] & 0xf0) == 0xe0        ? 3
+                     : s[0] >= 0xf0 && s[0] <= 0xf4 ? 4
+                                                    : 0;
+    for (size_t i = 1; i < n; i++)
+        if ((s[i] & 0xc0) != 0x80) return 0;
+    if (s[0] == 0xe0 && s[1] < 0xa0) return 0; // longer than needed
+    if (s[0] == 0xed && s[1] > 0x9f) return 0; // surrogates
+    if (s[0] == 0xf0 && s[1] < 0x90) return 0;
+    if (s[0] == 0xf4 && s[1] > 0x8f) return 0; // beyond U+10FFFF
+    return n;
+}
+
 bool bt_next_name(const char **names, char name[BT_LONGEST_KEY])
 {
     if (!**names) return false;

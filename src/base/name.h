@@ -18,6 +18,9 @@ extern bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
 /// The next of names with blanks between them, such as those of keys, cut to its room; false after the last.
 bool bt_next_name(const char **names, char name[BT_LONGEST_KEY]);
 
+/// Bytes of the valid UTF-8 sequence at s (RFC 3629), which ends with a 0; 0 when there is none.
+size_t bt_utf8_length(const unsigned char *s);
+
 // --- the closest word ------------------------------------------------------------------------------------------------
 
 // The known word closest to a mistyped one, for "did you mean".

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A set of named arrays: adding, taking, sharing, comparing.
 #include "base/snapshot.h"
+#include "base/inside.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -22,8 +23,7 @@ static size_t bytes_of(const bt_item *item) { return (size_t)item->n * (size_t)i
 
 void *bt_snapshot_begin(bt_snapshot *snap, const char *name, bt_item_type type, int64_t n, int width)
 {
-    if (snap->n == snap->cap)
-        snap->item = bt_realloc(snap->item, (size_t)(snap->cap = snap->cap ? 2 * snap->cap : 64), sizeof *snap->item);
+    BT_MAKE_ROOM(snap->item, snap->n, snap->cap, 64);
     bt_item *item = &snap->item[snap->n++];
     *item = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
     snap->rows = 0;

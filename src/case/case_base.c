@@ -124,10 +124,9 @@ static const bt_case_file *find(const bt_case_files *files, const char *absolute
 static bt_status read_base(bt_case_files *files, const bt_node *value, int line, bt_errors *err)
 {
     const char *from = files->file[files->n - 1].path;
-    if (value->kind != BT_NODE_SCALAR || !*value->text) {
-        bt_errors_add(err, "%s:%d: base: needs the name of one file, as in base: basin-80.yml", from, line);
-        return BT_ERR_CASE;
-    }
+    if (value->kind != BT_NODE_SCALAR || !*value->text)
+        return bt_fail(err, BT_ERR_CASE, "%s:%d: base: needs the name of one file, as in base: basin-80.yml", from,
+                       line);
     char *folder = bt_file_folder(from),
          *path = *value->text == '/' ? bt_text_copy(value->text) : bt_file_join(folder, value->text),
          *absolute = realpath(path, NULL), *text = NULL;
@@ -164,10 +163,8 @@ bt_status bt_case_files_read(bt_case_files *files, const char *path, const char 
     add(files, bt_text_copy(path), memcpy(copy, text, size), size);
     bt_status status = parse(files, err);
     int line = 0;
-    if (status == BT_OK && alone && bt_tree_has(files->file[0].root, "base")) {
-        bt_errors_add(err, "%s: base: a case stored with a result has none; the file is damaged", path);
-        status = BT_ERR_CASE;
-    }
+    if (status == BT_OK && alone && bt_tree_has(files->file[0].root, "base"))
+        status = bt_fail(err, BT_ERR_CASE, "%s: base: a case stored with a result has none; the file is damaged", path);
     for (const bt_node *base; status == BT_OK && (base = entry(files->file[files->n - 1].root, "base", &line));)
         status = read_base(files, base, line, err);
     return status;

@@ -123,10 +123,8 @@ static bool is_basin(const bt_case *input) { return input->domain.frame == BT_FR
 /// May the run use the value of this key?
 static bool is_used(const bt_case *input, const char *key, bool by_hand)
 {
-    if (bt_case_is_unused(input, key)) return false;
-    if (!strcmp(key, "ice.thickness")) return bt_case_makes_ice(input) || by_hand || input->ice.outlines;
-    if (!strcmp(key, "tow.speed")) return input->body.shape != BT_BODY_ABSENT && input->tow.mode != BT_TOW_NONE;
-    return true;
+    if (bt_case_why_unused(input, key)) return false;
+    return strcmp(key, "ice.thickness") || bt_case_makes_ice(input) || by_hand || input->ice.outlines;
 }
 
 /// Numbers that nobody gave, that have an effect, and whose default is a model basin's, become NaN. by_hand: there are
@@ -403,7 +401,7 @@ static void check_floe(const bt_check *check, int index)
     char where[256];
     const char *file = input->floes_path ? input->floes_path : input->path;
     if (floe->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", file ? file : "case", floe->line, index);
-    else snprintf(where, sizeof where, "%.180s: floes[%d]", input->path ? input->path : "case", index);
+    else snprintf(where, sizeof where, "%.180s: floes[%d]", bt_case_name(input), index);
     bool polygon = floe->shape == BT_BODY_POLYGON;
     const size_t before = check->err->n;
     if (polygon && !floe->n_vertices)

@@ -43,10 +43,8 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
     double v[2 * BT_MAX_VERTICES];
     const int n = outline(2, 1, v);
     const char *fault = bt_shape_fault(n, v);
-    if (fault) {
-        bt_errors_add(err, "shape %s: of 2 m by 1 m it is no outline: %s", name, fault);
-        return BT_ERR_USAGE;
-    }
+    if (fault)
+        return bt_fail(err, BT_ERR_USAGE, "shape %s: of 2 m by 1 m it is no outline: %s", name, fault);
     added[n_added] = outline;
     bt_body_shapes[BT_OWN_SHAPES + n_added++] = name;
     return BT_OK;

@@ -11,7 +11,7 @@
 
 void bt_case_locate(const bt_case *input, const bt_origin *origin, const char *key, char out[256])
 {
-    const char *path = origin && origin->file ? origin->file : input->path ? input->path : "case";
+    const char *path = origin && origin->file ? origin->file : bt_case_name(input);
     if (origin && origin->set && origin->place) snprintf(out, 256, "%.120s%.130s", origin->place, origin->set);
     else if (origin && origin->set) snprintf(out, 256, "--set %.240s", origin->set);
     else if (origin && origin->line > 0) snprintf(out, 256, "%.160s:%d: %s", path, origin->line, key);

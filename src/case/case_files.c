@@ -107,9 +107,9 @@ bt_status bt_case_itself_same(const char *path, const char *text, const char *di
 {
     const char *line = comment_in(text, ITSELF);
     if (line && is_itself(text, line)) return BT_OK;
-    bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
-                       "(bergtow run)", path, dir);
-    return BT_ERR_CASE;
+    return bt_fail(err, BT_ERR_CASE,
+                   "%s: has changed since the run in %s began; restore it, or begin another run with it "
+                   "(bergtow run)", path, dir);
 }
 
 bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err)
@@ -119,11 +119,10 @@ bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *e
         char *now = comment_of(input, &bt_case_keys[k]);
         const char *file = bt_case_file(input, &bt_case_keys[k]),
                    *before = comment_in(input->text, bt_case_keys[k].name);
-        if (now && (!before || strncmp(before, now, strlen(now)))) {
-            bt_errors_add(err, "%s: has changed since the run in %s began; restore it, or begin another run with it "
-                               "(bergtow run)", file, dir);
-            status = BT_ERR_CASE;
-        }
+        if (now && (!before || strncmp(before, now, strlen(now))))
+            status = bt_fail(err, BT_ERR_CASE,
+                             "%s: has changed since the run in %s began; restore it, or begin another run with it "
+                             "(bergtow run)", file, dir);
         free(now);
     }
     return status;

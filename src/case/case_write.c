@@ -49,18 +49,15 @@ static void member_of(const bt_case *input, const bt_key *key, void *out, size_t
 static void json_value(bt_json *json, const bt_key *key, const bt_case *input)
 {
     union {
-        double real;
-        int64_t integer;
-        bool yes;
+        int64_t whole;
         unsigned choice;
         const char *text;
         const double *points;
     } v;
     switch (key->type) {
-    case BT_KEY_REAL: member_of(input, key, &v.real, sizeof v.real), bt_json_number(json, key->name, v.real); break;
-    case BT_KEY_INT: member_of(input, key, &v.integer, sizeof v.integer),
-    bt_json_int(json, key->name, v.integer); break;
-    case BT_KEY_BOOL: member_of(input, key, &v.yes, sizeof v.yes), bt_json_bool(json, key->name, v.yes); break;
+    case BT_KEY_REAL: bt_json_number(json, key->name, bt_value_number(key, input)); break;
+    case BT_KEY_INT: member_of(input, key, &v.whole, sizeof v.whole), bt_json_int(json, key->name, v.whole); break;
+    case BT_KEY_BOOL: bt_json_bool(json, key->name, bt_value_number(key, input) != 0); break;
     case BT_KEY_CHOICE:
         member_of(input, key, &v.choice, sizeof v.choice);
         bt_json_string(json, key->name, key->choices[v.choice]);

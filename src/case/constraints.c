@@ -24,8 +24,8 @@
 
 // --- keys without effect ---------------------------------------------------------------------------------------------
 
-/// When keys without effect are refused.
-typedef enum { TOGETHER, ALWAYS } refusal;
+/// When keys without effect are refused; NEVER: nor is there a warning, as the program itself gives them a value.
+typedef enum { TOGETHER, ALWAYS, NEVER } refusal;
 
 /// Keys that are not used.
 typedef struct idle {
@@ -40,7 +40,7 @@ typedef struct idle {
     "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
     "tow.branch2.breaking_load"
 
-enum { IDLE = 36 };
+enum { IDLE = 38 };
 
 static void list_idle(const bt_case *input, idle out[IDLE])
 {
@@ -114,6 +114,9 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          "impact.conversion", "without impact.conversion: crushing"},
         {input->impact.conversion == BT_IMPACT_NONE, TOGETHER, "impact.least_speed", "impact.conversion",
          "where collisions are not told apart (impact.conversion)"},
+        {input->domain.ends != BT_BOUND_MOVING, NEVER, "domain.ahead", "domain.ends", "without a moving window"},
+        {input->body.shape == BT_BODY_ABSENT || input->tow.mode == BT_TOW_NONE, NEVER, "tow.speed", "tow.mode",
+         "without a tow"},
         {input->domain.ends != BT_BOUND_WALL, ALWAYS, "domain.ends_closing", "domain.ends", "without a wall to move"},
         {input->domain.sides != BT_BOUND_WALL, ALWAYS, "domain.sides_closing", "domain.sides",
          "without a wall to move"},
@@ -123,9 +126,9 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          "without a named line"},
         {input->water.tilt != BT_TILT_SLOPE, ALWAYS, "water.slope_x water.slope_y", "water.tilt",
          "without water.tilt: slope"},
-        {input->water.table.n > 0, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
+        {input->water.current_table, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
          "water.current_table", "with water.current_table, which gives all of it"},
-        {input->air.table.n > 0, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
+        {input->air.wind_table, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
          "with air.wind_table, which gives all of it"},
         {!input->ice.outlines, ALWAYS, "ice.outlines_crs", "ice.outlines", "without ice.outlines"},
         {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that is made, whose floes are convex"},
@@ -153,26 +156,24 @@ static bt_case with_default(const bt_case *c, const bt_key *key)
     return d;
 }
 
-bool bt_case_is_unused(const bt_case *input, const char *key)
+const char *bt_case_why_unused(const bt_case *input, const char *key)
 {
     idle rules[IDLE];
     char name[BT_LONGEST_KEY];
     list_idle(input, rules);
     for (int i = 0; i < IDLE; i++)
         for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
-            if (!strcmp(name, key)) return true;
-    return false;
+            if (!strcmp(name, key)) return rules[i].why;
+    return NULL;
 }
 
 bool bt_case_changed(const bt_case *c, const char *key)
 {
     const bt_key *k = row_of(key);
-    const void *at = (const char *)c + k->offset;
-    double value = 0;
     if (k->type == BT_KEY_POINTS) return *(const int *)(const void *)((const char *)c + k->offset_count) > 0;
-    if (k->type == BT_KEY_REAL) memcpy(&value, at, sizeof value);
+    if (k->type == BT_KEY_REAL && isnan(bt_value_number(k, c))) return false;
     const bt_case d = with_default(c, k);
-    return !isnan(value) && memcmp(at, (const char *)&d + k->offset, size_of(k)) != 0;
+    return memcmp((const char *)c + k->offset, (const char *)&d + k->offset, size_of(k)) != 0;
 }
 
 /// Calls found for each key that is not used although its value is not the default.
@@ -182,7 +183,7 @@ static void look(const bt_case *input, void (*found)(void *to, const char *key, 
     char name[BT_LONGEST_KEY];
     list_idle(input, rules);
     for (int i = 0; i < IDLE; i++)
-        for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
+        for (const char *keys = rules[i].keys; rules[i].so && rules[i].refused != NEVER && bt_next_name(&keys, name);)
             if (bt_case_changed(input, name)) found(to, name, &rules[i]);
 }
 
@@ -443,8 +444,7 @@ static void refuse_limit(const bt_check *check, const limit *l)
     static const char *const broken[] = {[BELOW] = "not below", [AT_MOST] = "more than", [AT_LEAST] = "less than"};
     const bt_key *row = row_of(l->key);
     const bool is_key = l->of && !strchr(l->of, ' ');
-    double value = 1;
-    if (row->type == BT_KEY_REAL) memcpy(&value, (const char *)check->c + row->offset, sizeof value);
+    const double value = row->type == BT_KEY_REAL ? bt_value_number(row, check->c) : 1;
     const bool bad[] = {[REFUSED] = true,
                         [NEEDED] = !(value > 0),
                         [BELOW] = value >= l->bound,

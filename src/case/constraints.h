@@ -19,8 +19,8 @@ void bt_case_mark_idle(const bt_case *input, bool *idle_key);
 /// Give a key of a number or a choice its default.
 void bt_case_put_default(bt_case *c, int key);
 
-/// Has this key no effect, whatever its value?
-bool bt_case_is_unused(const bt_case *input, const char *key);
+/// Of a key that has no effect, whatever its value: what completes "has no effect "; NULL of others.
+const char *bt_case_why_unused(const bt_case *input, const char *key);
 
 /// Has a key of a number, a choice or points another value than its default, which others may set?
 bool bt_case_changed(const bt_case *c, const char *key);

@@ -205,17 +205,15 @@ bt_status bt_cost_fits(const bt_case *input, double n_floes, const bt_comm *comm
     const double need = bt_cost_memory(input, n_floes, 0, comm->size, comm->ranks_here),
                  result = bt_cost_disk_of(input, n_floes, bt_cost_corners(input, NULL, n_floes), 2).result;
     if (result > BT_MOST_RESULT_BYTES) { // of a field that was read; of others the case is refused
-        bt_errors_add(err,
-                      "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g "
-                      "are written; lengthen it, or raise output.sample_every",
-                      input->path ? input->path : "case", n_floes, result, BT_MOST_RESULT_BYTES);
-        return BT_ERR_CASE;
+        return bt_fail(err, BT_ERR_CASE,
+                       "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g "
+                       "are written; lengthen it, or raise output.sample_every",
+                       bt_case_name(input), n_floes, result, BT_MOST_RESULT_BYTES);
     }
     if (need <= machine) return BT_OK;
-    bt_errors_add(err,
-                  "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take "
-                  "larger floes (ice.size), a smaller region, fewer steps (run.duration), "
-                  "or more machines (mpirun)",
-                  input->path ? input->path : "case", n_floes, (double)bt_case_steps(input), need / 1e9, machine / 1e9);
-    return BT_ERR_CASE;
+    return bt_fail(err, BT_ERR_CASE,
+        "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take "
+        "larger floes (ice.size), a smaller region, fewer steps (run.duration), "
+        "or more machines (mpirun)",
+        bt_case_name(input), n_floes, (double)bt_case_steps(input), need / 1e9, machine / 1e9);
 }

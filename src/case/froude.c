@@ -57,7 +57,7 @@ static void refuse_range(const bt_case *input, const bt_key *key, double value, 
     bt_units_parse("1", key->unit, &one, why);
     const char *unit = bt_units_bare(key->unit);
     bt_errors_add(err, "%s: %s: becomes %g in the twin of scale %g, out of its range %s%s%s; take a scale nearer to 1",
-                  input->path ? input->path : "case", key->name, value / one, ratio, key->range,
+                  bt_case_name(input), key->name, value / one, ratio, key->range,
                   strcmp(unit, "-") ? " " : "", strcmp(unit, "-") ? unit : "");
 }
 
@@ -108,7 +108,7 @@ static void scale_members(const bt_case *input, const bt_key *keys, int n, void 
             if (text && ratio != 1 && !is_plain(key->name))
                 bt_errors_add(
                     err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
-                    input->path ? input->path : "case", key->name, text);
+                    bt_case_name(input), key->name, text);
             break;
         }
         case BT_KEY_INT:

@@ -92,6 +92,9 @@ bool bt_value_range(const bt_key *key, bt_range *range);
 /// the member keeps its value and why says reason and remedy. Not for points.
 bool bt_value_read(const bt_key *key, void *base, const char *text, bool plain, char why[BT_WHY]);
 
+/// The member of a number or a switch (0 or 1) as a double; NaN of other keys.
+double bt_value_number(const bt_key *key, const void *base);
+
 /// Read the coordinate of a point, with the key's unit and range.
 bool bt_value_read_coordinate(const bt_key *key, const char *text, double *value, char why[BT_WHY]);
 

@@ -81,35 +81,29 @@ static void init_gamma(bt_sizes *sizes)
 
 bt_status bt_sizes_init(bt_sizes *sizes, const bt_case *input, bt_errors *err)
 {
-    const char *path = input->path ? input->path : "case";
+    const char *path = bt_case_name(input);
     *sizes = (bt_sizes){.law = input->ice.size_law, .mean = input->ice.size, .spread = input->ice.size_spread,
                         .min = input->ice.size_min, .max = input->ice.size_max, .exponent = input->ice.size_exponent};
     if (sizes->law == BT_SIZE_POWER) {
-        if (!(sizes->min > 0 && sizes->max > sizes->min && sizes->exponent > 0)) {
-            bt_errors_add(err,
-                          "%s: ice.size_law: power needs 0 < ice.size_min < ice.size_max and ice.size_exponent > 0, "
-                          "got %g m, %g m and %g",
-                          path, sizes->min, sizes->max, sizes->exponent);
-            return BT_ERR_CASE;
-        }
+        if (!(sizes->min > 0 && sizes->max > sizes->min && sizes->exponent > 0))
+            return bt_fail(err, BT_ERR_CASE,
+                           "%s: ice.size_law: power needs 0 < ice.size_min < ice.size_max and ice.size_exponent > 0, "
+                           "got %g m, %g m and %g",
+                           path, sizes->min, sizes->max, sizes->exponent);
         return BT_OK;
     }
-    if (!(sizes->mean > 0) || !(sizes->spread >= 0)) {
-        bt_errors_add(err, "%s: ice.size: needs a positive size and a spread of zero or more, got %g m and %g", path,
-                      sizes->mean, sizes->spread);
-        return BT_ERR_CASE;
-    }
+    if (!(sizes->mean > 0) || !(sizes->spread >= 0))
+        return bt_fail(err, BT_ERR_CASE,
+                       "%s: ice.size: needs a positive size and a spread of zero or more, got %g m and %g", path,
+                       sizes->mean, sizes->spread);
     if (sizes->law == BT_SIZE_SINGLE && sizes->spread > 0) init_gamma(sizes);
     if (sizes->law != BT_SIZE_LOGNORMAL || sizes->spread == 0) return BT_OK;
     sizes->sigma = sqrt(bt_log1p(sizes->spread * sizes->spread));
     sizes->mu = bt_log(sizes->mean) - sizes->sigma * sizes->sigma / 2;
     if (sizes->min <= 0 && sizes->max <= 0) return BT_OK;
-    if ((sizes->min > 0 && sizes->mean <= sizes->min) || (sizes->max > 0 && sizes->mean >= sizes->max)) {
-        bt_errors_add(
-            err, "%s: ice.size: %g m is %s; move the limits apart", path, sizes->mean,
+    if ((sizes->min > 0 && sizes->mean <= sizes->min) || (sizes->max > 0 && sizes->mean >= sizes->max))
+        return bt_fail(err, BT_ERR_CASE, "%s: ice.size: %g m is %s; move the limits apart", path, sizes->mean,
             sizes->min > 0 && sizes->mean <= sizes->min ? "not above ice.size_min" : "not below ice.size_max");
-        return BT_ERR_CASE;
-    }
     double low = sizes->mu - 3 * sizes->sigma, high = sizes->mu + 3 * sizes->sigma;
     for (int k = 0; k < 100; k++) {
         sizes->mu = (low + high) / 2;
@@ -119,12 +113,10 @@ bt_status bt_sizes_init(bt_sizes *sizes, const bt_case *input, bt_errors *err)
     // of all that is drawn, what lies between the limits: the rest is drawn again
     const double share = normal_cdf(sizes->max > 0 ? (bt_log(sizes->max) - sizes->mu) / sizes->sigma : INFINITY) -
                          normal_cdf(sizes->min > 0 ? (bt_log(sizes->min) - sizes->mu) / sizes->sigma : -INFINITY);
-    if (!(fabs(mean - sizes->mean) < 1e-6 * sizes->mean) || !(share > LEAST_SHARE)) {
-        bt_errors_add(
-            err, "%s: ice.size: no lognormal law cut at %s has the mean %g m and spread %g; move the limits apart",
+    if (!(fabs(mean - sizes->mean) < 1e-6 * sizes->mean) || !(share > LEAST_SHARE))
+        return bt_fail(err, BT_ERR_CASE,
+            "%s: ice.size: no lognormal law cut at %s has the mean %g m and spread %g; move the limits apart",
             path, cut_at(sizes, (char[64]){0}), sizes->mean, sizes->spread);
-        return BT_ERR_CASE;
-    }
     return BT_OK;
 }
 

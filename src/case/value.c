@@ -46,6 +46,18 @@ static void suggest_percent(const bt_key *key, const bt_range *range, double val
     snprintf(meant, 80, "did you mean %g or %g %%? ", ratio, value);
 }
 
+double bt_value_number(const bt_key *key, const void *base)
+{
+    const char *member = (const char *)base + key->offset;
+    double real = NAN;
+    int64_t whole;
+    bool yes;
+    if (key->type == BT_KEY_REAL) memcpy(&real, member, sizeof real);
+    else if (key->type == BT_KEY_INT) memcpy(&whole, member, sizeof whole), real = (double)whole;
+    else if (key->type == BT_KEY_BOOL) memcpy(&yes, member, sizeof yes), real = yes;
+    return real;
+}
+
 static bool in_range(const bt_key *key, double value, const char *text, char *why)
 {
     bt_range range;
@@ -61,27 +73,11 @@ static bool in_range(const bt_key *key, double value, const char *text, char *wh
     return false;
 }
 
-/// True when the text is valid UTF-8 without NUL.
-static bool is_utf8(const char *text, size_t n)
+static bool is_utf8(const char *text)
 {
-    const unsigned char *s = (const unsigned char *)text;
-    for (size_t i = 0; i < n;) {
-        int more = s[i] < 0x80                   ? 0
-                   : s[i] >= 0xC2 && s[i] < 0xE0 ? 1
-                   : (s[i] & 0xF0) == 0xE0       ? 2
-                   : s[i] >= 0xF0 && s[i] < 0xF5 ? 3
-                                                 : -1;
-        if (more < 0 || i + (size_t)more >= n || !s[i]) return false;
-        for (int j = 1; j <= more; j++)
-            if ((s[i + (size_t)j] & 0xC0) != 0x80) return false;
-        // overlong forms, surrogates, beyond U+10FFFF
-        if (s[i] == 0xE0 && s[i + 1] < 0xA0) return false;
-        if (s[i] == 0xED && s[i + 1] > 0x9F) return false;
-        if (s[i] == 0xF0 && s[i + 1] < 0x90) return false;
-        if (s[i] == 0xF4 && s[i + 1] > 0x8F) return false;
-        i += (size_t)more + 1;
-    }
-    return true;
+    size_t n = 1;
+    for (const unsigned char *s = (const unsigned char *)text; *s && n; s += n) n = bt_utf8_length(s);
+    return n > 0;
 }
 
 static bool read_real(const bt_key *key, void *base, const char *text, char *why)
@@ -146,7 +142,7 @@ static bool read_choice(const bt_key *key, void *base, const char *text, char *w
 static bool read_text(const bt_key *key, void *base, const char *text, char *why)
 {
     size_t n = strlen(text);
-    if (n > BT_MAX_TEXT || !is_utf8(text, n)) {
+    if (n > BT_MAX_TEXT || !is_utf8(text)) {
         snprintf(why, BT_WHY,
                  n > BT_MAX_TEXT ? "the text has %zu bytes; give at most %d"
                                  : "the text is not UTF-8; save it as UTF-8",
@@ -225,25 +221,17 @@ void bt_value_write(const bt_key *key, const void *base, FILE *out)
     const char *member = (const char *)base + key->offset;
     char number[64];
     switch (key->type) {
-    case BT_KEY_REAL: {
-        double v;
-        memcpy(&v, member, sizeof v);
-        bt_units_format(v, key->unit, number, sizeof number);
+    case BT_KEY_REAL:
+        bt_units_format(bt_value_number(key, base), key->unit, number, sizeof number);
         fputs(number, out);
         break;
-    }
     case BT_KEY_INT: {
         int64_t v;
         memcpy(&v, member, sizeof v);
         fprintf(out, "%" PRId64, v);
         break;
     }
-    case BT_KEY_BOOL: {
-        bool v;
-        memcpy(&v, member, sizeof v);
-        fputs(v ? "true" : "false", out);
-        break;
-    }
+    case BT_KEY_BOOL: fputs(bt_value_number(key, base) != 0 ? "true" : "false", out); break;
     case BT_KEY_CHOICE: {
         unsigned v;
         memcpy(&v, member, sizeof v);

@@ -200,9 +200,8 @@ bt_status bt_field_cut(const bt_case *input, const bt_region *whole, const bt_re
     bt_field_sort(field, region);
     field->strip = strip;
     if (fabs(area - wanted) <= TOLERANCE * wanted) return BT_OK;
-    bt_errors_add(err,
-                  "%s: ice.extent: the field cut to the ice region has a concentration of %.4g, %g wanted, with floes "
-                  "scaled within %.3g m of the cut; take another ice.seed, smaller floes, or a larger ice region",
-                  input->path ? input->path : "case", area / region->ice_area, input->ice.concentration, strip);
-    return BT_ERR_CASE;
+    return bt_fail(err, BT_ERR_CASE,
+        "%s: ice.extent: the field cut to the ice region has a concentration of %.4g, %g wanted, with floes "
+        "scaled within %.3g m of the cut; take another ice.seed, smaller floes, or a larger ice region",
+        bt_case_name(input), area / region->ice_area, input->ice.concentration, strip);
 }

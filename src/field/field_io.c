@@ -43,26 +43,19 @@ const char *bt_field_frame(const bt_case *input)
 bt_status bt_field_write(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
     // Under another name until it is complete, so that a full disk never leaves half a field under the right one.
-    size_t size = strlen(path) + sizeof ".part";
-    char *part = bt_alloc(size, 1);
-    snprintf(part, size, "%s.part", path);
+    char *part = bt_text_of("%s.part", path);
     bt_h5 h5;
     bt_status status = bt_h5_create(&h5, part, err);
     if (status == BT_OK) {
         hsize_t n = (hsize_t)field->n, nv = (hsize_t)field->offsets[field->n];
         bt_h5_group(&h5, "/floes");
-        bt_h5_write(&h5, "/floes/offsets", H5T_NATIVE_INT64, n + 1, 0, field->offsets);
-        bt_h5_write(&h5, "/floes/vertices", H5T_NATIVE_DOUBLE, nv, 2, field->vertices);
-        bt_h5_write(&h5, "/floes/pose", H5T_NATIVE_DOUBLE, n, 3, field->pose);
-        bt_h5_write(&h5, "/floes/thickness", H5T_NATIVE_DOUBLE, n, 0, field->thickness);
-        bt_h5_write(&h5, "/floes/area", H5T_NATIVE_DOUBLE, n, 0, field->area);
-        bt_h5_describe(&h5, "/floes/offsets", "floe_end", "1",
-                       "first vertex of each floe, and the number of vertices");
-        bt_h5_describe(&h5, "/floes/vertices", "floe_vertex xy", "m",
-                       "outlines, body frame, anticlockwise about the centroid");
-        bt_h5_describe(&h5, "/floes/pose", "floe component", "m, m, rad", "x, y, yaw");
-        bt_h5_describe(&h5, "/floes/thickness", "floe", "m", "thickness");
-        bt_h5_describe(&h5, "/floes/area", "floe", "m2", "area");
+        bt_h5_put(&h5, "/floes/offsets", H5T_NATIVE_INT64, n + 1, 0, field->offsets, "floe_end", "1",
+                  "first vertex of each floe, and the number of vertices");
+        bt_h5_put(&h5, "/floes/vertices", H5T_NATIVE_DOUBLE, nv, 2, field->vertices, "floe_vertex xy", "m",
+                  "outlines, body frame, anticlockwise about the centroid");
+        bt_h5_put(&h5, "/floes/pose", H5T_NATIVE_DOUBLE, n, 3, field->pose, "floe component", "m, m, rad", "x, y, yaw");
+        bt_h5_put(&h5, "/floes/thickness", H5T_NATIVE_DOUBLE, n, 0, field->thickness, "floe", "m", "thickness");
+        bt_h5_put(&h5, "/floes/area", H5T_NATIVE_DOUBLE, n, 0, field->area, "floe", "m2", "area");
         bt_h5_attr_double(&h5, "/floes", "ice_area", field->ice_area);
         bt_h5_attr_double(&h5, "/floes", "concentration", field->concentration);
         bt_h5_attr_int(&h5, "/floes", "n_floes", field->n);
@@ -71,8 +64,7 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         for (int k = 0; k < 4; k++) bt_h5_attr_double(&h5, "/floes", region_names[k], region[k]);
         bt_h5_attr_word(&h5, "/floes", "frame", bt_field_frame(input));
         char *text = bt_case_resolved(input);
-        bt_h5_write_text(&h5, "/case", text ? text : "");
-        bt_h5_describe(&h5, "/case", NULL, NULL, "the case with every key, in SI units");
+        bt_h5_put_text(&h5, "/case", text, "the case with every key, in SI units");
         bt_h5_describe_file(&h5, input->run.title);
         free(text);
         bt_h5_attr_text(&h5, "/", "program", "bergtow " BT_VERSION);
@@ -317,13 +309,11 @@ bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconve
     const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
     if (checked != BT_OK) return checked;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
-    if (H5Fis_hdf5(path) <= 0) {
-        bt_errors_add(err,
-                      "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`, or name "
-                      "outlines (GeoJSON) with ice.outlines",
-                      path);
-        return BT_ERR_CASE;
-    }
+    if (H5Fis_hdf5(path) <= 0)
+        return bt_fail(err, BT_ERR_CASE,
+                       "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`, or name "
+                       "outlines (GeoJSON) with ice.outlines",
+                       path);
     int errnum = 0; // of a read that failed: then what was found in the file says nothing of it
     bt_errors found = {0};
     reader in = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};

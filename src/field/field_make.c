@@ -112,18 +112,14 @@ static const double MORE_GAPS = 10;    // by which floes fly on that a shake has
 static const double MOST = 0.06;      // and at most this part of the size: a step turns a floe by a tenth of a radian
 enum { GROWTH_STAGES = 120, MORE_SHAKES = 3 };
 
-static const char *path_of(const bt_case *input) { return input->path ? input->path : "case"; }
-
 static bt_status cannot_pack(const bt_case *input, double reached, bt_errors *err)
 {
     static const char *const names[] = {[BT_ICE_VORONOI] = "voronoi floes", [BT_ICE_RECTANGLES] = "rectangles",
                                         [BT_ICE_POLYGONS] = "regular polygons"};
-    bt_errors_add(
-        err,
+    return bt_fail(err, BT_ERR_CASE,
         "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
         "ice.shape, size or region",
-        path_of(input), names[input->ice.shape], input->ice.concentration, floor(reached * 99) / 100);
-    return BT_ERR_CASE;
+        bt_case_name(input), names[input->ice.shape], input->ice.concentration, floor(reached * 99) / 100);
 }
 
 // Target areas of all floes, m²; [*n], caller frees.
@@ -131,12 +127,10 @@ static bt_status draw_targets(const bt_case *input, const bt_sizes *sizes, doubl
                               bt_errors *err)
 {
     double expected = wanted / bt_sizes_mean_area(sizes);
-    if (expected > BT_MOST_FLOES) {
-        bt_errors_add(
-            err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
-            path_of(input), bt_sizes_mean(sizes), expected, BT_MOST_FLOES);
-        return BT_ERR_CASE;
-    }
+    if (expected > BT_MOST_FLOES)
+        return bt_fail(err, BT_ERR_CASE,
+            "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
+            bt_case_name(input), bt_sizes_mean(sizes), expected, BT_MOST_FLOES);
     size_t cap = 64;
     *target = bt_alloc(cap, sizeof **target);
     *n = 0;
@@ -154,7 +148,7 @@ static bt_status draw_targets(const bt_case *input, const bt_sizes *sizes, doubl
             err,
             "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
             "a larger region, or ice.concentration: 0",
-            path_of(input), bt_sizes_mean(sizes), wanted);
+            bt_case_name(input), bt_sizes_mean(sizes), wanted);
         free(*target);
         return BT_ERR_CASE;
     }
@@ -234,11 +228,10 @@ static bt_status polygons_in_cells(const bt_case *input, const bt_region *region
                                    double wanted, bt_field *field, bt_errors *err)
 {
     int sides = (int)input->ice.sides;
-    if (input->ice.sides < 3 || input->ice.sides > 32) {
-        bt_errors_add(err, "%s: ice.sides: %lld is refused: a regular polygon has 3 to 32 sides here", path_of(input),
-                      (long long)input->ice.sides);
-        return BT_ERR_CASE;
-    }
+    if (input->ice.sides < 3 || input->ice.sides > 32)
+        return bt_fail(err, BT_ERR_CASE,
+            "%s: ice.sides: %lld is refused: a regular polygon has 3 to 32 sides here", bt_case_name(input),
+            (long long)input->ice.sides);
     double sum = 0, v[2 * 32];
     for (bt_idx i = 0; i < cells->n; i++)
         if (cells->nv[i] >= 3) sum += cells->target[i];
@@ -331,8 +324,8 @@ static void set_thickness(const bt_case *input, bt_field *field)
 static bt_status make(const bt_case *input, const bt_region *region, const bt_sizes *sizes, bt_field *field,
                       bt_errors *err)
 {
-    double wanted = input->ice.concentration * region->ice_area, *target;
-    bt_idx n;
+    double wanted = input->ice.concentration * region->ice_area, *target = NULL;
+    bt_idx n = 0;
     bt_status status = draw_targets(input, sizes, wanted, &target, &n, err);
     if (status != BT_OK) return status;
     bt_tessellation cells = make_cells(input, region, n, target, wanted);
@@ -352,8 +345,8 @@ static bt_status make(const bt_case *input, const bt_region *region, const bt_si
         char why[160];
         if (status != BT_OK || settled(region, field, wanted, why)) break;
         if (again < MORE_SHAKES && input->ice.shake > 0) continue;
-        bt_errors_add(err, "%s: ice field: %s; change ice.seed, or lower ice.shake", path_of(input), why);
-        status = BT_ERR_NUMERIC;
+        status = bt_fail(err, BT_ERR_NUMERIC,
+                         "%s: ice field: %s; change ice.seed, or lower ice.shake", bt_case_name(input), why);
     }
     if (status != BT_OK) return status;
     bt_field_sort(field, region);

@@ -164,13 +164,10 @@ bt_status bt_region_init(bt_region *region, const bt_case *input, double clearan
     *region = (bt_region){
         .x0 = input->ice.x_min, .x1 = input->ice.x_max, .y0 = input->ice.y_min, .y1 = input->ice.y_max,
         .clearance = clearance};
-    if (!(region->x1 > region->x0 && region->y1 > region->y0)) {
-        bt_errors_add(
-            err,
+    if (!(region->x1 > region->x0 && region->y1 > region->y0))
+        return bt_fail(err, BT_ERR_CASE,
             "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
-            input->path ? input->path : "case", region->x0, region->x1, region->y0, region->y1);
-        return BT_ERR_CASE;
-    }
+            bt_case_name(input), region->x0, region->x1, region->y0, region->y1);
     region->periodic_x = bt_bound_wraps(input->domain.ends) &&
                          spans(region->x0, region->x1, input->domain.x0, input->domain.length);
     region->periodic_y = input->domain.sides == BT_BOUND_PERIODIC &&
@@ -185,19 +182,15 @@ bt_status bt_region_init(bt_region *region, const bt_case *input, double clearan
         nv = bt_case_floe_outline(floe, v);
         wide = nv < 3 || add_body(region, input, nv, v, floe->x, floe->y, floe->yaw);
     }
-    if (!wide) {
-        bt_errors_add(err,
-                      "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m "
-                      "between it and the ice; take a wider one, or smaller floes (ice.size)",
-                      input->path ? input->path : "case", clearance);
-        return BT_ERR_CASE;
-    }
-    if (!(region->ice_area > 0)) {
-        bt_errors_add(err,
-                      "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
-                      input->path ? input->path : "case");
-        return BT_ERR_CASE;
-    }
+    if (!wide)
+        return bt_fail(err, BT_ERR_CASE,
+            "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m "
+            "between it and the ice; take a wider one, or smaller floes (ice.size)",
+            bt_case_name(input), clearance);
+    if (!(region->ice_area > 0))
+        return bt_fail(err, BT_ERR_CASE,
+            "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
+            bt_case_name(input));
     return BT_OK;
 }
 

@@ -146,14 +146,11 @@ static bt_status take_poses(const bt_world *world, const bt_case *input, const b
 {
     for (bt_idx i = 0; i < field->n; i++) {
         const bt_pose *pose = &world->bodies.pose[bt_world_index(world, i)];
-        if (!isfinite(pose->x) || !isfinite(pose->y) || !isfinite(pose->yaw)) {
-            bt_errors_add(
-                err,
+        if (!isfinite(pose->x) || !isfinite(pose->y) || !isfinite(pose->yaw))
+            return bt_fail(err, BT_ERR_NUMERIC,
                 "%s: ice field: floe %lld has no finite place after the field was shaken; report this case with its "
                 "seed, and use ice.shake: 0 meanwhile",
-                input->path ? input->path : "case", (long long)i);
-            return BT_ERR_NUMERIC;
-        }
+                bt_case_name(input), (long long)i);
         field->pose[3 * i] = pose->x;
         field->pose[3 * i + 1] = pose->y;
         field->pose[3 * i + 2] = remainder(pose->yaw, 2 * BT_PI);

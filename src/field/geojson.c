@@ -141,7 +141,7 @@ static void see(survey *seen, size_t i, double x, double y, double lon)
 {
     const double q[4] = {x, y, x < 0 ? x + 360 : x, x > 180 ? x - 360 : x};
     for (int a = 0; a < 4; a++) seen->low[a] = bt_min(seen->low[a], q[a]), seen->high[a] = bt_max(seen->high[a], q[a]);
-    if (seen->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90))
+    if (seen->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= BT_MAP_MOST_LAT))
         seen->feature = i, seen->odd[0] = x, seen->odd[1] = y;
 }
 
@@ -174,9 +174,10 @@ static void take_origin(const json_t *mark, double origin[2])
 static void begin_degrees(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
-    const survey seen = look_over(in, in->assumed ? 180 : 360);
-    const bool given = !isnan(input->ice.origin_lon), swapped = bt_max(fabs(seen.low[0]), fabs(seen.high[0])) <= 90 &&
-                                                                bt_max(fabs(seen.low[1]), fabs(seen.high[1])) <= 360;
+    const survey seen = look_over(in, in->assumed ? BT_MAP_NARROW_LON : BT_MAP_MOST_LON);
+    const bool given = !isnan(input->ice.origin_lon),
+               swapped = bt_max(fabs(seen.low[0]), fabs(seen.high[0])) <= BT_MAP_MOST_LAT &&
+                         bt_max(fabs(seen.low[1]), fabs(seen.high[1])) <= BT_MAP_MOST_LON;
     if (!isnan(input->ice.origin_east))
         bt_refuse(&in->r, "its coordinates are degrees, and ice.origin_east and ice.origin_north are metres; give "
                           "ice.origin_lon and ice.origin_lat, or none");
@@ -215,7 +216,7 @@ static void begin_degrees(reader *in, const json_t *mark)
 static void begin_plane(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
-    const survey seen = look_over(in, 180);
+    const survey seen = look_over(in, BT_MAP_NARROW_LON);
     const bool given = !isnan(input->ice.origin_east), projected = in->crs.kind == BT_MAP_PLANE;
     if (!isnan(input->ice.origin_lon) && in->kind == PLANE)
         bt_refuse(&in->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "

@@ -221,13 +221,11 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
     const double most =
         lead->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * lead->floe_size * lead->floe_size) : 0;
     bt_status status = BT_OK;
-    if (most > BT_MOST_FLOES) {
-        bt_errors_add(err,
-                      "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, "
-                      "or a narrower or shorter lead",
-                      lead->name, lead->floe_size, most, BT_MOST_FLOES);
-        status = BT_ERR_CASE;
-    }
+    if (most > BT_MOST_FLOES)
+        status = bt_fail(err, BT_ERR_CASE,
+            "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, "
+            "or a narrower or shorter lead",
+            lead->name, lead->floe_size, most, BT_MOST_FLOES);
     if (status == BT_OK) {
         bt_field out;
         bt_field_init(&out);
@@ -320,22 +318,18 @@ bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *sta
 {
     *stats = (bt_lead_stats){0};
     if (input->lead.mode == BT_LEAD_NONE) return BT_OK;
-    if (field->outlines.split > 0) {
-        bt_errors_add(err,
-                      "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set "
-                      "ice.nonconvex to hull, or draw the lead in the file",
-                      input->path ? input->path : "case", (long long)field->outlines.split);
-        return BT_ERR_CASE;
-    }
+    if (field->outlines.split > 0)
+        return bt_fail(err, BT_ERR_CASE,
+                       "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set "
+                       "ice.nonconvex to hull, or draw the lead in the file",
+                       bt_case_name(input), (long long)field->outlines.split);
     int n;
     char why[200];
     double *path = planned_path(input, &n, why);
-    if (!path) {
-        bt_errors_add(err, "%s: tow.waypoints: %s", input->path ? input->path : "case", why);
-        return BT_ERR_CASE;
-    }
+    if (!path)
+        return bt_fail(err, BT_ERR_CASE, "%s: tow.waypoints: %s", bt_case_name(input), why);
     const bt_lead lead = {
-        .name = input->path ? input->path : "case",
+        .name = bt_case_name(input),
         .mode = input->lead.mode,
         .width = input->lead.width,
         .floe_size = input->lead.floe_size,

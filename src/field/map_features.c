@@ -107,23 +107,19 @@ static const char *other_format(const char *text, size_t size)
 static bt_status refuse_text(const char *path, const char *text, size_t size, bt_errors *err)
 {
     const char *other = other_format(text, size);
-    if (other) {
-        bt_errors_add(err,
-                      "%s: is %s, not GeoJSON; make GeoJSON of it: bergtow outlines %s -o floes.geojson (a field of "
-                      "bergtow belongs to ice.field)",
-                      path, other, path);
-        return BT_ERR_CASE;
-    }
+    if (other)
+        return bt_fail(err, BT_ERR_CASE,
+                       "%s: is %s, not GeoJSON; make GeoJSON of it: bergtow outlines %s -o floes.geojson (a field of "
+                       "bergtow belongs to ice.field)",
+                       path, other, path);
     // What a hostile file could make of it is known before: a tree takes far more room than the text.
     int64_t lists = 0;
     const char *c = text, *end = text + size;
     while ((c = memchr(c, '[', (size_t)(end - c)))) c++, lists++;
     if (lists <= BT_MOST_LISTS) return BT_OK;
-    bt_errors_add(err,
-                  "%s: holds %" PRId64
-                  " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files",
-                  path, lists, BT_MOST_LISTS);
-    return BT_ERR_CASE;
+    return bt_fail(err, BT_ERR_CASE, "%s: holds %" PRId64
+                   " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files",
+                   path, lists, BT_MOST_LISTS);
 }
 
 bt_status bt_features_read(const char *path, bt_feature_visit *visit, void *context, json_t **root, size_t *n,
@@ -138,10 +134,8 @@ bt_status bt_features_read(const char *path, bt_feature_visit *visit, void *cont
         json_error_t why;
         *root = take_file((scan){text, text + size}, visit, context, n);
         if (!*root) *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why); // a list, or the fault
-        if (!*root) {
-            bt_errors_add(err, "%s:%d: is not JSON: %s; correct the file", path, why.line, why.text);
-            status = BT_ERR_CASE;
-        }
+        if (!*root)
+            status = bt_fail(err, BT_ERR_CASE, "%s:%d: is not JSON: %s; correct the file", path, why.line, why.text);
     }
     free(text);
     return status;

@@ -297,10 +297,7 @@ static void place_seeds(const bt_region *region, bt_idx n, const double *radius,
             }
         }
         for (bin_walk walk = walk_bins(region, &dd, p[2 * i], p[2 * i + 1], SPACING * radius[i]); next_bin(&walk);) {
-            if (dd.n == dd.cap) {
-                dd.cap = dd.cap ? 2 * dd.cap : 1024;
-                dd.node = bt_realloc(dd.node, (size_t)dd.cap, sizeof *dd.node);
-            }
+            BT_MAKE_ROOM(dd.node, dd.n, dd.cap, 1024);
             dd.node[dd.n].i = i;
             dd.node[dd.n].next = dd.head[walk.bin];
             dd.head[walk.bin] = dd.n++;

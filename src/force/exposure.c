@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "body/bodies.h"
 #include "partition/domain.h"
 #include "space/cells.h"
@@ -244,10 +245,7 @@ static void sort(double *x, size_t n)
 
 static void put(scratch *room, double x)
 {
-    if (room->n_numbers == room->cap_numbers) {
-        room->cap_numbers = room->cap_numbers ? 2 * room->cap_numbers : 64;
-        room->number = bt_realloc(room->number, room->cap_numbers, sizeof *room->number);
-    }
+    BT_MAKE_ROOM(room->number, room->n_numbers, room->cap_numbers, 64);
     room->number[room->n_numbers++] = x;
 }
 
@@ -411,10 +409,7 @@ static void consider(const bt_world *world, bt_idx i, const region *r, const bt_
     if (d[0] * d[0] + d[1] * d[1] >= reach * reach || !(h > 0) || bodies->gid[j] == world->bodies.gid[i]) return;
     const double low[2] = {d[0] - size, d[1] - size}, high[2] = {d[0] + size, d[1] + size};
     if (misses(r, (const double[]){0, 0}, low, high)) return;
-    if (room->n == room->cap) {
-        room->cap = room->cap ? 2 * room->cap : 32;
-        room->near = bt_realloc(room->near, room->cap, sizeof *room->near);
-    }
+    BT_MAKE_ROOM(room->near, room->n, room->cap, 32);
     room->near[room->n++] = (neighbour){bodies, j, d[0], d[1]};
 }
 

@@ -69,8 +69,7 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
 
 static void add(contact_rows *list, const bt_body_contact *row)
 {
-    if (list->n == list->cap)
-        list->row = bt_realloc(list->row, (size_t)(list->cap = list->cap ? 2 * list->cap : 64), sizeof *list->row);
+    BT_MAKE_ROOM(list->row, list->n, list->cap, 64);
     list->row[list->n++] = *row;
 }
 
@@ -202,10 +201,7 @@ void bt_impact_describe(const bt_impact_rule *rule, char out[160])
 
 static void close_event(bt_impacts *impacts, const bt_impact_open *o)
 {
-    if (impacts->n_closed == impacts->cap_closed)
-        impacts->closed =
-            bt_realloc(impacts->closed, (size_t)(impacts->cap_closed = impacts->cap_closed
-                                                 ? 2 * impacts->cap_closed : 64), sizeof *impacts->closed);
+    BT_MAKE_ROOM(impacts->closed, impacts->n_closed, impacts->cap_closed, 64);
     bt_impact *impact = &impacts->closed[impacts->n_closed++];
     *impact = o->so_far;
     impact->panel = bt_panels_at(&impacts->panels, impact->x, impact->y);

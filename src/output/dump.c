@@ -42,8 +42,7 @@
 
 static bt_status refuse(const char *path, const char *reason, bt_errors *err)
 {
-    bt_errors_add(err, "%s: the contact problem is not written: %s", path, reason);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE, "%s: the contact problem is not written: %s", path, reason);
 }
 
 static bt_status check_problem(const char *path, const bt_fclib_problem *p, bt_errors *err)
@@ -62,28 +61,14 @@ static bt_status check_problem(const char *path, const bt_fclib_problem *p, bt_e
     return BT_OK;
 }
 
-/// A dataset and what it holds; axes, units and meaning as for bt_h5_describe.
-static void put(bt_h5 *h5, const char *name, hid_t type, hsize_t n, hsize_t width, const void *data, const char *axes,
-                const char *units, const char *meaning)
-{
-    bt_h5_write(h5, name, type, n, width, data);
-    bt_h5_describe(h5, name, axes, units, meaning);
-}
-
 static void put_int(bt_h5 *h5, const char *name, int value, const char *meaning)
 {
-    put(h5, name, H5T_NATIVE_INT, 1, 0, &value, "one", "1", meaning);
-}
-
-static void put_text(bt_h5 *h5, const char *name, const char *text, const char *meaning)
-{
-    bt_h5_write_text(h5, name, text);
-    bt_h5_describe(h5, name, NULL, NULL, meaning);
+    bt_h5_put(h5, name, H5T_NATIVE_INT, 1, 0, &value, "one", "1", meaning);
 }
 
 static void put_rows(bt_h5 *h5, const char *name, int m, const double *data, const char *units, const char *meaning)
 {
-    put(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)m, 0, data, "row", units, meaning);
+    bt_h5_put(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)m, 0, data, "row", units, meaning);
 }
 
 static void write_problem(bt_h5 *h5, const bt_fclib_problem *x)
@@ -98,18 +83,20 @@ static void write_problem(bt_h5 *h5, const bt_fclib_problem *x)
     put_int(h5, "/fclib_local/W/m", m, "rows of W");
     put_int(h5, "/fclib_local/W/n", m, "columns of W");
     put_int(h5, "/fclib_local/W/nz", COMPRESSED_ROWS, "kind of storage: -2, compressed rows");
-    put(h5, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
+    bt_h5_put(h5, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
         "row i has the entries p[i] up to p[i + 1]");
-    put(h5, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1", "column of each entry");
-    put(h5, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1", "entries of W");
+    bt_h5_put(h5, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1",
+              "column of each entry");
+    bt_h5_put(h5, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1",
+              "entries of W");
     bt_h5_group(h5, "/fclib_local/vectors");
     put_rows(h5, "/fclib_local/vectors/q", m, x->q, "m/s", "velocities without impulses: u = W r + q");
-    put(h5, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)x->n, 0, x->mu, "contact", "1", "friction");
+    bt_h5_put(h5, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)x->n, 0, x->mu, "contact", "1", "friction");
     free(rows);
     bt_h5_group(h5, "/fclib_local/info");
-    put_text(h5, "/fclib_local/info/title", x->title ? x->title : "", "title");
-    put_text(h5, "/fclib_local/info/description", x->description ? x->description : "", "description");
-    put_text(h5, "/fclib_local/info/math_info",
+    bt_h5_put_text(h5, "/fclib_local/info/title", x->title ? x->title : "", "title");
+    bt_h5_put_text(h5, "/fclib_local/info/description", x->description ? x->description : "", "description");
+    bt_h5_put_text(h5, "/fclib_local/info/math_info",
              "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent",
              "what the problem is");
 }
@@ -119,14 +106,14 @@ static void write_places(bt_h5 *h5, const bt_fclib_places *places, hsize_t n)
     bt_h5_group(h5, "/places");
     bt_h5_attr_double(h5, "/places", "time", places->time);
     bt_h5_attr_double(h5, "/places", "dt", places->dt);
-    put(h5, "/places/body", H5T_NATIVE_INT64, n, 2, places->body, "contact pair", "1",
+    bt_h5_put(h5, "/places/body", H5T_NATIVE_INT64, n, 2, places->body, "contact pair", "1",
         "ids of the two bodies of each contact");
-    put(h5, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, places->normal, "contact xy", "1",
+    bt_h5_put(h5, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, places->normal, "contact xy", "1",
         "from the first body to the second, world frame");
-    put(h5, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, places->lever, "contact pair_xy", "m",
+    bt_h5_put(h5, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, places->lever, "contact pair_xy", "m",
         "from the centroid of the first and of the second body to the contact point, world frame, at the start of the "
         "step");
-    put(h5, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)places->n_bodies, 3, places->pose, "any_body component",
+    bt_h5_put(h5, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)places->n_bodies, 3, places->pose, "any_body component",
         "m, m, rad",
         "x, y, yaw of every body at the end of the step, by id");
 }
@@ -136,9 +123,10 @@ static void write_more(bt_h5 *h5, const bt_fclib_problem *p)
 {
     const hsize_t n = (hsize_t)p->n;
     if (p->bound)
-        put(h5, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
+        bt_h5_put(h5, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s",
+                  "upper bound of the normal impulse");
     if (p->disc)
-        put(h5, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
+        bt_h5_put(h5, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
             "sheets: their impulse is the sum of a point of the disc of this radius and of a point of the line from "
             "-ends to ends; NaN: another contact");
     if (p->ends) put_rows(h5, "/ends", 2 * p->n, p->ends, "N s", "half of that line; 0 of other contacts");

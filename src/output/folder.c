@@ -106,13 +106,11 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
     bt_status status = BT_OK;
     for (int k = 0; k < N_FILES; k++) {
         char *path = bt_file_join(dir, files[k].name);
-        if (is_foreign(dir, k, path)) {
-            bt_errors_add(err,
-                          "%s: is not a file that this program has written, and a run would replace it; move it away, "
-                          "or give another folder with -o",
-                          path);
-            status = BT_ERR_IO;
-        }
+        if (is_foreign(dir, k, path))
+            status = bt_fail(err, BT_ERR_IO,
+                "%s: is not a file that this program has written, and a run would replace it; move it away, "
+                "or give another folder with -o",
+                path);
         free(path);
     }
     return status;
@@ -241,10 +239,7 @@ bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt
     const bool finished = bt_file_there(dir, "summary.json"), begun = has_begun(dir);
     const bt_status foreign = bt_folder_check(dir, err);
     if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
-    if (finished || !begun)
-        bt_errors_add(err, "%s: holds a result; %s", dir, remedy);
-    else
-        bt_errors_add(err,
-                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, %s", dir, dir, remedy);
-    return BT_ERR_IO;
+    if (finished || !begun) return bt_fail(err, BT_ERR_IO, "%s: holds a result; %s", dir, remedy);
+    return bt_fail(err, BT_ERR_IO, "%s: holds an unfinished run; go on with it by `bergtow resume %s`, %s", dir, dir,
+                   remedy);
 }

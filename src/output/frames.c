@@ -73,10 +73,10 @@ static void describe(bt_h5 *h5, const bt_record_bodies *bodies)
     bt_h5_describe(h5, "/bodies/area", "body", "m2", "area of each body");
     bt_h5_describe(h5, "/xdmf/floes", "floe_cell", "1", "polygons of the floes as XDMF's mixed topology");
     bt_h5_describe(h5, "/xdmf/bodies", "body_cell", "1", "polygons of the other bodies as XDMF's mixed topology");
-    bt_h5_write_names(h5, "/bodies/names", (hsize_t)(bodies->n_bodies - bodies->n_floes), bodies->names);
-    bt_h5_describe(h5, "/bodies/names", "body", NULL, "what each body is");
-    bt_h5_write(h5, "/bodies/towed", H5T_NATIVE_INT64, 1, 0, &towed);
-    bt_h5_describe(h5, "/bodies/towed", "one", "1", "which of these bodies is towed, -1 = none");
+    bt_h5_put_names(h5, "/bodies/names", (hsize_t)(bodies->n_bodies - bodies->n_floes), bodies->names, "body",
+                    "what each body is");
+    bt_h5_put(h5, "/bodies/towed", H5T_NATIVE_INT64, 1, 0, &towed, "one", "1",
+              "which of these bodies is towed, -1 = none");
 }
 
 /// Bodies from .. from + n of the block `bodies` to rows first .. first + n of the datasets; `before`: vertices of the
@@ -158,28 +158,47 @@ static void keep_outlines(bt_frames *frames, const bt_record_bodies *bodies)
     for (int64_t v = 0; v < 2 * nv; v++) frames->vertices[v] = (float)bodies->vertices[v];
 }
 
+/// Quantities of a frame that are written row by row.
+enum quantity { POINTS, POSE, FORCE, SPEED, VELOCITY, NET, FORCE_4, SPEED_4, VELOCITY_4, NET_4 };
+
+enum { FLOES = 1, OTHERS = 2 };
+static const struct {
+    const char *name, *axes, *units, *text;
+    enum quantity quantity;
+    bool single; ///< precision
+    int width, of;
+} columns[BT_FRAME_COLUMNS] = {
+    {"/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe", POSE, false, 3, FLOES},
+    {"/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies", POSE, false, 3, OTHERS},
+    {"/frames/contact_force", "time floe", "N",
+     "largest normal contact force on the floe in the step, NaN where that has no solution", FORCE, false, 0, FLOES},
+    {"/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies", SPEED, false, 0,
+     FLOES | OTHERS},
+    {"/frames/velocity", "time floe_or_body xy", "m/s", "velocity of the centroid: floes, then /bodies", VELOCITY,
+     true, 2, FLOES | OTHERS},
+    {"/frames/net_force", "time floe_or_body xy", "N",
+     "sum of all contact forces in the step, NaN where that has no solution: floes, then /bodies", NET, true, 2,
+     FLOES | OTHERS},
+};
+
+/// So many floes and other bodies as a column has.
+static int64_t rows_of(int column, int64_t floes, int64_t others)
+{
+    return (columns[column].of & FLOES ? floes : 0) + (columns[column].of & OTHERS ? others : 0);
+}
+
 static void create_datasets(bt_frames *frames)
 {
     bt_h5 *h5 = frames->h;
     bt_h5_group(h5, "/frames");
     frames->time = bt_h5_growing(h5, "/frames/time", H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){256, 1}, false);
-    frames->pose = bt_slab_growing(h5, "/frames/pose", H5T_NATIVE_DOUBLE, frames->n_floes, 3);
-    frames->body_pose = bt_slab_growing(h5, "/frames/body_pose", H5T_NATIVE_DOUBLE, frames->n_others, 3);
-    frames->contact_force = bt_slab_growing(h5, "/frames/contact_force", H5T_NATIVE_DOUBLE, frames->n_floes, 0);
-    frames->speed = bt_slab_growing(h5, "/frames/speed", H5T_NATIVE_DOUBLE, frames->n_floes + frames->n_others, 0);
-    frames->velocity = bt_slab_growing(h5, "/frames/velocity", H5T_NATIVE_FLOAT, frames->n_floes + frames->n_others, 2);
-    frames->net_force = bt_slab_growing(h5, "/frames/net_force", H5T_NATIVE_FLOAT, frames->n_floes + frames->n_others,
-                                        2);
     bt_h5_describe(h5, "/frames/time", "time", "s", "time of each frame, since the start of the run");
-    bt_h5_describe(h5, "/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe");
-    bt_h5_describe(h5, "/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies");
-    bt_h5_describe(h5, "/frames/contact_force", "time floe", "N",
-                   "largest normal contact force on the floe in the step, NaN where that has no solution");
-    bt_h5_describe(h5, "/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies");
-    bt_h5_describe(h5, "/frames/velocity", "time floe_or_body xy", "m/s",
-                   "velocity of the centroid: floes, then /bodies");
-    bt_h5_describe(h5, "/frames/net_force", "time floe_or_body xy", "N",
-                   "sum of all contact forces in the step, NaN where that has no solution: floes, then /bodies");
+    for (int k = 0; k < BT_FRAME_COLUMNS; k++) {
+        frames->column[k] = bt_slab_growing(h5, columns[k].name, columns[k].single ? H5T_NATIVE_FLOAT
+                                            : H5T_NATIVE_DOUBLE, rows_of(k, frames->n_floes, frames->n_others),
+                                            columns[k].width);
+        bt_h5_describe(h5, columns[k].name, columns[k].axes, columns[k].units, columns[k].text);
+    }
     if (!frames->branches) return;
     const hsize_t k = (hsize_t)frames->branches;
     frames->line_points = bt_h5_growing(h5, "/frames/line_points", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){2 * k, 2},
@@ -215,9 +234,6 @@ void bt_frames_create(bt_frames *frames, bt_h5 *h5, const bt_comm *comm, const b
     create_datasets(frames);
 }
 
-/// Quantities of a frame that are written row by row.
-enum quantity { POSE, FORCE, SPEED, VELOCITY, NET, FORCE_4, SPEED_4, VELOCITY_4, NET_4 };
-
 /// ParaView's vectors have three components.
 static void draw_vector(const bt_frames *frames, double x, double y, float to[3])
 {
@@ -234,6 +250,7 @@ static void write_rows(const bt_frames *frames, bt_slab *slab, enum quantity q, 
     for (int64_t i = 0; i < n; i++) {
         void *to = bt_rows_next(&rows);
         switch (q) {
+        case POINTS: break; // write_points
         case POSE: memcpy(to, (const double[3]){row[i].x, row[i].y, row[i].yaw}, 3 * sizeof(double)); break;
         case FORCE: *(double *)to = row[i].contact_force; break;
         case SPEED: *(double *)to = row[i].speed; break;
@@ -285,55 +302,48 @@ static void write_points(const bt_frames *frames, bt_slab *slab, int64_t first, 
     bt_rows_end(&rows);
 }
 
-/// Datasets of the frame in single precision, see xdmf.c.
-typedef struct paraview { bt_slab points, speed, velocity, net_force, force; } paraview;
+/// Datasets of the frame in single precision, see xdmf.c; the last of floes alone.
+static const struct {
+    const char *name, *units, *text;
+    enum quantity quantity;
+    int width;
+} drawn[] = {
+    {"points", "m", "every vertex, along the axes of /xdmf, from its origin", POINTS, 2},
+    {"speed", "m/s", "speed of the centroid", SPEED_4, 0},
+    {"velocity", "m/s", "velocity of the centroid along these axes, and 0", VELOCITY_4, 3},
+    {"net_force", "N", "sum of all contact forces in the step along these axes, and 0", NET_4, 3},
+    {"force", "N", "largest normal contact force in the step", FORCE_4, 0},
+};
+enum { N_DRAWN = sizeof drawn / sizeof *drawn };
 
-static paraview create_paraview(bt_frames *frames, const char *kind, int64_t cells, int64_t points, bool force)
+/// Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
+static void create_drawn(bt_frames *frames, const char *kind, int64_t cells, int64_t points, int n, bt_slab *slab)
 {
-    char path[64];
-#define NAMED(name) (snprintf(path, sizeof path, "/xdmf/%06lld/%s_%s", (long long)frames->n, kind, name), path)
-    paraview p = {
-        .points = bt_slab_fixed(frames->h, NAMED("points"), H5T_NATIVE_FLOAT, points, 2, true),
-        .speed = bt_slab_fixed(frames->h, NAMED("speed"), H5T_NATIVE_FLOAT, cells, 0, true),
-        .velocity = bt_slab_fixed(frames->h, NAMED("velocity"), H5T_NATIVE_FLOAT, cells, 3, true),
-        .net_force = bt_slab_fixed(frames->h, NAMED("net_force"), H5T_NATIVE_FLOAT, cells, 3, true),
-        .force = {.h = frames->h, .dataset = -1, .piece = 1, .row_bytes = 4},
-    };
-    if (force) p.force = bt_slab_fixed(frames->h, NAMED("force"), H5T_NATIVE_FLOAT, cells, 0, true);
-    // Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
-    const char *const names[] = {"points", "speed", "velocity", "net_force", "force"},
-                      *const units[] = {"m", "m/s", "m/s", "N", "N"},
-                      *const texts[] = {"every vertex, along the axes of /xdmf, from its origin",
-                                        "speed of the centroid", "velocity of the centroid along these axes, and 0",
-                                        "sum of all contact forces in the step along these axes, and 0",
-                                        "largest normal contact force in the step"};
-    for (int k = 0; k < (force ? 5 : 4); k++) {
-        bt_h5_attr_text(frames->h, NAMED(names[k]), "units", units[k]);
-        bt_h5_attr_text(frames->h, path, "long_name", texts[k]);
+    for (int k = 0; k < n; k++) {
+        char path[64];
+        snprintf(path, sizeof path, "/xdmf/%06lld/%s_%s", (long long)frames->n, kind, drawn[k].name);
+        slab[k] = bt_slab_fixed(frames->h, path, H5T_NATIVE_FLOAT, drawn[k].quantity == POINTS ? points : cells,
+                                drawn[k].width, true);
+        bt_h5_attr_text(frames->h, path, "units", drawn[k].units);
+        bt_h5_attr_text(frames->h, path, "long_name", drawn[k].text);
     }
-#undef NAMED
-    return p;
 }
 
-static void write_frame(bt_frames *frames, paraview *floes, paraview *others, const bt_frame_row *rows)
+static void write_frame(bt_frames *frames, bt_slab *floes, bt_slab *others, const bt_frame_row *rows)
 {
     char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
     const int64_t nf = frames->own_floes, nb = frames->own_others;
-    write_rows(frames, &frames->pose, POSE, frames->first, rows, nf, buffer);
-    write_rows(frames, &frames->contact_force, FORCE, frames->first, rows, nf, buffer);
-    write_rows(frames, &frames->speed, SPEED, frames->first, rows, nf + nb, buffer);
-    write_rows(frames, &frames->velocity, VELOCITY, frames->first, rows, nf + nb, buffer);
-    write_rows(frames, &frames->net_force, NET, frames->first, rows, nf + nb, buffer);
-    write_rows(frames, &frames->body_pose, POSE, 0, rows + nf, nb, buffer);
-    write_points(frames, &floes->points, frames->vertices_before, rows, 0, nf, 0, buffer);
-    write_rows(frames, &floes->speed, SPEED_4, frames->first, rows, nf, buffer);
-    write_rows(frames, &floes->velocity, VELOCITY_4, frames->first, rows, nf, buffer);
-    write_rows(frames, &floes->net_force, NET_4, frames->first, rows, nf, buffer);
-    write_rows(frames, &floes->force, FORCE_4, frames->first, rows, nf, buffer);
-    write_points(frames, &others->points, 0, rows, nf, nb, frames->floe_vertices - frames->vertices_before, buffer);
-    write_rows(frames, &others->speed, SPEED_4, 0, rows + nf, nb, buffer);
-    write_rows(frames, &others->velocity, VELOCITY_4, 0, rows + nf, nb, buffer);
-    write_rows(frames, &others->net_force, NET_4, 0, rows + nf, nb, buffer);
+    for (int k = 0; k < BT_FRAME_COLUMNS; k++) {
+        const bool some = columns[k].of & FLOES;
+        write_rows(frames, &frames->column[k], columns[k].quantity, some ? frames->first : 0, rows + (some ? 0 : nf),
+                   rows_of(k, nf, nb), buffer);
+    }
+    write_points(frames, &floes[0], frames->vertices_before, rows, 0, nf, 0, buffer);
+    write_points(frames, &others[0], 0, rows, nf, nb, frames->floe_vertices - frames->vertices_before, buffer);
+    for (int k = 1; k < N_DRAWN; k++) {
+        write_rows(frames, &floes[k], drawn[k].quantity, frames->first, rows, nf, buffer);
+        if (k < N_DRAWN - 1) write_rows(frames, &others[k], drawn[k].quantity, 0, rows + nf, nb, buffer);
+    }
     free(buffer);
 }
 
@@ -355,22 +365,19 @@ bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows
     bt_h5 *h5 = frames->h;
     bt_status status = bt_comm_agree(frames->comm, h5->status);
     if (status != BT_OK) return status;
-    bt_slab_grow(&frames->pose, frames->n);
-    bt_slab_grow(&frames->body_pose, frames->n);
-    bt_slab_grow(&frames->contact_force, frames->n);
-    bt_slab_grow(&frames->speed, frames->n);
-    bt_slab_grow(&frames->velocity, frames->n);
-    bt_slab_grow(&frames->net_force, frames->n);
-    paraview floes = create_paraview(frames, "floe", frames->n_floes, frames->floe_vertices, true);
-    paraview others = create_paraview(frames, "body", frames->n_others, frames->other_vertices, false);
-    bt_slab *shared[] = {&frames->pose, &frames->body_pose, &frames->contact_force, &frames->speed, &frames->velocity,
-                         &frames->net_force, // these stay open
-                         &floes.points, &floes.speed, &floes.velocity, &floes.net_force, &floes.force,
-                         &others.points, &others.speed, &others.velocity, &others.net_force};
-    enum { N = sizeof shared / sizeof *shared, STAY = 6 };
-    status = bt_slab_share(frames->comm, shared, N);
-    if (status == BT_OK) write_frame(frames, &floes, &others, rows);
-    for (int k = STAY; k < N; k++) bt_slab_close(shared[k]);
+    bt_slab floes[N_DRAWN], others[N_DRAWN - 1], *shared[BT_FRAME_COLUMNS + 2 * N_DRAWN - 1];
+    create_drawn(frames, "floe", frames->n_floes, frames->floe_vertices, N_DRAWN, floes);
+    create_drawn(frames, "body", frames->n_others, frames->other_vertices, N_DRAWN - 1, others);
+    int n = 0;
+    for (int k = 0; k < BT_FRAME_COLUMNS; k++) {
+        bt_slab_grow(&frames->column[k], frames->n);
+        shared[n++] = &frames->column[k]; // these stay open
+    }
+    for (int k = 0; k < N_DRAWN; k++) shared[n++] = &floes[k];
+    for (int k = 0; k < N_DRAWN - 1; k++) shared[n++] = &others[k];
+    status = bt_slab_share(frames->comm, shared, n);
+    if (status == BT_OK) write_frame(frames, floes, others, rows);
+    for (int k = BT_FRAME_COLUMNS; k < n; k++) bt_slab_close(shared[k]);
     // The time comes last: a reader that counts frames by it finds them whole.
     status = bt_comm_agree(frames->comm, h5->status);
     if (status != BT_OK) {
@@ -391,10 +398,8 @@ bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows
 
 void bt_frames_close(bt_frames *frames)
 {
-    bt_slab *all[] = {&frames->pose, &frames->body_pose, &frames->contact_force, &frames->speed, &frames->velocity,
-                      &frames->net_force};
-    for (int k = 0; k < 6; k++)
-        if (all[k]->h) bt_slab_close(all[k]);
+    for (int k = 0; k < BT_FRAME_COLUMNS; k++)
+        if (frames->column[k].h) bt_slab_close(&frames->column[k]);
     const hid_t datasets[] = {frames->time, frames->line_points, frames->line_tension};
     for (int k = 0; k < 3; k++)
         if (frames->h && datasets[k] >= 0) H5Dclose(datasets[k]);

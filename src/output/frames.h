@@ -7,6 +7,8 @@
 #include "output/frame.h"
 #include "base/h5dataset.h"
 
+enum { BT_FRAME_COLUMNS = 6 };
+
 typedef struct bt_frames {
     bt_h5 *h;
     const bt_comm *comm;
@@ -20,7 +22,7 @@ typedef struct bt_frames {
     int64_t floe_vertices, other_vertices; ///< of all ranks
     int64_t vertices_before;        ///< of floes on the ranks before this one
     hid_t time;
-    bt_slab pose, body_pose, contact_force, speed, velocity, net_force;
+    bt_slab column[BT_FRAME_COLUMNS]; ///< pose, ...: frames.c
     int64_t towed;                  ///< which of the other bodies, −1 = none
     int branches;                   ///< of the tow line
     hid_t line_points, line_tension;///< −1 without a line

@@ -57,13 +57,11 @@ static void create_panels(bt_impact_store *store, const bt_panels *panels, bool 
     bt_h5_attr_text(h5, "/panels", "description",
                     "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the "
                     "body's own x axis");
-    bt_h5_write(h5, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
-    bt_h5_describe(h5, "/panels/ends", "panel_end xy", "m",
-                   "panel k reaches from point k to k + 1, frame of the towed body");
-    bt_h5_write(h5, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
-    bt_h5_describe(h5, "/panels/middle", "panel xy", "m", "middle of each panel, frame of the towed body");
-    bt_h5_write(h5, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal);
-    bt_h5_describe(h5, "/panels/normal", "panel xy", "1", "outward normal there");
+    bt_h5_put(h5, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start, "panel_end xy", "m",
+              "panel k reaches from point k to k + 1, frame of the towed body");
+    bt_h5_put(h5, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle, "panel xy", "m",
+              "middle of each panel, frame of the towed body");
+    bt_h5_put(h5, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal, "panel xy", "1", "outward normal there");
     free(start);
     free(middle);
     free(normal);
@@ -220,9 +218,8 @@ void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, co
     bt_h5 *h5 = store->h;
     bt_h5_attr_double(h5, "/panels", "from", steady->start);
     bt_h5_attr_int(h5, "/panels", "steps", steady->n);
-    bt_h5_write(h5, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
-    bt_h5_describe(h5, "/panels/mean_force", "panel xy", "N",
-             "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
+    bt_h5_put(h5, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x, "panel xy", "N",
+              "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
     const struct { const char *path, *text; } of_normals[] = {
         {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
         {"/panels/max_load", "largest sum of the normal forces in a step of the window, impulse / dt"},
@@ -230,12 +227,11 @@ void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, co
         {"/panels/start_max_load", "largest sum of the normal forces in a step before the window, impulse / dt"},
         {"/panels/start_max_peak", "largest peak of a collision before the window by the conversion of /impacts"},
     };
-    for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++) {
-        bt_h5_write(h5, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n);
-        bt_h5_describe(h5, of_normals[k].path, "panel", "N", of_normals[k].text);
-    }
-    bt_h5_write(h5, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
-    bt_h5_describe(h5, "/panels/collisions", "panel", "1", "collisions in the window");
+    for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++)
+        bt_h5_put(h5, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n, "panel", "N",
+                  of_normals[k].text);
+    bt_h5_put(h5, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count, "panel", "1",
+              "collisions in the window");
     free(x);
     free(count);
     free(before);
@@ -290,11 +286,10 @@ static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
         if (old->status == BT_OK && rows_sound(store)) {
             write_rows(store);
         } else if (old->status == BT_OK) {
-            bt_errors_add(old->err,
-                          "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is "
-                          "damaged: restore it",
-                          old->path);
-            old->status = BT_ERR_CASE;
+            old->status = bt_fail(old->err, BT_ERR_CASE,
+                "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is "
+                "damaged: restore it",
+                old->path);
         }
     }
     free(x);

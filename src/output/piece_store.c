@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/h5dataset.h"
 #include "step/splitting.h"
 
@@ -204,10 +205,7 @@ void bt_piece_store_frame(bt_piece_store *store, const bt_piece_row *rows, int64
         points += store->s->split[k / 2].corners[k % 2];
     }
     if (n > 0) write_paraview(store, rows, n, points);
-    if (store->n_frames == store->cap) {
-        store->cap = store->cap ? 2 * store->cap : 64;
-        store->frame = bt_realloc(store->frame, (size_t)store->cap, sizeof *store->frame);
-    }
+    BT_MAKE_ROOM(store->frame, store->n_frames, store->cap, 64);
     store->frame[store->n_frames] = (bt_piece_count){n, points};
     store->n_rows += n;
     bt_h5_append(store->h, store->end, H5T_NATIVE_INT64, (hsize_t)store->n_frames++, 1, &store->n_rows);

@@ -73,8 +73,8 @@ static void create_events(bt_record *record)
                                           (hsize_t[]){64, 1}, false);
         bt_h5_describe(&record->h5, names[k], "time", units[k], texts[k]);
     }
-    bt_h5_write_names(&record->h5, "/events/kind_names", BT_EVENT_KINDS, bt_event_names);
-    bt_h5_describe(&record->h5, "/events/kind_names", "event_kind", NULL, "what a number in kind stands for");
+    bt_h5_put_names(&record->h5, "/events/kind_names", BT_EVENT_KINDS, bt_event_names, "event_kind",
+                    "what a number in kind stands for");
 }
 
 bt_status bt_record_events(bt_record *record, const bt_events *events, bt_errors *err)
@@ -178,10 +178,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     if (status == BT_OK) {
         bt_h5_attr_int(&record->h5, "/", "complete", 0);
         bt_provenance_write(&record->h5, command_line);
-        bt_h5_write_text(&record->h5, "/case", resolved);
-        bt_h5_write_text(&record->h5, "/case_as_given", input->text ? input->text : "");
-        bt_h5_describe(&record->h5, "/case", NULL, NULL, "the case with every key, in SI units");
-        bt_h5_describe(&record->h5, "/case_as_given", NULL, NULL,
+        bt_h5_put_text(&record->h5, "/case", resolved, "the case with every key, in SI units");
+        bt_h5_put_text(&record->h5, "/case_as_given", input->text ? input->text : "",
                        "the case file as it was given, and in a second document what a study or --set changed");
         bt_h5_describe_file(&record->h5, input->run.title);
         create_series(record);

@@ -60,11 +60,10 @@ static bool same_values(const bt_case *input, const char *text)
 static void refuse(bt_h5_reader *old, const bt_snapshot *snap, const char *why)
 {
     if (old->status != BT_OK) return;
-    bt_errors_add(old->err,
-                  "%s: belongs to another run than %s: %s; restore the result of that run, or go on from a checkpoint "
-                  "of this one",
-                  old->path, snap->path, why);
-    old->status = BT_ERR_CASE;
+    old->status = bt_fail(old->err, BT_ERR_CASE,
+        "%s: belongs to another run than %s: %s; restore the result of that run, or go on from a checkpoint "
+        "of this one",
+        old->path, snap->path, why);
 }
 
 /// On rank 0. Refuse, in old, a result of another run than that of the checkpoint `snap`: by what both began with, and
@@ -373,12 +372,11 @@ static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int
     const int64_t there = bt_h5_size(old, "/series/time", 0), pictures = bt_h5_size(old, "/frames/time", 0),
                   width = bt_h5_size(old, "/frames/pose", 1);
     if (old->status != BT_OK || (there >= entries && pictures >= frames && width == floes)) return;
-    bt_errors_add(old->err,
-                  "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint expects %lld, %lld and "
-                  "%lld: it is of another run, or older; restore it",
-                  old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries,
-                  (long long)frames, (long long)floes);
-    old->status = BT_ERR_CASE;
+    old->status = bt_fail(old->err, BT_ERR_CASE,
+        "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint expects %lld, %lld and "
+        "%lld: it is of another run, or older; restore it",
+        old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries,
+        (long long)frames, (long long)floes);
 }
 
 bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *events, bt_errors *err)

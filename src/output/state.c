@@ -592,13 +592,11 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
     bt_memory *memory = load_columns(snap, "contacts", memory_columns, BT_N_OF(memory_columns), sizeof *memory, &n);
     if (!snap->faulty) bt_state_check(world, memory, n, world->impacts && comm->rank == 0, snap);
     bt_status status = bt_comm_agree(comm, snap->faulty ? BT_ERR_CASE : BT_OK);
-    if (status == BT_OK && !same_constants(&made, &world->par, !world->environment)) {
-        bt_errors_add(err,
-                      "%s: the case it holds makes other constants of the step now; it was written by another version "
-                      "of the program: use that one",
-                      snap->path);
-        status = BT_ERR_CASE;
-    }
+    if (status == BT_OK && !same_constants(&made, &world->par, !world->environment))
+        status = bt_fail(err, BT_ERR_CASE,
+            "%s: the case it holds makes other constants of the step now; it was written by another version "
+            "of the program: use that one",
+            snap->path);
     if (status != BT_OK) {
         free(memory);
         return status;
@@ -606,9 +604,8 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
     bt_domain_create(world, comm);
     bt_cells_restore(world, memory, n);
     if (bt_world_hash(world) == hash) return BT_OK;
-    bt_errors_add(err,
-                  "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
-                  "; go on with the program that wrote it",
-                  snap->path, hash);
-    return BT_ERR_NUMERIC;
+    return bt_fail(err, BT_ERR_NUMERIC,
+                   "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
+                   "; go on with the program that wrote it",
+                   snap->path, hash);
 }

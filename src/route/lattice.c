@@ -18,6 +18,7 @@
 #include "route/lattice.h"
 
 #include "base/elementary.h"
+#include "base/inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -314,8 +315,7 @@ static bool before(entry a, entry b)
 
 static void push(heap *queue, entry e)
 {
-    if (queue->n == queue->cap)
-        queue->e = bt_realloc(queue->e, queue->cap = queue->cap ? 2 * queue->cap : 1024, sizeof *queue->e);
+    BT_MAKE_ROOM(queue->e, queue->n, queue->cap, 1024);
     size_t k = queue->n++;
     for (; k > 0 && before(e, queue->e[(k - 1) / 4]); k = (k - 1) / 4) queue->e[k] = queue->e[(k - 1) / 4];
     queue->e[k] = e;

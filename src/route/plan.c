@@ -4,7 +4,6 @@
 
 #include "base/elementary.h"
 #include "route/lattice.h"
-#include "route/shorten.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +12,184 @@
 #define MOST_STATES 1.5e6 ///< of a lattice whose spacing is chosen
 #define MOST_CELLS 3e6  ///< times speeds, of a raster whose cells are chosen
 #define REPELS 1.3      ///< factor of the cost near routes that have been found; then its square, and so on
-enum { TRIES = 4, ARRIVALS = 40 };
+enum { TRIES = 4, ARRIVALS = 40, ROUNDS = 4, SWEEPS = 12 };
+
+// --- a way made cheaper ----------------------------------------------------------------------------------------------
+
+// Line-of-sight shortening and a compass search over the corners of a path.
+//
+// Each step is taken when the cost of the whole path, its swath and its constraints, falls. Rejected: a spline by a
+// solver of nonlinear programmes, for the cost of ice has no gradient that leads anywhere at the size of floes; and
+// shortening by sight alone, which cuts through the ice that the search went round.
+
+typedef struct {
+    int n, cap;
+    double (*point)[2]; ///< [n] way-points, m; the last is the end
+    bt_path_cost cost;
+} bt_way;
+
+/// Legs of a way from the start of the task, with corners of its radius; false where they have no room. The path is
+/// the caller's to free.
+static bool way_path(const bt_planner *planner, const bt_way *way, bt_path *path)
+{
+    char why[200];
+    return bt_path_make(path, planner->task.start[0], planner->task.start[1], way->n, way->point[0],
+                        planner->task.radius, why);
+}
+
+/// Sets way->cost.
+static void way_price(const bt_planner *planner, bt_way *way)
+{
+    bt_path path;
+    if (!way_path(planner, way, &path)) {
+        way->cost = (bt_path_cost){.faults = BT_ROUTE_TURNS, .cost = INFINITY, .time = way->cost.time};
+        return;
+    }
+    way->cost = bt_swath_cost(planner, path.n - 1, path.leg, NULL);
+    bt_path_free(&path);
+}
+
+static void way_copy(bt_way *to, const bt_way *from)
+{
+    if (to->cap < from->n + 1) to->point = bt_realloc(to->point, (size_t)(to->cap = from->n + 16), sizeof *to->point);
+    memcpy(to->point, from->point, (size_t)from->n * sizeof *to->point);
+    to->n = from->n;
+    to->cost = from->cost;
+}
+
+/// The nearest place of the goal, of the task at the time t, to (x, y), in the frame of the ice.
+static void way_goal(const bt_planner *planner, double t, double x, double y, double goal[2])
+{
+    const double *g = planner->task.goal, *u = planner->task.drift;
+    goal[0] = g[0] - u[0] * t, goal[1] = g[1] - u[1] * t;
+    if (!planner->task.goal_is_line) return;
+    const double ex = g[2] - g[0], ey = g[3] - g[1], square = ex * ex + ey * ey;
+    const double dot = (x - goal[0]) * ex + (y - goal[1]) * ey;
+    const double f = dot <= 0 || !(square > 0) ? 0 : dot >= square ? 1 : dot / square;
+    goal[0] += f * ex, goal[1] += f * ey;
+}
+
+/// The end of a way put where the goal is at the time of arrival.
+static void end_at_goal(const bt_planner *planner, bt_way *way)
+{
+    enum { STEPS = 40 };
+    const double *u = planner->task.drift, fine = 1e-9 * planner->task.width;
+    double *end = way->point[way->n - 1];
+    for (int k = 0; k < STEPS; k++) {
+        const double was[2] = {end[0], end[1]};
+        way_goal(planner, way->cost.time, was[0], was[1], end);
+        way_price(planner, way);
+        if ((u[0] == 0 && u[1] == 0) || bt_hypot(end[0] - was[0], end[1] - was[1]) < fine) return;
+    }
+}
+
+/// Takes `tried` when it is better, or has fewer corners and is not worse.
+static bool take(const bt_planner *planner, bt_way *way, bt_way *tried)
+{
+    way_price(planner, tried);
+    bool better = bt_swath_better(&tried->cost, &way->cost);
+    if (!better && tried->n < way->n && !bt_swath_better(&way->cost, &tried->cost)) better = true;
+    if (better) way_copy(way, tried);
+    return better;
+}
+
+/// Way-points before this one stay.
+static int first_free(const bt_planner *planner)
+{
+    return isnan(planner->task.start_heading) ? 0 : 1;
+}
+
+static bool leave_out(const bt_planner *planner, bt_way *way, bt_way *tried)
+{
+    bool any = false;
+    for (int span = way->n - 1; span >= 1; span = span > 8 ? span * 2 / 3 : span - 1)
+        for (int k = first_free(planner); k + span < way->n;) {
+            way_copy(tried, way);
+            memmove(tried->point[k], tried->point[k + span], (size_t)(way->n - k - span) * sizeof *way->point);
+            tried->n -= span;
+            if (take(planner, way, tried)) any = true;
+            else k++;
+        }
+    return any;
+}
+
+/// Steps of the way-point k, to eight sides; the first stays on a given heading, and the end on the goal's line.
+static bool move_one(const bt_planner *planner, bt_way *way, bt_way *tried, int k, double step)
+{
+    const double *g = planner->task.goal, ex = g[2] - g[0], ey = g[3] - g[1], line = bt_hypot(ex, ey);
+    const bool end = k == way->n - 1, ray = k < first_free(planner);
+    if (end && (ray || !planner->task.goal_is_line || !(line > 0))) return false;
+    bool any = false;
+    for (int side = 0; side < (end || ray ? 2 : 8); side++) {
+        static const double to[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
+        const double along = step * to[side][0], aside = step * to[side][1];
+        way_copy(tried, way);
+        double *at = tried->point[k];
+        if (end) {
+            at[0] += along * ex / line, at[1] += along * ey / line;
+            way_goal(planner, way->cost.time, at[0], at[1], at);
+        } else {
+            at[0] += along * planner->ice.ax - aside * planner->ice.ay, at[1] += along * planner->ice.ay +
+                aside * planner->ice.ax;
+        }
+        if (take(planner, way, tried)) any = true, side = -1; // once more in the same sense
+    }
+    return any;
+}
+
+static bool move_all(const bt_planner *planner, bt_way *way, bt_way *tried)
+{
+    bool any = false;
+    for (double step = 2 * planner->task.width; step > planner->task.width / 100; step *= 0.5)
+        for (int sweep = 0; sweep < SWEEPS; sweep++) {
+            bool moved = false;
+            for (int k = 0; k < way->n; k++) moved = move_one(planner, way, tried, k, step) || moved;
+            if (!moved) break;
+            any = true;
+        }
+    return any;
+}
+
+/// A corner in the middle of a long leg, where it finds a better place than on it.
+static bool put_in(const bt_planner *planner, bt_way *way, bt_way *tried)
+{
+    bool any = false;
+    bt_way with = {0};
+    for (int k = first_free(planner); k < way->n; k++) {
+        const double *a = k ? way->point[k - 1] : planner->task.start, *b = way->point[k];
+        if (bt_hypot(b[0] - a[0], b[1] - a[1]) < 4 * planner->task.width) continue;
+        way_copy(&with, way);
+        memmove(with.point[k + 1], with.point[k], (size_t)(way->n - k) * sizeof *way->point);
+        with.point[k][0] = 0.5 * (a[0] + b[0]), with.point[k][1] = 0.5 * (a[1] + b[1]);
+        with.n++;
+        way_price(planner, &with);
+        for (double step = 2 * planner->task.width; step > planner->task.width / 10; step *= 0.5)
+            move_one(planner, &with, tried, k, step);
+        // worth a corner
+        if (with.cost.cost < way->cost.cost * (1 - 1e-4) && bt_swath_better(&with.cost, &way->cost)) {
+            way_copy(way, &with);
+            any = true;
+        }
+    }
+    free(with.point);
+    return any;
+}
+
+/// Lower the cost of a way until no step does: corners left out, moved and put in. Its end stays at the goal, which is
+/// where it is when the berg arrives.
+static void way_shorten(const bt_planner *planner, bt_way *way)
+{
+    bt_way tried = {0};
+    end_at_goal(planner, way);
+    for (int round = 0; round < ROUNDS; round++) {
+        bool any = leave_out(planner, way, &tried);
+        any = move_all(planner, way, &tried) || any;
+        any = put_in(planner, way, &tried) || any;
+        end_at_goal(planner, way);
+        if (!any) break;
+    }
+    free(tried.point);
+}
 
 // --- routes ----------------------------------------------------------------------------------------------------------
 
@@ -38,7 +214,7 @@ static void keep(const bt_planner *planner, bt_route *route, int n, const bt_leg
 static void keep_way(const bt_planner *planner, bt_route *route, const bt_way *way)
 {
     bt_path path;
-    if (!bt_way_path(planner, way, &path)) return; // not those that the planner makes
+    if (!way_path(planner, way, &path)) return; // not those that the planner makes
     keep(planner, route, path.n - 1, path.leg, way->n, way->point);
     bt_path_free(&path);
 }
@@ -123,7 +299,7 @@ static bool with_tail(const bt_planner *planner, const bt_lattice_way *way, doub
             for (int k = 0; k < (given ? 1 : task->headings); k++) {
                 double from[3] = {way->node[a][0], way->node[a][1], way->node[a][2]}, part[3][2], to[3];
                 if (a == 0 && any_start) from[2] = 2 * BT_PI * turn / task->headings;
-                bt_way_goal(planner, arrival, from[0], from[1], to);
+                way_goal(planner, arrival, from[0], from[1], to);
                 to[2] = given ? task->goal_heading : 2 * BT_PI * k / task->headings;
                 bt_route_dubins(from, to, radius, part);
                 int n = way->node_leg[a];
@@ -179,17 +355,17 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
         w.point[0][0] = task->start[0], w.point[0][1] = task->start[1];
         w.n = 1;
     }
-    bt_way_price(planner, &w);
-    bt_way_goal(planner, w.cost.time, w.point[w.n - 1][0], w.point[w.n - 1][1], w.point[w.n - 1]);
-    bt_way_price(planner, &w);
-    bt_way_shorten(planner, &w);
+    way_price(planner, &w);
+    way_goal(planner, w.cost.time, w.point[w.n - 1][0], w.point[w.n - 1][1], w.point[w.n - 1]);
+    way_price(planner, &w);
+    way_shorten(planner, &w);
     if (direct && isnan(task->start_heading)) {
         straight.point = bt_alloc((size_t)(straight.cap = 16), sizeof *straight.point);
         straight.n = 1;
-        bt_way_goal(planner, 0, task->start[0], task->start[1], straight.point[0]);
-        bt_way_price(planner, &straight);
-        bt_way_shorten(planner, &straight);
-        if (bt_swath_better(&straight.cost, &w.cost)) bt_way_copy(&w, &straight);
+        way_goal(planner, 0, task->start[0], task->start[1], straight.point[0]);
+        way_price(planner, &straight);
+        way_shorten(planner, &straight);
+        if (bt_swath_better(&straight.cost, &w.cost)) way_copy(&w, &straight);
     }
     bool allowed = !(w.cost.faults & (BT_ROUTE_IN_NO_GO | BT_ROUTE_OUTSIDE | BT_ROUTE_TURNS));
     if (allowed) keep_way(planner, route, &w);
@@ -211,11 +387,11 @@ static bool straight_line(const bt_planner *planner, bt_route *route)
     const double wide = task->extent[2] - task->extent[0] + task->extent[3] - task->extent[1];
     const bool still = task->drift[0] == 0 && task->drift[1] == 0;
     bool there = false;
-    bt_way_goal(planner, 0, task->start[0], task->start[1], end);
+    way_goal(planner, 0, task->start[0], task->start[1], end);
     for (int k = 0; k < STEPS && !there; k++) {
-        bt_way_price(planner, &way);
+        way_price(planner, &way);
         const double was[2] = {end[0], end[1]};
-        bt_way_goal(planner, way.cost.time, task->start[0], task->start[1], end);
+        way_goal(planner, way.cost.time, task->start[0], task->start[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
         there = still || moved < 1e-9 * task->width;
         if (bt_hypot(end[0] - task->start[0], end[1] - task->start[1]) > 10 * wide) break;
@@ -295,7 +471,7 @@ static bt_lattice *lattice_of(bt_planner *planner)
     double goal[2], ax = 1, ay = 0, h = task->spacing, cell = task->cell;
     double x = 0, y = 0, far = 0;
     for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice when the fastest speed has led there
-        bt_way_goal(planner, far / task->speed[0], task->start[0], task->start[1], goal);
+        way_goal(planner, far / task->speed[0], task->start[0], task->start[1], goal);
         x = goal[0] - task->start[0], y = goal[1] - task->start[1], far = bt_hypot(x, y);
     }
     if (!isnan(task->start_heading)) bt_sincos(task->start_heading, &ay, &ax);
@@ -317,7 +493,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     plan->spacing = bt_lattice_spacing(lattice);
     plan->status = fault_of_end(&planner, 0, t->start, 0, &plan->force);
     double there[2];
-    bt_way_goal(&planner, 0, t->start[0], t->start[1], there);
+    way_goal(&planner, 0, t->start[0], t->start[1], there);
     const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
     if (at_goal || !straight_line(&planner, &plan->route[0])) {
         plan->n = 0;

@@ -46,7 +46,8 @@ static void complete_journal(const bt_ensemble *ensemble)
     }
     bt_journal_strike_ended(ensemble->o->dir, ensemble->s->repeats, ensemble->n, lacking);
     for (int64_t i = 0; i < ensemble->n; i++)
-        if (lacking[ensemble->list[i].index]) bt_ensemble_journal(ensemble, "finished", &ensemble->list[i].m, NAN, 0);
+        if (lacking[ensemble->list[i].index])
+            bt_ensemble_journal(ensemble, BT_EVENT_FINISHED, &ensemble->list[i].m, NAN, 0);
     free(lacking);
 }
 
@@ -101,7 +102,7 @@ static bool lock_member(bt_ensemble *ensemble, bt_entry *entry)
         status = BT_ERR_IO;
     if (status != BT_OK) {
         settle_failed(ensemble, entry, status, &why);
-        bt_ensemble_journal(ensemble, "failed", &entry->m, 0, (int)status);
+        bt_ensemble_journal(ensemble, BT_EVENT_FAILED, &entry->m, 0, (int)status);
         bt_ensemble_say(ensemble, entry, status, 0);
     }
     bt_errors_free(&why);
@@ -177,16 +178,15 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
     bt_errors why = {0};
     bt_status status = BT_OK;
     int64_t n_steps = 0;
-    if (first && entry->attempts >= BT_MAX_ATTEMPTS) {
-        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", entry->m.name,
-                      entry->attempts);
-        status = BT_ERR_NUMERIC;
-    }
+    if (first && entry->attempts >= BT_MAX_ATTEMPTS)
+        status = bt_fail(&why, BT_ERR_NUMERIC,
+                         "%s: its process died in each of %d attempts; run the case alone to see why", entry->m.name,
+                         entry->attempts);
     if (first) {
         if (entry->attempts == 0) bt_member_forget_attempts(entry->folder);
         if (entry->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(entry->folder);
         if (entry->attempts > 0) gather(ensemble, false); // its process may die again, and the file should say so
-        bt_ensemble_journal(ensemble, "start", &entry->m, 0, 0);
+        bt_ensemble_journal(ensemble, BT_EVENT_START, &entry->m, 0, 0);
     }
     status = bt_comm_agree(ensemble->group, status);
     if (status == BT_OK) {
@@ -219,11 +219,10 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
         }
         if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(ensemble, entry, status, &why);
         bt_ensemble_journal(ensemble,
-                entry->paused                 ? "stopped"
-                : status == BT_OK         ? "finished"
-                : status == BT_ERR_SIGNAL ? "stopped"
-                                          : "failed",
-                &entry->m, wall, (int)status);
+                            entry->paused || status == BT_ERR_SIGNAL ? BT_EVENT_STOPPED
+                            : status == BT_OK                        ? BT_EVENT_FINISHED
+                                                                     : BT_EVENT_FAILED,
+                            &entry->m, wall, (int)status);
         if (status != BT_ERR_SIGNAL && !entry->paused) bt_ensemble_say(ensemble, entry, status, wall);
     }
     bt_errors_free(&why);

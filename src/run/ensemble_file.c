@@ -63,6 +63,25 @@ typedef struct {
     int64_t unread; ///< members that have finished and could not be read
 } table;
 
+/// What is known of each member: numbers, and texts, which have no units.
+static const struct {
+    const char *path, *units, *meaning;
+    size_t offset;
+} columns[] = {
+    {"/members/id", "1", "number of the member in the study, from 1", offsetof(table, id)},
+    {"/members/condition", "1", "which condition of the study, from 0", offsetof(table, condition)},
+    {"/members/repeat", "1", "which field of the condition, from 0", offsetof(table, repeat)},
+    {"/members/seed", "1", "seed of its field", offsetof(table, seed)},
+    {"/members/status", "1", "0 waiting, 1 finished, 2 failed", offsetof(table, status)},
+    {"/members/name", NULL, "folder of the member", offsetof(table, name)},
+    {"/members/state_hash", NULL, "hash of the state at its end", offsetof(table, hash)},
+    {"/members/reason", NULL, "why it failed, died or is not sound", offsetof(table, reason)},
+    {"/members/hole", NULL, "failed, no_solution, died, unsound or unreadable", offsetof(table, hole)},
+};
+enum { N_COLUMNS = sizeof columns / sizeof *columns };
+
+static void **array_of(const table *t, int k) { return (void **)(void *)((char *)t + columns[k].offset); }
+
 static void put_text(char **to, const char *text)
 {
     free(*to);
@@ -146,7 +165,7 @@ static hsize_t read_column(bt_h5 *h5, const char *folder, const char *group, con
     return n;
 }
 
-static void write_series(bt_h5 *h5, const table *t, const bt_study *study, const char *dir)
+static void write_series(bt_h5 *h5, const table *t, const char *dir)
 {
     hsize_t most = 0;
     for (int64_t m = 0; m < t->n; m++) {
@@ -158,7 +177,6 @@ static void write_series(bt_h5 *h5, const table *t, const bt_study *study, const
         free(x);
         free(folder);
     }
-    (void)study;
     bt_h5_group(h5, "/series");
     for (int k = 0; k < N_SERIES; k++) {
         char *name = bt_file_join("/series", series[k]);
@@ -186,24 +204,18 @@ static void write_series(bt_h5 *h5, const table *t, const bt_study *study, const
 /// Events of all members: of a line that parted the statistics ask when, and which.
 static void write_events(bt_h5 *h5, const table *t, const char *dir)
 {
-    static const struct {
-        const char *name, *units, *meaning;
-    } columns[] = {{"time", "s", "end of the step"},
-                   {"kind", NULL, "what happened"},
-                   {"subject", "1", "which branch (line_broken) or way-point (waypoint), from 1"},
-                   {"value", NULL,
-                    "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"}};
-    enum { TIME, KIND, SUBJECT, VALUE, N_COLUMNS };
+    static const char *const names[] = {"time", "kind", "subject", "value"};
+    enum { TIME, KIND, SUBJECT, VALUE, N_NAMES };
     bt_events all = {0};
     int64_t *member = NULL;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
         char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
-        double *x[N_COLUMNS];
-        hsize_t n = read_column(h5, folder, "/events", columns[TIME].name, &x[TIME]);
-        for (int k = KIND; k < N_COLUMNS; k++) {
+        double *x[N_NAMES];
+        hsize_t n = read_column(h5, folder, "/events", names[TIME], &x[TIME]);
+        for (int k = KIND; k < N_NAMES; k++) {
             x[k] = NULL;
-            const hsize_t others = n ? read_column(h5, folder, "/events", columns[k].name, &x[k]) : 0;
+            const hsize_t others = n ? read_column(h5, folder, "/events", names[k], &x[k]) : 0;
             n = others < n ? others : n;
         }
         member = bt_realloc(member, (size_t)all.n + n + 1, sizeof *member);
@@ -211,7 +223,7 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
             member[all.n] = t->id[m];
             bt_events_add(&all, x[TIME][i], (bt_event_kind)x[KIND][i], (int64_t)x[SUBJECT][i], x[VALUE][i]);
         }
-        for (int k = 0; k < N_COLUMNS; k++) free(x[k]);
+        for (int k = 0; k < N_NAMES; k++) free(x[k]);
         free(folder);
     }
     const hsize_t n = (hsize_t)all.n;
@@ -225,17 +237,13 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
     }
     if (n > 0) {
         bt_h5_group(h5, "/events");
-        bt_h5_write(h5, "/events/member", H5T_NATIVE_INT64, n, 0, member);
-        bt_h5_describe(h5, "/events/member", "event", "1", "number of the member in the study, from 1");
-        bt_h5_write(h5, "/events/time", H5T_NATIVE_DOUBLE, n, 0, time);
-        bt_h5_write_names(h5, "/events/kind", n, kind);
-        bt_h5_write(h5, "/events/subject", H5T_NATIVE_INT64, n, 0, subject);
-        bt_h5_write(h5, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value);
-        for (int k = 0; k < N_COLUMNS; k++) {
-            char *path = bt_file_join("/events", columns[k].name);
-            bt_h5_describe(h5, path, "event", columns[k].units, columns[k].meaning);
-            free(path);
-        }
+        bt_h5_put(h5, "/events/member", H5T_NATIVE_INT64, n, 0, member, "event", columns[0].units, columns[0].meaning);
+        bt_h5_put(h5, "/events/time", H5T_NATIVE_DOUBLE, n, 0, time, "event", "s", "end of the step");
+        bt_h5_put_names(h5, "/events/kind", n, kind, "event", "what happened");
+        bt_h5_put(h5, "/events/subject", H5T_NATIVE_INT64, n, 0, subject, "event", "1",
+                  "which branch (line_broken) or way-point (waypoint), from 1");
+        bt_h5_put(h5, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value, "event", NULL,
+                  "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)");
     }
     void *arrays[] = {member, time, value, subject, kind};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
@@ -257,15 +265,8 @@ static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
         bt_case input;
         bt_case_defaults(&input);
         char why[BT_WHY];
-        value[m] = NAN;
-        if (number && bt_value_read(key, &input, text[m], true, why)) {
-            const char *at = (const char *)&input + key->offset;
-            int64_t whole;
-            bool yes;
-            if (key->type == BT_KEY_REAL) memcpy(&value[m], at, sizeof value[m]);
-            else if (key->type == BT_KEY_INT) memcpy(&whole, at, sizeof whole), value[m] = (double)whole;
-            else memcpy(&yes, at, sizeof yes), value[m] = yes;
-        }
+        const bool read = number && bt_value_read(key, &input, text[m], true, why);
+        value[m] = read ? bt_value_number(key, &input) : (double)NAN;
         bt_case_free(&input);
         bt_member_free(&member);
     }
@@ -307,10 +308,8 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
 static void fill(table *t, const bt_study *study, const char *dir, bt_member_records *records)
 {
     t->n = bt_study_n_members(study);
-    int64_t **numbers[] = {&t->id, &t->condition, &t->repeat, &t->seed, &t->status};
-    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) *numbers[k] = bt_alloc((size_t)t->n, sizeof(int64_t));
-    char ***texts[] = {&t->name, &t->hash, &t->reason, &t->hole};
-    for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) *texts[k] = bt_alloc((size_t)t->n, sizeof(char *));
+    for (int k = 0; k < N_COLUMNS; k++)
+        *array_of(t, k) = bt_alloc((size_t)t->n, columns[k].units ? sizeof(int64_t) : sizeof(char *));
     for (int64_t m = 0; m < t->n; m++) {
         bt_member member;
         bt_study_member(study, m, &member);
@@ -333,11 +332,10 @@ static void fill(table *t, const bt_study *study, const char *dir, bt_member_rec
 
 static void release(table *t)
 {
-    for (int64_t m = 0; m < t->n; m++) {
-        free(t->name[m]);
-        free(t->hash[m]);
-        free(t->reason[m]);
-        free(t->hole[m]);
+    for (int k = 0; k < N_COLUMNS; k++) {
+        char **text = *array_of(t, k);
+        for (int64_t m = 0; m < t->n && !columns[k].units; m++) free(text[m]);
+        free(text);
     }
     bt_member_notes_free(&t->warnings);
     bt_member_notes_free(&t->reasons);
@@ -346,9 +344,7 @@ static void release(table *t)
         free(t->column[k].key);
         free(t->column[k].value);
     }
-    void *arrays[] = {t->id, t->condition, t->repeat, t->seed, t->status,
-                      t->name, t->hash, t->reason, t->hole, t->column};
-    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
+    free(t->column);
 }
 
 /// What is registered of a number, as attributes.
@@ -370,68 +366,49 @@ static void describe(bt_h5 *h5, const char *name, const char *key, int order)
         if (*texts[i].text) bt_h5_attr_text(h5, name, texts[i].name, texts[i].text);
 }
 
-static void describe_members(bt_h5 *h5)
+static void write_members(bt_h5 *h5, const table *t)
 {
-    static const struct {
-        const char *name, *units, *meaning;
-    } columns[] = {{"/members/id", "1", "number of the member in the study, from 1"},
-                  {"/members/condition", "1", "which condition of the study, from 0"},
-                  {"/members/repeat", "1", "which field of the condition, from 0"},
-                  {"/members/seed", "1", "seed of its field"},
-                  {"/members/status", "1", "0 waiting, 1 finished, 2 failed"},
-                  {"/members/name", NULL, "folder of the member"},
-                  {"/members/state_hash", NULL, "hash of the state at its end"},
-                  {"/members/reason", NULL, "why it failed, died or is not sound"},
-                  {"/members/hole", NULL, "failed, no_solution, died, unsound or unreadable"}};
-    for (size_t k = 0; k < sizeof columns / sizeof *columns; k++)
-        bt_h5_describe(h5, columns[k].name, "member", columns[k].units, columns[k].meaning);
+    const hsize_t n = (hsize_t)t->n;
+    bt_h5_put(h5, "/member", H5T_NATIVE_INT64, n, 0, t->id, "member", columns[0].units, columns[0].meaning);
+    bt_h5_group(h5, "/members");
+    for (int k = 0; k < N_COLUMNS; k++) {
+        void *array = *array_of(t, k);
+        if (columns[k].units)
+            bt_h5_put(h5, columns[k].path, H5T_NATIVE_INT64, n, 0, array, "member", "1", columns[k].meaning);
+        else bt_h5_put_names(h5, columns[k].path, n, array, "member", columns[k].meaning);
+    }
     bt_h5_attr_text(h5, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
 }
 
 static void write_all(bt_h5 *h5, const table *t, const bt_study *study, const char *dir)
 {
-    const hsize_t n = (hsize_t)t->n;
     int64_t finished = 0, failed = 0;
     for (int64_t m = 0; m < t->n; m++) {
         finished += t->status[m] == BT_MEMBER_FINISHED;
         failed += t->status[m] == BT_MEMBER_FAILED;
     }
-    bt_h5_write(h5, "/member", H5T_NATIVE_INT64, n, 0, t->id);
-    bt_h5_describe(h5, "/member", "member", "1", "number of the member in the study, from 1");
-    bt_h5_group(h5, "/members");
-    bt_h5_write(h5, "/members/id", H5T_NATIVE_INT64, n, 0, t->id);
-    bt_h5_write(h5, "/members/condition", H5T_NATIVE_INT64, n, 0, t->condition);
-    bt_h5_write(h5, "/members/repeat", H5T_NATIVE_INT64, n, 0, t->repeat);
-    bt_h5_write(h5, "/members/seed", H5T_NATIVE_INT64, n, 0, t->seed);
-    bt_h5_write(h5, "/members/status", H5T_NATIVE_INT64, n, 0, t->status);
-    bt_h5_write_names(h5, "/members/name", n, (const char *const *)t->name);
-    bt_h5_write_names(h5, "/members/state_hash", n, (const char *const *)t->hash);
-    bt_h5_write_names(h5, "/members/reason", n, (const char *const *)t->reason);
-    bt_h5_write_names(h5, "/members/hole", n, (const char *const *)t->hole);
-    describe_members(h5);
+    write_members(h5, t);
     bt_h5_group(h5, "/parameters");
     for (int p = 0; p < study->n_parameters; p++) write_parameter(h5, study, p, t->n);
     bt_h5_group(h5, "/summary");
     for (int k = 0; k < t->n_columns; k++) {
         char *name = bt_file_join("/summary", t->column[k].name);
-        bt_h5_write(h5, name, H5T_NATIVE_DOUBLE, n, 0, t->column[k].value);
+        bt_h5_write(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)t->n, 0, t->column[k].value);
         describe(h5, name, t->column[k].key, k);
         free(name);
     }
-    write_series(h5, t, study, dir);
+    write_series(h5, t, dir);
     write_events(h5, t, dir);
     bt_member_notes_write(h5, &t->warnings, "/warnings", "warning", "code of the warning");
     bt_member_notes_write(h5, &t->reasons, "/reasons", "reason", "code of a reason of the verdict");
     bt_warning_codes_write(h5);
-    bt_h5_write_text(h5, "/study", study->text);
-    bt_h5_describe(h5, "/study", NULL, NULL, "the study file as it was given");
+    bt_h5_put_text(h5, "/study", study->text, "the study file as it was given");
     bt_h5_describe_file(h5, study->title);
     char *path = bt_file_join(dir, "study.resolved.yml"), *resolved;
     size_t size;
     bt_errors unheard = {0};
     if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK)
-        bt_h5_write_text(h5, "/study_resolved", resolved),
-            bt_h5_describe(h5, "/study_resolved", NULL, NULL, "what the members are, and the base case with every key");
+        bt_h5_put_text(h5, "/study_resolved", resolved, "what the members are, and the base case with every key");
     bt_errors_free(&unheard);
     free(resolved);
     free(path);
@@ -457,13 +434,11 @@ bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_r
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
     }
-    if (status == BT_OK && t.unread) {
-        bt_errors_add(err,
-                      "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
-                                     "correct that, and call again",
-                      path, t.unread);
-        status = BT_ERR_IO;
-    }
+    if (status == BT_OK && t.unread)
+        status = bt_fail(err, BT_ERR_IO,
+            "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
+            "correct that, and call again",
+            path, t.unread);
     bt_member_notes_free(warnings);
     *warnings = t.warnings;
     t.warnings = (bt_member_notes){0};

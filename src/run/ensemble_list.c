@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <inttypes.h>
+#include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,9 +25,17 @@
 
 #define JOURNAL "journal.jsonl"
 
-/// Add a line, in one write: lines of several processes do not mix. wall: s, NAN = not known. A line that cannot be
-/// written is left out.
-static void journal_add(const char *dir, const char *event, const char *member, double wall, int code)
+static const char *const event_name[] = {
+    [BT_EVENT_START] = "start",
+    [BT_EVENT_STOPPED] = "stopped",
+    [BT_EVENT_FINISHED] = "finished",
+    [BT_EVENT_FAILED] = "failed",
+    [BT_EVENT_UNSOUND] = "unsound",
+};
+
+/// Add a line, in one write: lines of several processes do not mix. A line that cannot be written is left out.
+void bt_ensemble_journal(const bt_ensemble *ensemble, bt_member_event event, const bt_member *member, double wall,
+                         int code)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
@@ -35,8 +44,9 @@ static void journal_add(const char *dir, const char *event, const char *member, 
     const int n = snprintf(line, sizeof line,
                            "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": "
                            "%s, \"exit_code\": %d}\n",
-                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, member, (long)getpid(), took, code);
-    const int fd = bt_member_open(dir, JOURNAL, O_WRONLY | O_CREAT | O_APPEND);
+                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event_name[event], member->name,
+                           (long)getpid(), took, code);
+    const int fd = bt_member_open(ensemble->o->dir, JOURNAL, O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
     if (write(fd, line, (size_t)n) == n) fsync(fd);
     close(fd);
@@ -51,13 +61,16 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
     char *line = NULL;
     size_t room = 0;
     while (f && getline(&line, &room, f) > 0) {
-        int64_t condition, repeat;
-        const char *name = strstr(line, "\"member\": \"c");
-        if (!name || sscanf(name, "\"member\": \"c%" SCNd64 "-r%" SCNd64, &condition, &repeat) != 2) continue;
+        json_t *entry = json_loads(line, 0, NULL); // NULL for a line that a full disk cut short
+        const char *name = json_string_value(json_object_get(entry, "member"));
+        const char *event = json_string_value(json_object_get(entry, "event"));
+        int64_t condition = 0, repeat = 0;
+        const bool known = name && event && sscanf(name, "c%" SCNd64 "-r%" SCNd64, &condition, &repeat) == 2;
         const int64_t i = (condition - 1) * repeats + repeat - 1;
         // with fewer repeats than before there are lines of members that are no longer asked for
-        if (i >= 0 && i < n && repeat >= 1 && repeat <= repeats)
-            ended[i] = strstr(line, "\"event\": \"finished\"") != NULL;
+        if (known && i >= 0 && i < n && repeat >= 1 && repeat <= repeats)
+            ended[i] = !strcmp(event, event_name[BT_EVENT_FINISHED]);
+        json_decref(entry);
     }
     const bool whole = f && !ferror(f); // what cannot be read may say anything
     for (int64_t i = 0; i < n; i++) lacking[i] = lacking[i] && whole && !ended[i];
@@ -78,13 +91,11 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
     size_t size;
     *old = access(path, F_OK) == 0;
     bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
-    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text)) {
-        bt_errors_add(err,
-                      "%s: holds the members of another study (see %s): only `repeats` may change; give another "
-                      "folder with -o, or restore the study and its base case",
-                      dir, path);
-        status = BT_ERR_CASE;
-    }
+    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text))
+        status = bt_fail(err, BT_ERR_CASE,
+                         "%s: holds the members of another study (see %s): only `repeats` may change; give another "
+                         "folder with -o, or restore the study and its base case",
+                         dir, path);
     const char *kept = *old ? before : text;
     if (status == BT_OK) bt_checksum_digest_text(kept, strlen(kept), digest);
     free(before);
@@ -119,11 +130,6 @@ bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_op
 }
 
 // --- the list --------------------------------------------------------------------------------------------------------
-
-void bt_ensemble_journal(const bt_ensemble *ensemble, const char *event, const bt_member *member, double wall, int code)
-{
-    journal_add(ensemble->o->dir, event, member->name, wall, code);
-}
 
 bool bt_entry_is_suspect(const bt_entry *entry) { return entry->attempts >= BT_SUSPECT_ATTEMPTS; }
 
@@ -166,7 +172,7 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
             status = BT_OK;
         } else {
             status = bt_member_record_forget(entry->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
-            bt_ensemble_journal(ensemble, "unsound", &entry->m, 0, (int)status);
+            bt_ensemble_journal(ensemble, BT_EVENT_UNSOUND, &entry->m, 0, (int)status);
         }
         bt_errors_free(&again);
         bt_lock_drop(entry->folder, run);

@@ -72,8 +72,13 @@ typedef struct bt_ensemble {
     bt_errors *err;
 } bt_ensemble;
 
+typedef enum {
+    BT_EVENT_START, BT_EVENT_STOPPED, BT_EVENT_FINISHED, BT_EVENT_FAILED,
+    BT_EVENT_UNSOUND ///< it had finished, and its result is damaged
+} bt_member_event;
+
 /// A line of journal.jsonl. wall: s, NAN = unknown.
-void bt_ensemble_journal(const bt_ensemble *ensemble, const char *event, const bt_member *member, double wall,
+void bt_ensemble_journal(const bt_ensemble *ensemble, bt_member_event event, const bt_member *member, double wall,
                          int code);
 
 /// The wall time that is left, s; infinite where none was given.

@@ -142,6 +142,6 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **failure,
     if (died > 0)
         *why = bt_text_of("its process died in %d attempt%s without a checkpoint; it is tried again after all others, "
                           "%d times in all",
-                          died, died > 1 ? "s" : "", BT_MAX_ATTEMPTS);
+                          died, bt_plural(died), BT_MAX_ATTEMPTS);
     return BT_MEMBER_WAITING;
 }

@@ -55,8 +55,7 @@ static void write_texts(bt_h5 *h5, const char *group, const char *name, const ch
                         const char *const *texts, const char *meaning)
 {
     char *path = bt_file_join(group, name);
-    bt_h5_write_names(h5, path, (hsize_t)n, texts);
-    bt_h5_describe(h5, path, axis, NULL, meaning);
+    bt_h5_put_names(h5, path, (hsize_t)n, texts, axis, meaning);
     free(path);
 }
 
@@ -66,8 +65,8 @@ void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *
     if (notes->n == 0) return;
     bt_h5_group(h5, group);
     char *path = bt_file_join(group, "member");
-    bt_h5_write(h5, path, H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member);
-    bt_h5_describe(h5, path, axis, "1", "number of the member in the study, from 1");
+    bt_h5_put(h5, path, H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member, axis, "1",
+              "number of the member in the study, from 1");
     free(path);
     write_texts(h5, group, "code", axis, notes->n, (const char *const *)notes->code, what);
     write_texts(h5, group, "text", axis, notes->n, (const char *const *)notes->text, "the same for readers");
@@ -167,8 +166,8 @@ bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
     if (status == BT_OK && !json_is_object(*root)) {
         json_decref(*root);
         *root = NULL;
-        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; check the disk", path, why.line, why.text);
-        status = BT_ERR_CASE;
+        status = bt_fail(err, BT_ERR_CASE,
+                         "%s: cannot be read as JSON: line %d: %s; check the disk", path, why.line, why.text);
     }
     free(text);
     free(path);

@@ -38,10 +38,8 @@ static void report(const bt_snapshot *snap, const char *said)
 /// Rank 0. The folder is ours, and what it holds is read; but for the case.
 static bt_status open_folder(bt_resume *resume, const bt_run_options *options, bt_errors *err)
 {
-    if (!bt_file_there(options->dir, ".")) {
-        bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", options->dir);
-        return BT_ERR_IO;
-    }
+    if (!bt_file_there(options->dir, "."))
+        return bt_fail(err, BT_ERR_IO, "%s: there is no such folder; give the result folder of a run", options->dir);
     if (!options->held && (resume->lock = bt_lock_take(options->dir, NULL, err)) < 0) return BT_ERR_IO;
     bt_folder_recover(options->dir);
     resume->fresh = !options->from && !bt_checkpoint_there(options->dir) &&
@@ -193,13 +191,11 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *input, const bt
 
 bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err)
 {
-    if (comm->size > 1 && options->dump_step >= 0) {
-        bt_errors_add(err,
-                      "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the "
-                      "step is the same)",
-                      comm->size);
-        return BT_ERR_USAGE;
-    }
+    if (comm->size > 1 && options->dump_step >= 0)
+        return bt_fail(err, BT_ERR_USAGE,
+            "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the "
+            "step is the same)",
+            comm->size);
     return run_guarded(comm, input, options, NULL, false, bt_clock(), err);
 }
 

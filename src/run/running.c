@@ -304,8 +304,7 @@ static bt_status frame_if_due(run *running, double time, bt_errors *err)
 /// A force law could not say what it does.
 static bt_status tell_failed(const bt_forces *forces, bt_errors *err)
 {
-    bt_errors_add(err, "force %s: %s; the run ends here", forces->failed->name, forces->why);
-    return BT_ERR_NUMERIC;
+    return bt_fail(err, BT_ERR_NUMERIC, "force %s: %s; the run ends here", forces->failed->name, forces->why);
 }
 
 bool bt_running_goes_on(const bt_running *running)
@@ -497,11 +496,10 @@ static bt_status finish(run *running, bt_errors *err)
     if (sound) status = closed;
     bt_snapshot_free(&snap);
     status = bt_comm_agree(running->comm, status);
-    if (status == BT_OK && *stopped) {
-        bt_errors_add(err, "stopped by %s; %s holds everything up to there, and `bergtow resume %s` goes on", stopped,
-                      running->o->dir, running->o->dir);
-        status = BT_ERR_SIGNAL;
-    }
+    if (status == BT_OK && *stopped)
+        status = bt_fail(err, BT_ERR_SIGNAL,
+                         "stopped by %s; %s holds everything up to there, and `bergtow resume %s` goes on", stopped,
+                         running->o->dir, running->o->dir);
     return status;
 }
 

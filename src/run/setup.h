@@ -30,12 +30,17 @@ void bt_setup_track_free(bt_track *track);
 /// Constants of the step from the case. size: mean floe size, m.
 bt_params bt_setup_params(const bt_case *input, double size);
 
-// The tow of a case (private to the set-up).
+// --- parts of it (private to setup*.c) -------------------------------------------------------------------------------
+
+/// Is the field one of this domain, and is there room for it until walls have closed? Otherwise a message.
+bool bt_setup_check_field(const bt_case *input, const bt_field *field, bt_errors *err);
+
+/// Are the bodies apart, also on prescribed paths, and does each have room within a period? Otherwise messages.
+/// first_wall: the walls are the bodies from there on.
+bool bt_setup_check_bodies(const bt_case *input, bt_world *world, const bt_roster *roster, bt_idx first_wall,
+                           bt_errors *err);
 
 /// The tow at time zero of a case that was checked; release with bt_tow_free.
 bt_tow *bt_setup_tow(const bt_case *input);
-
-/// Displacement from the start after this way of the tow, m.
-void bt_setup_tow_displacement(const bt_case *input, const bt_tow *tow, double way, double d[2]);
 
 #endif

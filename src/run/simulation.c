@@ -16,6 +16,8 @@
 #include "base/units.h"
 #include "case/arch.h"
 #include "case/case_base.h"
+#include "case/constraints.h"
+#include "case/schema.h"
 #include "field/map_crs.h"
 #include "output/checkpoint.h"
 #include "bergtow/quantity.h"
@@ -80,10 +82,8 @@ static bt_status refuse_within(void)
 static bt_status read_case(bt_case *input, const bt_simulation_options *options, bt_errors *err)
 {
     *input = (bt_case){0};
-    if (!options->path && !options->text) {
-        bt_errors_add(err, "no case: give its file in path, or the case itself in text");
-        return BT_ERR_USAGE;
-    }
+    if (!options->path && !options->text)
+        return bt_fail(err, BT_ERR_USAGE, "no case: give its file in path, or the case itself in text");
     const char **place = bt_alloc((size_t)options->n_set, sizeof *place);
     for (int i = 0; i < options->n_set; i++) place[i] = ""; // messages name the value itself, and no option --set
     const bt_status status =
@@ -144,14 +144,13 @@ static bt_status begin(bt_simulation *sim, bt_errors *err)
 
 static bt_status check_numbers(const bt_simulation_options *options, bt_errors *err)
 {
-    if (options->n_set < 0 || (options->n_set > 0 && !options->set)) {
-        bt_errors_add(err, "n_set: %d is not a number of texts; give 0 with set NULL, or their number", options->n_set);
-        return BT_ERR_USAGE;
-    }
+    if (options->n_set < 0 || (options->n_set > 0 && !options->set))
+        return bt_fail(err, BT_ERR_USAGE,
+                       "n_set: %d is not a number of texts; give 0 with set NULL, or their number", options->n_set);
     if (options->threads >= 0 && options->threads <= BT_MOST_THREADS) return BT_OK;
-    bt_errors_add(err, "threads: %d are not available; give 1 to %d, or 0 for run.threads of the case or all cores",
-                  options->threads, BT_MOST_THREADS);
-    return BT_ERR_USAGE;
+    return bt_fail(err, BT_ERR_USAGE,
+                   "threads: %d are not available; give 1 to %d, or 0 for run.threads of the case or all cores",
+                   options->threads, BT_MOST_THREADS);
 }
 
 /// The end of create and resume.
@@ -189,11 +188,9 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
                       options->dir);
     if (err.n > 0) status = BT_ERR_USAGE;
     else status = bt_resume_begin(&resume, bt_comm_world(), &sim->o, &err);
-    if (status == BT_OK && resume.finished) {
-        bt_errors_add(&err, "%s is finished: all %lld steps are done", options->dir,
-                      (long long)bt_case_steps(&resume.c));
-        status = BT_ERR_USAGE;
-    }
+    if (status == BT_OK && resume.finished)
+        status = bt_fail(&err, BT_ERR_USAGE, "%s is finished: all %lld steps are done", options->dir,
+                         (long long)bt_case_steps(&resume.c));
     sim->m.lock = resume.lock;
     sim->m.held = true;
     sim->c = resume.c; // ours from here on
@@ -231,10 +228,9 @@ bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
     for (; n > 0 && sim->status == BT_OK && bt_running_goes_on(&sim->r); n--)
         sim->status = bt_running_step(&sim->r, &err);
     stepping = NULL;
-    if (sim->status == BT_OK && bt_halt_stops(sim->r.asked)) {
-        bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)sim->r.w->step);
-        sim->status = BT_ERR_SIGNAL;
-    }
+    if (sim->status == BT_OK && bt_halt_stops(sim->r.asked))
+        sim->status = bt_fail(&err, BT_ERR_SIGNAL,
+                              "asked to stop after step %lld; end the simulation", (long long)sim->r.w->step);
     if (keeps_failure(sim))
         bt_errors_add(&err, "the end of the simulation writes the state before that step to %s/%s", sim->dir,
                       BT_FAILURE_FILE);
@@ -482,6 +478,25 @@ bt_status bt_case_check_text(const bt_simulation_options *options, char **resolv
     return reported(status, &err);
 }
 
+char *bt_case_unused(const char *text)
+{
+    double row[2][3] = {{0}, {1e300}}; // in place of tables that the text names
+    const bt_table table = {.n = 2, .row = row[0]};
+    bt_errors unheard = {0};
+    bt_case input;
+    bt_case_read_kept(&input, "case", text, &table, &table, &unheard);
+    bt_json json = {0};
+    bt_json_open(&json, NULL, '{');
+    for (int k = 0; k < bt_n_case_keys; k++) {
+        const char *why = bt_case_why_unused(&input, bt_case_keys[k].name);
+        if (why) bt_json_string(&json, bt_case_keys[k].name, why);
+    }
+    bt_json_close(&json, '}');
+    bt_case_free(&input);
+    bt_errors_free(&unheard);
+    return json.text;
+}
+
 char *bt_simulation_progress(const bt_simulation *sim)
 {
     char line[BT_PROGRESS_LINE];
@@ -570,6 +585,8 @@ static char *limits_json(void)
     bt_json_int(&json, "contact_columns", BT_CONTACT_COLUMNS);
     bt_json_string(&json, "map_local_crs", BT_MAP_LOCAL_NAME);
     bt_json_numbers(&json, "map_ice_free_deg", 2, (const double[]){BT_MAP_FREE_SOUTH, BT_MAP_FREE_NORTH});
+    bt_json_numbers(&json, "map_most_deg", 2, (const double[]){BT_MAP_MOST_LON, BT_MAP_MOST_LAT});
+    bt_json_number(&json, "map_narrow_lon_deg", BT_MAP_NARROW_LON);
     bt_json_int(&json, "outline_vertices", BT_MAX_VERTICES);
     bt_json_close(&json, '}');
     return json.text;

@@ -424,11 +424,10 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         char line[96];
         snprintf(line, sizeof line, "%" PRId64 " bytes, xxh128 %s\n", file->bytes, file->digest);
         const char *before = bt_case_said_of(kept, file->path);
-        if (before && strncmp(before, line, strlen(line))) {
-            bt_errors_add(err, "%s: has changed since members in %s were made with it, and is of another study now; "
-                               "restore it, or give another folder with -o", file->path, dir);
-            status = BT_ERR_CASE;
-        }
+        if (before && strncmp(before, line, strlen(line)))
+            status = bt_fail(err, BT_ERR_CASE,
+                             "%s: has changed since members in %s were made with it, and is of another study now; "
+                             "restore it, or give another folder with -o", file->path, dir);
         if (before) continue;
         fprintf(text.out, "%s: %s", file->path, line);
         added++;
@@ -461,11 +460,10 @@ bt_status bt_study_files_same(bt_study_files *files, bt_errors *err)
         const bool read = bt_checksum_digest_file(file->path, now.digest, &now.bytes, &unheard) == BT_OK;
         bt_errors_free(&unheard);
         if (!read) continue;
-        if (strcmp(now.digest, file->digest)) {
-            bt_errors_add(err, "%s: has changed while the members of a study were made with it: restore it and call "
-                               "again, or give another folder with -o", file->path);
-            return BT_ERR_CASE;
-        }
+        if (strcmp(now.digest, file->digest))
+            return bt_fail(err, BT_ERR_CASE,
+                           "%s: has changed while the members of a study were made with it: restore it and call "
+                           "again, or give another folder with -o", file->path);
         file->seen = now.seen;
     }
     return BT_OK;

@@ -389,8 +389,7 @@ bt_status bt_study_override(bt_study *study, const char *const *set, int n, bt_e
 bt_status bt_study_fits(const bt_study *study, int ranks, bt_errors *err)
 {
     if (study->ranks <= ranks) return BT_OK;
-    bt_errors_add(
-        err, "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it",
+    return bt_fail(err, BT_ERR_CASE,
+        "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it",
         study->path, study->ranks, ranks);
-    return BT_ERR_CASE;
 }

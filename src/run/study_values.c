@@ -74,17 +74,13 @@ static said read_said(const bt_key *key, const bt_node *value)
     bt_case_defaults(&scratch);
     char why[BT_WHY];
     bt_value_read(key, &scratch, value->text, value->plain, why); // it has been looked at
-    said x = {0};
-    int64_t whole = 0;
-    if (key->type == BT_KEY_REAL) memcpy(&x.number, (const char *)&scratch + key->offset, sizeof x.number);
-    else if (key->type == BT_KEY_INT) memcpy(&whole, (const char *)&scratch + key->offset, sizeof whole);
-    else {
+    said x = {.number = bt_value_number(key, &scratch)};
+    if (key->type != BT_KEY_REAL && key->type != BT_KEY_INT) {
         bt_text text;
         bt_text_begin(&text);
         bt_value_write(key, &scratch, text.out);
         x.text = bt_text_end(&text);
     }
-    if (key->type == BT_KEY_INT) x.number = (double)whole;
     bt_case_free(&scratch);
     return x;
 }
@@ -268,13 +264,7 @@ void bt_study_read_range(const bt_study_reader *reader, const bt_node *map, int 
             if (!read)
                 bt_study_complain(reader, at, "%s.%s: %s", parameter->name, map->key[i],
                                   value->kind == BT_NODE_SCALAR ? why : "needs a single value");
-            else if (key->type == BT_KEY_REAL)
-                memcpy(&end[map->key[i][0] == 't'], (const char *)&scratch + key->offset, sizeof(double));
-            else {
-                int64_t whole;
-                memcpy(&whole, (const char *)&scratch + key->offset, sizeof whole);
-                end[map->key[i][0] == 't'] = (double)whole;
-            }
+            else end[map->key[i][0] == 't'] = bt_value_number(key, &scratch);
             good = good && read;
             bt_case_free(&scratch);
         } else if (!strcmp(map->key[i], "n")) {

@@ -20,6 +20,7 @@ from harness import TOW, call, changed, run, texts, write_case
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 
+from bergtow import _library
 from bergtow import cli, writing
 from bergtow.errors import BergtowError
 from bergtow.plot import style
@@ -559,6 +560,7 @@ ice:
   density: 910 kg/m3  # density of the floes [Hunke & Comeau 2011]
   shake: 15  # displacement, 0 = none, assumed
   basin: 10 m  # the default is HSVA's large ice tank, from memory
+  shape: polygons
   sides: 6  # corners, by [[x, y], ...]
 tow:
   speed: 0.2 m/s  # speed
@@ -579,7 +581,8 @@ def test_where_each_value_comes_from():
     assert kinds == {
         "run.dt": "given", "run.title": "given", "ice.size": "source", "ice.thickness": "assumed",
         "ice.friction": "given", "ice.length": "memory", "ice.density": "source", "ice.shake": "assumed",
-        "ice.basin": "memory", "ice.sides": "set", "tow.speed": "set", "tow.waypoints": "assumed"
+        "ice.basin": "memory", "ice.shape": "default", "ice.sides": "set", "tow.speed": "set",
+        "tow.waypoints": "assumed"
     }
     assert values["ice.size"].origin == "Yulmetov & Løset 2017" and values["run.title"].value == "a # b" and values[
         "tow.waypoints"].value == "[[1, 2], [3, 4]]"
@@ -589,6 +592,14 @@ def test_where_each_value_comes_from():
     assert report_case.preface(GIVEN) == ["Title.", "ASSUMED: the rest."]
     assert report_case.preface("# A line\n# goes on.\n#\n# Made by\n#   make x\n# - one\n# two\nrun:") == [
         "A line goes on.", "Made by\n  make x\n- one two"]
+
+
+def test_keys_without_effect_are_those_of_the_program():
+    """With a list of them in Python, keys of a line stood among the values of a tow without one."""
+    unused = _library.unused("run: {dt: 0.1 s, duration: 9 s}\nbody: {shape: disc}\ntow: {mode: speed}\n"
+                             "water: {current_table: nowhere.csv}\nno_such: {key: 1}\n")
+    assert "tow.line.type" in unused and "tow.speed" not in unused and "ice.concentration" not in unused
+    assert unused["water.current_x"] == "with water.current_table, which gives all of it"
 
 
 @pytest.mark.parametrize("words, kind", [
@@ -702,7 +713,7 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
         "ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.seed"
     } & set(ice) and "ice.friction" in ice
     assert (every["ice.size"].kind == "unused"
-            and every["ice.size"].origin == "not used: the ice is read by ice.outlines")
+            and every["ice.size"].origin == "not used: no effect on ice that is read from a file")
     assert said == [{"ice.size": f"{size.mean():.3g} m", "ice.thickness": "0.7 m"}]
     text = page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch).read_text()
     assert ice["floe size"][0] in text and "as read" in text

@@ -349,7 +349,7 @@ def _geometry(ogr, name, kind, place, at):
     return polygon
 
 
-def write_shapefile(layer, place, path, force):
+def write_shapefile(layer, place, path):
     """The files of a shapefile, the one with its name last. The mark is in its table."""
     with tempfile.TemporaryDirectory() as there:
         new = Path(there) / path.name
@@ -517,7 +517,7 @@ def _write(layers, place, path, kind, force):
     renamed = {}
     try:
         if kind == ".shp":
-            renamed = write_shapefile(layers[0], place, path, force)
+            renamed = write_shapefile(layers[0], place, path)
         elif kind == ".gpkg":
             with writing.written(path, force) as new:
                 renamed = write_ogr(layers, place, new, "GPKG")

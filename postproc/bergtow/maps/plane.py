@@ -27,6 +27,7 @@ from bergtow.errors import RunError
 from bergtow.maps.read import INSTALL, local_crs
 
 WGS84 = "OGC:CRS84"   # degrees, longitude first
+ROUNDING = 1e-3       # degrees beyond which coordinates are no degrees
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
       "east and north of no place on the earth"
 
@@ -102,14 +103,15 @@ def hold_against(path, crs, xy, implied=False):
     if isinstance(crs, str):
         return
     unit = crs.axis_info[0].unit_conversion_factor
+    lon, lat = _library.limit("map_most_deg")
     if crs.is_geographic:
         x, y = np.degrees(far * unit)
-        if x > 360.001 or y > 90.001:
-            swapped = x <= 90 and y <= 360
+        if x > lon + ROUNDING or y > lat + ROUNDING:
+            swapped = x <= lat and y <= lon
             raise RunError(path, f"is in {name_of(crs)}, degrees, and has coordinates up to {far[0]:.6g}, {far[1]:.6g}",
                            "latitude seems to come first: swap them" if swapped else
                            "they look like metres: " + (SAY if implied else "correct its crs (ogr2ogr -a_srs)"))
-    elif (far * unit <= (180, 90)).all():
+    elif (far * unit <= (_library.limit("map_narrow_lon_deg"), lat)).all():
         raise RunError(path, f"is in {name_of(crs)}, metres, and all its coordinates lie within {span[0]:.3g} of "
                        f"{xy[0][0]:.6g}, {xy[0][1]:.6g}, as degrees do",
                        "correct its crs (ogr2ogr -a_srs EPSG:4326)")
@@ -138,7 +140,7 @@ class Plane:
         if isinstance(crs, str):
             plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)
             return plane
-        if centre and not (abs(centre[0]) <= 360 and abs(centre[1]) <= 90):
+        if centre and (np.abs(centre) > _library.limit("map_most_deg")).any():
             raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is no place on the earth",
                            "give longitude and latitude in degrees")
         lonlat = plane._prepare(found, xy)

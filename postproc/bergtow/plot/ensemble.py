@@ -11,6 +11,7 @@
     variants.png      what each variant does to the mean, against the first one (plot/variants.py)
     sensitivity.png   Sobol indices and partial rank correlations
 """
+import argparse
 import sys
 from pathlib import Path
 
@@ -21,10 +22,10 @@ from bergtow.plot import variants as plot_variants
 from bergtow.plot.axes import axis_label, headline, numeric, of, wants_log
 from bergtow.plot.loads import MOST_LINES, draw_above, draw_exceedance, draw_returns
 from bergtow.plot.sweep import draw_scatter, draw_sweep
-from bergtow.result.members import EXCLUDABLE, Members, reading, short_key
+from bergtow.result.members import Members, reading, short_key
 from bergtow.stats import loads
 from bergtow.stats import mean as stat_mean
-from bergtow.stats.conditions import member, nothing_to_count, sensitivity
+from bergtow.stats.conditions import DEFAULTS, member, nothing_to_count, sensitivity
 
 import numpy as np
 from matplotlib.colors import LogNorm
@@ -171,17 +172,12 @@ def options(p):
                    choices=[s[1:] for s in writing.PICTURES],
                    default="png",
                    help="kind of the files (default png)")
-    p.add_argument("--exclude",
-                   action="append",
-                   choices=EXCLUDABLE,
-                   default=[],
-                   help="leave out members with this doubt; may be repeated")
-    loads.add_load_options(p)
+    loads.add_options(p)
     arguments.add_force(p)
 
 
 def perform(a):
-    a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0, 10.0, 100.0], None, None, None, 1
+    a = argparse.Namespace(**DEFAULTS | vars(a) | {"resamples": 1})
     e = Members(a.folder)
     dropped = e.exclude(a.exclude) if a.exclude else {}
     for name, kinds in dropped.items():

@@ -365,6 +365,7 @@ def draw(points, log=True):
     figure = style.Figure(figsize=(11, 7))
     axes = figure.add_axes((0.085, 0.1, 0.63, 0.755))
     draw_estimates(axes, points, factor)
+    of_estimates = axes.get_legend_handles_labels()[0]
     hidden = draw_runs(axes, points, factor, low, log)
     if log:
         style.logarithmic(axes.yaxis)
@@ -374,8 +375,7 @@ def draw(points, log=True):
     axes.set_ylabel(f"mean ice resistance ({unit})")
     axes.grid(which="major")
     handles, labels, lost = style.legend_of(axes)
-    ours = ("simulated", "mean of the tows", "a tow", "window", "measured")
-    order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith(ours))
+    order = sorted(range(len(labels)), key=lambda i: handles[i] in of_estimates)
     axes.legend([handles[i] for i in order], [labels[i] for i in order],
                 loc="upper left",
                 bbox_to_anchor=(1.02, 1.0),

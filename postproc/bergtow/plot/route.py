@@ -11,9 +11,9 @@ LINES = (style.TOW, style.DRAG, "#e69f00", style.INERTIA, "#56b4e9", "#cc79a7")
 COVER = LinearSegmentedColormap.from_list("cover", [style.WATER, "#5d8fb5", "#d3e6f1", "#fbfdfe"])
 
 
-def figure(title, words, place, extent, cover, cover_extent, outlines, no_go, routes, goal):
-    """The map. routes: [(label, body [m, 2], vessel [k, 2] or None, bold)]; cover [ny, nx] within cover_extent (x0, x1,
-    y0, y1)."""
+def figure(title, words, place, extent, cover, cover_extent, outlines, no_go, routes, bold, goal):
+    """The map. routes: candidates (label, track [m, 2] of the body, tug [k, 2] or None, straight, name), bold: the name
+    of one of them or None; cover [ny, nx] within cover_extent (x0, x1, y0, y1)."""
     flat = place.map
     (left, low), (right, high) = flat([extent[:2], extent[2:]])
     width = 9.0
@@ -31,13 +31,13 @@ def figure(title, words, place, extent, cover, cover_extent, outlines, no_go, ro
         axes.add_collection(PolyCollection([flat(o) for o in no_go], facecolors=style.FIXED, edgecolors=style.INK,
                                            hatch="///", linewidths=0.6))
     colours = iter(LINES * len(routes))
-    for label, body, vessel, bold in routes:
-        colour = style.JAM if label.startswith("straight") else next(colours)
-        axes.plot(*flat(body).T, color=style.HALO, linewidth=4.2 if bold else 3.0)
-        axes.plot(*flat(body).T, color=colour, linewidth=2.6 if bold else 1.5, label=label)
-        if vessel is not None:
-            axes.plot(*flat(vessel).T, color=colour, linewidth=0.8, linestyle=(0, (3, 2)))
-    start = flat(routes[0][1][:1])[0]
+    for c in routes:
+        colour = style.JAM if c.straight else next(colours)
+        axes.plot(*flat(c.track).T, color=style.HALO, linewidth=4.2 if c.name == bold else 3.0)
+        axes.plot(*flat(c.track).T, color=colour, linewidth=2.6 if c.name == bold else 1.5, label=c.label)
+        if c.tug is not None:
+            axes.plot(*flat(c.tug).T, color=colour, linewidth=0.8, linestyle=(0, (3, 2)))
+    start = flat(routes[0].track[:1])[0]
     axes.plot(*start, "o", color=style.BODY, markeredgecolor=style.BODY_EDGE, markersize=8)
     aim = flat(np.atleast_2d(goal))
     axes.plot(*aim.T, "X-" if len(aim) > 1 else "X", color=style.JAM, markeredgecolor=style.HALO, markersize=10)

@@ -24,10 +24,9 @@ from bergtow.result import origins as report_case
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, Members, reading, short_key
 from bergtow.result.origins import scrubbed
 from bergtow.result.run import Run
-from bergtow.stats import loads
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import design_value as statement
-from bergtow.stats import fit as stat_fit
+from bergtow.stats.conditions import DEFAULTS as OPTIONS
 from bergtow.study import analysis
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
@@ -44,11 +43,6 @@ DECIDE = ("ice.size", "tow.speed", "body.drag.water_form", "water.current_x", "w
           "air.wind_y")
 STATUS = {FINISHED: "finished", FAILED: "failed"}
 WARNED = "WARNING: "
-#: as bergtow statistics has them
-OPTIONS = {
-    "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
-    "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
-}
 
 
 def unbroken(text):
@@ -462,9 +456,8 @@ def context(folder, place=None, given=None, also=()):
         "warnings": [scrubbed(w) for w in warned],
         "method": report_method.method(s, cases), "limits": report_method.limits(cases, bool(told and told["speeds"])),
         "assumed": [replace(v, value=report_case.short(v.value)) for v in values
-                    if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
-                    and not v.key.startswith(PERSONAL + NUMERICAL)
-                    and any(report_run.applies(v.key, r[2]) for r in runs)],
+                    if v.kind != "unused" and (v.kind not in ("source", "default", "field") or v.key in DECIDE)
+                    and not v.key.startswith(PERSONAL + NUMERICAL)],
         "ranges": ranges(results, told), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results, told), "chapters": parts(found, drawn),
         "members": rows_of, "members_by_condition": by_condition(s),

@@ -15,7 +15,6 @@ from bergtow.plot import resistance as plot_resistance
 from bergtow.reporting.replay import LIMIT, Replay
 from bergtow.result import origins as report_case
 from bergtow.result.at_least import AtLeast
-from bergtow.result.run import case_value
 
 import numpy as np
 
@@ -46,11 +45,6 @@ KEY_VALUES = {
 }
 MOST_EVENTS = 40  #: of the table; a tow may have thousands of way-points
 UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
-#: keys of the tow that mean nothing in some modes
-ONLY = {
-    "tow.line": ("line", "thrust"), "tow.vessel": ("thrust", ), "tow.speed": ("speed", "line", "thrust"),
-    "tow.ramp": ("speed", "line", "thrust")
-}
 
 
 def force(value):
@@ -305,20 +299,6 @@ def stamp(run):
             f"state hash {run.summary.get('state_hash', 'unknown')}")
 
 
-def applies(key, case):
-    """Does a key mean anything in a case, {key: text}? One of the tow in its mode, a size of the body in its shape,
-    one of walls beside walls, one of crushing or splitting where ice is crushed or splits."""
-    if key in ("body.length", "body.width") and case.get("body.shape") == "polygon":
-        return False
-    edges = {case.get("domain.ends"), case.get("domain.sides")}
-    if key.startswith("domain.wall_") and "wall" not in edges or key == "domain.ahead" and "moving" not in edges:
-        return False
-    if any(key.startswith(law.rpartition(".")[0]) and key != law and not case_value(case, law, 0.0) > 0
-           for law in ("ice.crushing.pressure", "ice.splitting.toughness")):
-        return False
-    return not any(key.startswith(start) and case.get("tow.mode", "") not in modes for start, modes in ONLY.items())
-
-
 def key_values(run, values):
     """{heading: [Value]}: the values that tell one run from another."""
     by_key, out = {v.key: v for v in values}, {}
@@ -327,8 +307,7 @@ def key_values(run, values):
             continue
         out[heading] = (report_case.of_field(run) if heading == "Ice" else []) + [
             by_key[k] for k in keys if k in by_key and by_key[k].kind != "unused" and by_key[k].value not in
-            ("", "none",
-             UNSET.get(k)) and applies(k, run.case)
+            ("", "none", UNSET.get(k))
         ]
     return out
 

@@ -10,9 +10,8 @@ from pathlib import Path
 from bergtow import arguments, progress, writing
 from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero
 from bergtow.errors import RunError
-from bergtow.result.members import EXCLUDABLE, FINISHED, Members
+from bergtow.result.members import FINISHED, Members
 from bergtow.stats import conditions, loads
-from bergtow.stats import fit as stat_fit
 from bergtow.text import ensemble as ensemble_text
 
 import numpy as np
@@ -80,21 +79,14 @@ def options(p):
     p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
     p.add_argument("--error",
                    type=above_zero,
-                   default=0.05,
                    metavar="E",
-                   help="relative error of the mean that the number of fields needed is for (default 0.05)")
-    p.add_argument("--exclude",
-                   action="append",
-                   choices=EXCLUDABLE,
-                   default=[],
-                   help="leave out members with this doubt, and name them; may be repeated")
+                   help="relative error of the mean that the number of fields needed is for (default %(default)s)")
     p.add_argument("--hours",
                    type=above_zero,
                    nargs="+",
-                   default=[1.0, 10.0, 100.0],
                    metavar="T",
                    help="return times of loads and peaks, hours of tow (default 1 10 100)")
-    loads.add_load_options(p)
+    loads.add_options(p)
     p.add_argument("--threshold",
                    type=finite,
                    metavar="N",
@@ -109,13 +101,13 @@ def options(p):
                    help="blocks a field for block maxima (default: so many that there are 20)")
     p.add_argument("--resamples",
                    type=at_least_one,
-                   default=stat_fit.RESAMPLES,
                    metavar="B",
                    help="resamples for p-values and return levels (default %(default)s)")
     p.add_argument("--partial",
                    action="store_true",
                    help="exit with 0 even where members of the study are in no number")
     arguments.add_force(p)
+    p.set_defaults(**conditions.DEFAULTS | {"exclude": []})
 
 
 def perform(a):

@@ -10,6 +10,8 @@ import shlex
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
+from bergtow import _library
+
 import numpy as np
 import yaml
 
@@ -27,10 +29,6 @@ BESIDE = "set."  #: in the text of a case as given, of the keys that were given 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  #: 20 times as fast, where the package was built with it
 ZERO = 1e-12  #: no value of a key is so small
 
-#: keys of ice that is made, which mean nothing where it is read
-MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread",
-        "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake", "ice.extent.x_min", "ice.extent.x_max",
-        "ice.extent.y_min", "ice.extent.y_max")
 #: used for outlines that have no thickness of their own; a field file always has one
 THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 
@@ -142,17 +140,14 @@ def source_of_ice(case):
 
 
 def not_used(run, case):
-    """{key: why} of the keys of ice that is made, which say nothing of a run that read its ice; case: {key: text}."""
+    """{key: why} of the keys that have no effect on a run; case: {key: text}."""
+    found = {key: f"not used: no effect {why}" for key, why in _library.unused(run.resolved_text).items()}
     ice = source_of_ice(case)
-    if ice is None:
-        return {}
-    thickness = run.value("ice.thickness")
-    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant"
-                                       or bool(np.any(np.isclose(run.thickness, thickness, rtol=1e-12, atol=0))))
-    return {
-        key: f"not used: the ice is read by {ice}" + ("" if key in MADE else ", with its thickness")
-        for key in (MADE if asked else MADE + THICKNESS)
-    }
+    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant" or bool(
+        np.any(np.isclose(run.thickness, run.value("ice.thickness"), rtol=1e-12, atol=0))))
+    if ice and not asked:
+        found |= dict.fromkeys(THICKNESS, f"not used: the ice is read by {ice}, with its thickness")
+    return found
 
 
 def spread(values, unit):

@@ -108,7 +108,7 @@ def room(outlines, most):
     return out
 
 
-def clear_of_hull(floes, outlines, situation, start=None, yaw=None):
+def clear_of_hull(outlines, situation, start=None, yaw=None):
     """[n] of bool: floes that do not lie on the towed body where it starts."""
     start = np.array(situation.start if start is None else start)
     yaw = situation.values["body.yaw"] if yaw is None else yaw
@@ -158,7 +158,7 @@ def one(k, floes, own, situation, errors, folder, as_read):
     periodic = np.array([values[f"domain.{side}"] == "periodic" for side in ("ends", "sides")])
     moved.pose[:, :2] = np.where(periodic, low + (moved.pose[:, :2] - low) % (high - low), moved.pose[:, :2])
     kept = np.all((moved.pose[:, :2] >= low) & (moved.pose[:, :2] <= high), axis=1)
-    kept &= clear_of_hull(moved, moved.outlines(), situation)
+    kept &= clear_of_hull(moved.outlines(), situation)
     file = folder / f"m{k + 1:03d}.h5"
     moved.take(kept).write(file)
     drift = errors.drift * current

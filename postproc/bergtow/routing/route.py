@@ -119,7 +119,7 @@ def _not_below(text, unit, option):
     return value
 
 
-def refuse_looks(a, w, s):
+def refuse_looks(w, s):
     """Refuse what --replan cannot have. Errors: RunError."""
     if s.mode == "thrust":
         raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new "
@@ -213,7 +213,7 @@ def calibrated(a, w, s, runs):
     for k, (start, end) in enumerate(swaths(a.calibrate, s, length)):
         yaw = float(np.arctan2(*(end - start)[::-1]))
         file = folder / f"s{k + 1:03d}.h5"
-        floes.take(members.clear_of_hull(floes, outlines, s, start, yaw)).write(file)
+        floes.take(members.clear_of_hull(outlines, s, start, yaw)).write(file)
         route = planner.straight_route(s.ice, s.hull, start, end, speed=speed, extent=s.extent, cell=w["cell"],
                                        drift=s.drift, water=s.water)
         c = tows.candidate(f"swath-{k + 1}", f"swath {k + 1}", route, speed, s)
@@ -256,7 +256,7 @@ def tow(runs, name, some, keys):
 # ---- what was found
 
 
-def described(c, s):
+def described(c):
     """A candidate, for JSON."""
     r = c.route
     by_legs = not np.isfinite(c.speed)
@@ -296,11 +296,11 @@ def numbers(found):
 
 def draw(found, plan, some, s, goal, bold):
     from bergtow.plot import route as picture
-    shown = [(c.label, c.track, c.tug, c.name == bold) for c in some
+    shown = [c for c in some
              if not np.isfinite(c.speed) or c.speed == max(x.speed for x in some if np.isfinite(x.speed))]
     e = plan.cover_extent
     return picture.figure(f"{found['title']}: routes", words.answer(found), s.place, s.extent, plan.cover,
-                          e, s.ice.outlines, s.no_go, shown, goal)
+                          e, s.ice.outlines, s.no_go, shown, bold, goal)
 
 
 class Files:
@@ -368,7 +368,7 @@ def perform(a):
         raise RunError(f"--to {a.to}", f"is reached where the tow starts: within a width of the body, "
                        f"{s.hull.width:.4g} m", "choose a goal farther away", CASE)
     if w["replan"]:
-        refuse_looks(a, w, s)
+        refuse_looks(w, s)
     last = began + 60 * a.budget
     runs = tows.Tows(case.resolve(), folder, "route", program, [], a.jobs, last, last)
     found = {"case": a.case.name, "title": s.values["run.title"] or a.case.stem, "status": "ok", "set": a.set,
@@ -387,7 +387,7 @@ def perform(a):
         found |= {"plan_s": time.monotonic() - clock, "states": plan.states, "cell": plan.cell, "spacing": plan.spacing}
         refuse(plan, found, folder / "route.json", a.force)
         some = tows.candidates(plan.routes, w["speeds"], s)
-        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c, s) for c in some]}
+        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c) for c in some]}
         files = Files(folder, plan, some, s, goal, a.force)
         files.write_plan()
         files.write(found, picture=True)

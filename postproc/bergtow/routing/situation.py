@@ -167,9 +167,10 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
                            "make outlines of it with `bergtow outlines`, and name the .geojson", USAGE)
         if not map_file.is_file():
             raise RunError(map_file, "no such file", "name a field (.h5) or outlines (.geojson) with --map")
-        given.append((f"ice.{kind}", str(map_file.resolve())))
-        idle = MADE + (BESIDE_FIELD if kind == "field" else ())
-        merged["ice"] = {k: v for k, v in merged.get("ice", {}).items() if k not in idle}
+        merged["ice"] = {**merged.get("ice", {}), kind: str(map_file.resolve())}
+        for key in ("ice.seed", *_library.unused(json.dumps(merged))):
+            if key.startswith("ice."):
+                _drop(merged, key.split("."))
     for key, value in [*given, *values.items()]:
         node, (*parents, last) = merged, key.strip().split(".")
         for name in parents:
@@ -185,11 +186,12 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
     return out, ramp
 
 
-#: keys of the ice that have no effect where it is read
-MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_spread", "size_min", "size_max",
-        "size_exponent", "shake", "extent", "seed")
-#: beside a field, too
-BESIDE_FIELD = ("thickness", "thickness_law", "thickness_spread", "x_min", "x_max", "y_min", "y_max", "outlines_crs")
+def _drop(section, names):
+    """Take a key out of a case, by the names that lead to it."""
+    for name in names[:-1]:
+        section = section.get(name, {})
+    if isinstance(section, dict):
+        section.pop(names[-1], None)
 
 
 def _merged(old, new):

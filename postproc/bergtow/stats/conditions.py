@@ -20,6 +20,13 @@ import numpy as np
 MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
 
 
+#: the options that statistics() takes: what bergtow statistics has by default
+DEFAULTS = {
+    "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
+    "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
+}
+
+
 def member(e, m):
     """Mean of one member with its standard error within the run."""
     within = stat_mean.series_mean(e.steady(m))

@@ -266,7 +266,7 @@ def branches(e, rows, case, found):
     return [row(name) for name in sorted(largest)]
 
 
-def _of_the_line(e, rows, case, lines):
+def _of_the_line(e, rows, lines):
     """Warnings of lines that parted, or that would. A line parts by the tension of a step, while the design tension is
     a mean over the time scale, so both are compared with the breaking load; lines: those of branches()."""
     out, tows = [], e.tows(rows)
@@ -335,7 +335,7 @@ def statement(e, rows, c):
         if load["needs"] in loads.LINE:  # warnings about the sample of the tow force hold here, too
             said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
             warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
-    warned = _of_the_line(e, there, case, lines) + warned
+    warned = _of_the_line(e, there, lines) + warned
     if c["without_bound"]["words"]:
         warned = [("means, peaks and quantiles are at least those given, and there is no design value, since nothing "
                    "bounds some loads: let ice give way (ice.rafting.kappa, ice.crushing.pressure)",

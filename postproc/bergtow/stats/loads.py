@@ -25,6 +25,7 @@ import numpy as np
 
 from bergtow.arguments import above_zero, share
 from bergtow.errors import RunError
+from bergtow.result.members import EXCLUDABLE
 from bergtow.result.run import Run, least
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
@@ -269,8 +270,13 @@ def panels(e, rows):
     }
 
 
-def add_load_options(p):
-    """Options of the statistics of loads."""
+def add_options(p):
+    """Options of the statistics of loads, and --exclude."""
+    p.add_argument("--exclude",
+                   action="append",
+                   choices=EXCLUDABLE,
+                   default=[],
+                   help="leave out members with this doubt, and name them; may be repeated")
     p.add_argument("--time-scale",
                    type=above_zero,
                    metavar="S",
