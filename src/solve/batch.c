@@ -31,10 +31,20 @@ static size_t batch_bytes(const bt_cell *cell)
     return sizeof(bt_batch) + (cell->laws.limits ? sizeof(bt_batch_bounds) : 0);
 }
 
-/// The records of the contacts that are not listed.
-static bt_contact *rest_of(const bt_cell *cell)
+/// Bytes of what n batches rest: whole records.
+static size_t rest_bytes(bt_idx n)
 {
-    return (bt_contact *)((char *)cell->work.batch + (size_t)cell->work.n_batches * batch_bytes(cell));
+    return ((size_t)n * sizeof(bt_rest) + sizeof(bt_contact) - 1) / sizeof(bt_contact) * sizeof(bt_contact);
+}
+
+bt_rest *bt_batch_rests(const bt_cell *cell)
+{
+    return (bt_rest *)((char *)cell->work.batch + (size_t)cell->work.n_batches * batch_bytes(cell));
+}
+
+bt_contact *bt_batch_others(const bt_cell *cell)
+{
+    return (bt_contact *)((char *)bt_batch_rests(cell) + rest_bytes(cell->work.n_batches));
 }
 
 bool bt_batch_is_for(const bt_cell *cell)
@@ -244,9 +254,10 @@ static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv, const
         for (int l = 0; l < batch->n; l++)
             for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[batch->contact[l]].flat[c];
     }
-    bt_contact *rest = rest_of(cell);
+    memset(bt_batch_rests(cell), 0, (size_t)cell->work.n_batches * sizeof(bt_rest));
+    bt_contact *other = bt_batch_others(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        if (!pack->listed[i]) copy_records(rest++, &pack->u[i], 1);
+        if (!pack->listed[i]) copy_records(other++, &pack->u[i], 1);
 }
 
 void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
@@ -257,7 +268,7 @@ void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
     take_unknowns(cell, slop != NULL, &pack);
     const bt_idx n_batches = deal(cell, pack.u, inv, slop != NULL, pack.place);
     const size_t n_rest = (size_t)(cell->n_contacts - cell->work.n_list);
-    bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + n_rest * sizeof(bt_contact));
+    bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + rest_bytes(n_batches) + n_rest * sizeof(bt_contact));
     cell->work.n_batches = n_batches;
     cell->work.batch = (bt_batch *)cell->contacts;
     cell->work.packed = true;
@@ -319,9 +330,9 @@ static bt_idx take_all(const bt_cell *cell, packing *pack)
         of += batch->n;
         for (int l = 0; l < batch->n; l++) pack->listed[batch->contact[l]] = true;
     }
-    const bt_contact *rest = rest_of(cell);
+    const bt_contact *other = bt_batch_others(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        if (!pack->listed[i]) copy_records(&pack->u[i], rest++, 1);
+        if (!pack->listed[i]) copy_records(&pack->u[i], other++, 1);
     return (bt_idx)(of - pack->of);
 }
 
