@@ -35,8 +35,8 @@ typedef struct bt_batch_bounds {
     bt_vec of[2];
 } bt_batch_bounds;
 
-/// How many sweeps a batch rests after its last update; of these to come, and done. Apart from the batches: a sweep goes
-/// over many of these for each batch that it takes.
+/// How many sweeps a batch rests after its last update; of these to come, and done. Apart from the batches, for a sweep
+/// reads more of these than batches.
 typedef struct bt_rest {
     uint8_t in_all, to_come, done;
 } bt_rest;

@@ -12,7 +12,7 @@
 #include "solve/kernel.h"
 #include "solve/rows.h"
 
-// --- of the contact law ------------------------------------------------------------------------------------------------
+// --- of the contact law ----------------------------------------------------------------------------------------------
 
 /// Lanes of a vector for loops over contacts.
 typedef struct {
@@ -279,9 +279,9 @@ bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, co
     return o.found;
 }
 
-// --- of the position projection ----------------------------------------------------------------------------------------
+// --- of the position projection --------------------------------------------------------------------------------------
 
-/// Which contacts the last sweep of the projection has moved, and their multipliers; 0 of contacts that are in no batch.
+/// Which contacts the last sweep of the projection has moved, and their multipliers; 0 of contacts in no batch.
 typedef struct {
     uint8_t few_moved[BT_FEW], *moved; // [n_contacts]
     double few_x[BT_FEW][2], (*x)[2];  // [n_contacts]

@@ -258,7 +258,8 @@ static double sweep(bt_world *world, const bt_problem *problem, const bt_before 
                     bt_work *work)
 {
     bt_totals totals = {.n_sums = BT_SWEEP_N};
-    bt_sweep sweep = {.problem = problem, .moves = !problem->plain, .all = all, .beta = m->beta[0], .lead = {m->beta[0]}};
+    bt_sweep sweep = {.problem = problem, .moves = !problem->plain, .all = all, .beta = m->beta[0],
+                      .lead = {m->beta[0]}};
     for (int k = 1; k <= BT_REST; k++) {
         sweep.lead[k] = m->beta[k] * (1 + sweep.lead[k - 1]);
         sweep.lag[k] = m->beta[k] * (1 + sweep.lag[k - 1]);

@@ -244,7 +244,8 @@ static void free_velocities(bt_world *world, bt_idx k, const void *context, bt_t
 static bool form_velocities(bt_world *world, bool warm)
 {
     bt_totals totals = {0};
-    bt_phases_run(world, BT_WITH_WORK, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, world->bodies.vel, &totals);
+    bt_phases_run(world, BT_WITH_WORK, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, world->bodies.vel,
+                  &totals);
     return totals.most > 0;
 }
 

@@ -123,7 +123,8 @@ void bt_cells_free(bt_cells *cells)
     if (!cells) return;
     for (bt_idx k = 0; k < cells->n; k++) free_cell(&cells->cell[k]);
     void *arrays[] = {cells->at,   cells->speed,   cells->bound, cells->moved, cells->asleep, cells->awake,
-                      cells->busy, cells->is_busy, cells->order, cells->turn,  cells->share, cells->swept, cells->cell,  cells};
+                      cells->busy, cells->is_busy, cells->order, cells->turn,  cells->share,  cells->swept,
+                      cells->cell, cells};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 

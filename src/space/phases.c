@@ -81,8 +81,8 @@ void bt_phases_distribute(bt_world *world)
     }
     cells->n_shares = n;
     for (int s = 0; s < BT_STRETCHES; s++) {
-        const bt_idx middle = cells->start[s / 2] + cells->n_border[s / 2], begin = s % 2 ? middle : cells->start[s / 2],
-                     end = s % 2 ? cells->start[s / 2 + 1] : middle;
+        const bt_idx first = cells->start[s / 2], middle = first + cells->n_border[s / 2],
+                     begin = s % 2 ? middle : first, end = s % 2 ? cells->start[s / 2 + 1] : middle;
         const bt_idx n_listed = listed_first(world, cells->order + begin, end - begin);
         deal_stretch(cells, BT_WITH_WORK, begin, end, &cells->share[s * n]);
         deal_stretch(cells, BT_LISTED, begin, begin + n_listed, &cells->share[(BT_STRETCHES + s) * n]);

@@ -69,8 +69,8 @@ typedef struct bt_before {
 /// Collective. After what comes before it (or NULL), visit the cells of phase 0, then those of phase 1, ...: those of
 /// one phase share no movable body and are done at once by threads and ranks. After each phase, `exchanged` (an array
 /// over the bodies, or NULL) is brought up to date on all ranks, while the other cells are still worked on.
-void bt_phases_run(bt_world *world, bt_which which, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
-                   bt_totals *totals);
+void bt_phases_run(bt_world *world, bt_which which, const bt_before *before, bt_visit *visit, const void *context,
+                   bt_vel *exchanged, bt_totals *totals);
 
 /// Visit the cells with work in any order, all at once.
 void bt_phases_any_order(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals);

@@ -156,7 +156,8 @@ static void swept_order(const bt_cell *cell, bt_idx *contact)
         for (int l = 0; l < cell->work.batch[k].n; l++) *contact++ = cell->work.batch[k].contact[l];
 }
 
-/// The residual pass four at a time against one by one, bit for bit; the sum of squares of a packed cell but for rounding.
+/// The residual pass four at a time against one by one, bit for bit; the sum of squares of a packed cell but for
+/// rounding.
 static void check_residual(knot_of_floes *four, knot_of_floes *one)
 {
     const bt_problem p = {.tolerance = 1e-3};
