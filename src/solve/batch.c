@@ -31,10 +31,20 @@ static size_t batch_bytes(const bt_cell *cell)
     return sizeof(bt_batch) + (cell->laws.limits ? sizeof(bt_batch_bounds) : 0);
 }
 
-/// The records of the contacts that are not listed.
-static bt_contact *rest_of(const bt_cell *cell)
+/// Bytes of what n batches rest: whole records.
+static size_t rest_bytes(bt_idx n)
 {
-    return (bt_contact *)((char *)cell->work.batch + (size_t)cell->work.n_batches * batch_bytes(cell));
+    return ((size_t)n * sizeof(bt_rest) + sizeof(bt_contact) - 1) / sizeof(bt_contact) * sizeof(bt_contact);
+}
+
+bt_rest *bt_batch_rests(const bt_cell *cell)
+{
+    return (bt_rest *)((char *)cell->work.batch + (size_t)cell->work.n_batches * batch_bytes(cell));
+}
+
+bt_contact *bt_batch_others(const bt_cell *cell)
+{
+    return (bt_contact *)((char *)bt_batch_rests(cell) + rest_bytes(cell->work.n_batches));
 }
 
 bool bt_batch_is_for(const bt_cell *cell)
@@ -61,11 +71,16 @@ static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *contact, boo
     return !cell->laws.limits ? BT_BATCH_RIGID : contact->n > 0 ? BT_BATCH_BOUNDED : BT_BATCH_SHEETS;
 }
 
-/// The contacts of a batch, and those of their bodies that can be moved.
+typedef bt_idx held_bodies __attribute__((vector_size(2 * BT_LANES * sizeof(bt_idx))));
+
+/// The contacts of a batch, and those of their bodies that can be moved; NOBODY in places that are free.
 typedef struct {
-    bt_idx contact[BT_LANES], body[2 * BT_LANES];
-    uint8_t n, n_bodies, kind;
+    held_bodies body;
+    bt_idx contact[BT_LANES];
+    uint8_t n, kind;
 } place;
+
+enum { NOBODY = -1, FIXED = -2 };
 
 /// What a thread needs to pack a cell, or to unpack it: on its stack unless there are many contacts. The records
 /// have to stand aside: they and the batches are in the same memory.
@@ -80,7 +95,7 @@ static void begin_packing(packing *pack, const bt_cell *cell)
 {
     const size_t n = (size_t)cell->n_contacts, n_list = (size_t)cell->work.n_list;
     const bool few = n <= BT_FEW;
-    pack->place = n_list > BT_FEW ? bt_realloc(NULL, n_list, sizeof *pack->place) : pack->few_places;
+    pack->place = n_list > BT_FEW ? bt_alloc_aligned(n_list, sizeof *pack->place) : pack->few_places;
     pack->of = few ? pack->few_unknowns : bt_realloc(NULL, n, sizeof *pack->of);
     pack->u = few ? pack->few_records : bt_realloc(NULL, n, sizeof *pack->u);
     pack->listed = few ? pack->few_listed : bt_realloc(NULL, n, sizeof *pack->listed);
@@ -95,21 +110,18 @@ static void end_packing(packing *pack)
     if (pack->listed != pack->few_listed) free(pack->listed);
 }
 
-static bool holds(const place *slot, bt_idx body)
+/// May a contact between bodies a and b, or FIXED, stand in a batch?
+BT_INLINE bool fits(const place *slot, bt_batch_kind kind, bt_idx a, bt_idx b)
 {
-    for (int l = 0; l < slot->n_bodies; l++)
-        if (slot->body[l] == body) return true;
-    return false;
-}
-
-/// May a contact stand in a batch?
-static bool fits(const place *slot, bt_batch_kind kind, const bt_idx body[2], int n)
-{
-    return slot->kind == kind && !(n > 0 && holds(slot, body[0])) && !(n > 1 && holds(slot, body[1]));
+    const held_bodies held = (slot->body == a) | (slot->body == b);
+    uint64_t any[sizeof held / sizeof(uint64_t)];
+    memcpy(any, &held, sizeof held);
+    return slot->kind == kind && (any[0] | any[1] | any[2] | any[3]) == 0;
 }
 
 /// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
 /// bodies that can be moved. Those that filled up leave the window. Returns the number of batches.
+BT_FOR_EACH_CPU
 static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv *inv, bool projection, place *o)
 {
     bt_idx open[OPEN], n_batches = 0;
@@ -118,19 +130,17 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
         const bt_idx i = cell->work.list[j];
         const bt_contact *contact = &contacts[i];
         const bt_batch_kind kind = kind_of(cell, contact, projection);
-        bt_idx body[2];
-        int n = 0, k = 0;
-        if (inv[contact->a].m > 0) body[n++] = contact->a;
-        if (inv[contact->b].m > 0) body[n++] = contact->b;
-        while (k < n_open && !fits(&o[open[k]], kind, body, n)) k++;
+        const bt_idx a = inv[contact->a].m > 0 ? contact->a : FIXED, b = inv[contact->b].m > 0 ? contact->b : FIXED;
+        int k = 0;
+        while (k < n_open && !fits(&o[open[k]], kind, a, b)) k++;
         if (k == n_open) {
             if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
-            o[n_batches] = (place){.kind = (uint8_t)kind};
+            o[n_batches] = (place){.kind = (uint8_t)kind, .body = (held_bodies){0} + NOBODY};
             open[n_open++] = n_batches++;
         }
         place *p = &o[open[k]];
+        p->body[2 * p->n] = a == FIXED ? NOBODY : a, p->body[2 * p->n + 1] = b == FIXED ? NOBODY : b;
         p->contact[p->n++] = i;
-        for (int l = 0; l < n; l++) p->body[p->n_bodies++] = body[l];
         if (p->n < BT_LANES) continue;
         n_open--;
         memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
@@ -244,9 +254,10 @@ static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv, const
         for (int l = 0; l < batch->n; l++)
             for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[batch->contact[l]].flat[c];
     }
-    bt_contact *rest = rest_of(cell);
+    memset(bt_batch_rests(cell), 0, (size_t)cell->work.n_batches * sizeof(bt_rest));
+    bt_contact *other = bt_batch_others(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        if (!pack->listed[i]) copy_records(rest++, &pack->u[i], 1);
+        if (!pack->listed[i]) copy_records(other++, &pack->u[i], 1);
 }
 
 void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
@@ -256,8 +267,9 @@ void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
     put_aside(cell, pack.u);
     take_unknowns(cell, slop != NULL, &pack);
     const bt_idx n_batches = deal(cell, pack.u, inv, slop != NULL, pack.place);
-    const size_t n_rest = (size_t)(cell->n_contacts - cell->work.n_list);
-    bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + n_rest * sizeof(bt_contact));
+    const size_t n_others = (size_t)(cell->n_contacts - cell->work.n_list);
+    bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + rest_bytes(n_batches) +
+                                 n_others * sizeof(bt_contact));
     cell->work.n_batches = n_batches;
     cell->work.batch = (bt_batch *)cell->contacts;
     cell->work.packed = true;
@@ -319,9 +331,9 @@ static bt_idx take_all(const bt_cell *cell, packing *pack)
         of += batch->n;
         for (int l = 0; l < batch->n; l++) pack->listed[batch->contact[l]] = true;
     }
-    const bt_contact *rest = rest_of(cell);
+    const bt_contact *other = bt_batch_others(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
-        if (!pack->listed[i]) copy_records(&pack->u[i], rest++, 1);
+        if (!pack->listed[i]) copy_records(&pack->u[i], other++, 1);
     return (bt_idx)(of - pack->of);
 }
 

@@ -18,7 +18,8 @@
 //
 // Packing happens before the first sweep over a new list. Batches take the place of the records, in the memory of the
 // contacts, for both together would be a third of all memory of dense ice; the records of what is not listed stand
-// after them. The records are put back before anybody else looks at the contacts. What an unknown was before the last
+// after them. Residual passes look at the contacts in either form, and take apart the batches of a cell whose list has
+// changed. The records are put back before anybody else looks at the contacts. What an unknown was before the last
 // sweep, and the multipliers of the projection, then stand after the records until the next list is packed: a contact
 // that was in no batch was not moved, for otherwise it would have been listed.
 #ifndef BERGTOW_BATCH_H
@@ -38,21 +39,22 @@ size_t bt_batch_bytes(const bt_cell *cell);
 /// The cell has a new problem, and no batches yet.
 void bt_batch_begin(bt_cell *cell);
 
-/// What a residual pass finds in the cell, whose impulses are in its contacts; it lists them. Or in the position
-/// projection, d: displacements, slop: overlap that is left alone, m.
+/// Apply all impulses of a packed cell to its bodies; contacts that are in no batch have none.
+void bt_batch_apply(const bt_cell *cell, bt_vel *v);
+
+/// What a residual pass finds in the cell; it lists the contacts to be swept. Or in the position projection of a cell
+/// that is not packed, with room for the list, d: displacements, slop: overlap that is left alone, m.
 bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem);
 bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
                                       const bt_problem *problem);
 
-/// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
-/// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
-/// first pass in *most. Returns how far it turned against its move, J.
-double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, double enough,
-                      int64_t *done, double *most);
+/// One visit of a sweep to the cell: its move, and at most `times` passes, each over what the one before has not left
+/// calm.
+void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals);
 
 /// The same for the position projection, in one pass.
-double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep, int64_t *done,
-                        double *most);
+void bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep,
+                      bt_totals *totals);
 
 /// The contacts again, with their impulses; nothing when they are there.
 void bt_batch_unpack(bt_cell *cell);

@@ -35,6 +35,12 @@ typedef struct bt_batch_bounds {
     bt_vec of[2];
 } bt_batch_bounds;
 
+/// How many sweeps a batch rests after its last update; of these to come, and done. Apart from the batches, for a sweep
+/// reads more of these than batches.
+typedef struct bt_rest {
+    uint8_t in_all, to_come, done;
+} bt_rest;
+
 /// Of one contact: unknowns before the last sweep, and the multipliers of the projection.
 typedef struct bt_unknowns {
     double before[3], multiplier[2];
@@ -44,5 +50,9 @@ typedef struct bt_unknowns {
 /// The listed contacts of a cell into batches of sweeps, slop: NULL; or of the position projection, *slop: overlap that
 /// is left alone, m.
 void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop);
+
+/// After the batches of a packed cell: [n_batches] what they rest, and the records of the contacts in none, ascending.
+bt_rest *bt_batch_rests(const bt_cell *cell);
+bt_contact *bt_batch_others(const bt_cell *cell);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Residual passes four contacts at a time: the same numbers and the same list as contact by contact (solver.c,
-// project.c), and which contacts the last sweep has moved.
+// project.c). Contacts are looked at where they are, in batches or not; they leave their batches only when the list has
+// changed, which it has in a tenth of the cells.
 #include "solve/batch.h"
 
 #include <math.h>
@@ -11,39 +12,7 @@
 #include "solve/kernel.h"
 #include "solve/rows.h"
 
-/// Which contacts the last sweep has moved, and their multipliers unless NULL; 0 of contacts that are in no batch.
-typedef struct {
-    uint8_t few_moved[BT_FEW], *moved;          // [n_contacts]
-    double few_x[BT_FEW][2], (*x)[2];           // [n_contacts]
-} last_sweep;
-
-static void take_last(const bt_cell *cell, bool projection, last_sweep *last)
-{
-    const size_t n = (size_t)cell->n_contacts;
-    const bool few = n <= BT_FEW;
-    last->moved = few ? last->few_moved : bt_realloc(NULL, n, sizeof *last->moved);
-    last->x = !projection ? NULL : few ? last->few_x : bt_realloc(NULL, n, sizeof *last->x);
-    if (n > 0) memset(last->moved, 0, n * sizeof *last->moved);
-    if (n > 0 && projection) memset(last->x, 0, n * sizeof *last->x);
-    for (bt_idx k = 0; k < cell->work.n_last; k++) {
-        const bt_unknowns *unknowns = &cell->work.last[k];
-        const bt_idx i = unknowns->contact;
-        const bt_contact *contact = &cell->contacts[i];
-        const double *b = unknowns->before;
-        if (projection) {
-            last->moved[i] = unknowns->multiplier[0] != b[0] || unknowns->multiplier[1] != b[1];
-            last->x[i][0] = unknowns->multiplier[0], last->x[i][1] = unknowns->multiplier[1];
-        } else {
-            last->moved[i] = contact->ln[0] != b[0] || contact->ln[1] != b[1] || contact->lt != b[2];
-        }
-    }
-}
-
-static void free_last(last_sweep *last)
-{
-    if (last->moved != last->few_moved) free(last->moved);
-    if (last->x && last->x != last->few_x) free(last->x);
-}
+// --- of the contact law ----------------------------------------------------------------------------------------------
 
 /// Lanes of a vector for loops over contacts.
 typedef struct {
@@ -57,144 +26,292 @@ static inline lanes lanes_of(bt_vec a)
     return o;
 }
 
-/// Contacts i to i + 3 with their masses, and what their bodies move by (velocities, or displacements).
+/// Four contacts with their masses, and what their bodies move by (velocities, or displacements).
 typedef struct {
-    const bt_contact *u[BT_LANES];
     bt_four_rows r;
     bt_masses m;
     bt_motions a, b;
 } four;
 
-/// The last contact of the cell again where there are no more.
-BT_INLINE four four_from(const bt_cell *cell, bt_idx i, const bt_vel *v, const bt_inv *inv)
+BT_INLINE four four_from(const bt_contact *const contact[BT_LANES], const bt_vel *v, const bt_inv *inv)
 {
     four o;
     bt_idx a[BT_LANES], b[BT_LANES];
-    for (int l = 0; l < BT_LANES; l++) {
-        o.u[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
-        a[l] = o.u[l]->a, b[l] = o.u[l]->b;
-    }
-    o.r = bt_rows_of(o.u);
+    for (int l = 0; l < BT_LANES; l++) a[l] = contact[l]->a, b[l] = contact[l]->b;
+    o.r = bt_rows_of(contact);
     o.m = bt_masses_of(&o.r, bt_take_inv(inv, a), bt_take_inv(inv, b));
     o.a = bt_take_four(v, a), o.b = bt_take_four(v, b);
     return o;
 }
 
-/// Lanes of contacts i to i + 3 that there are.
-BT_INLINE bt_mask there_are(const bt_cell *cell, bt_idx i)
+BT_INLINE four four_of(const bt_batch *batch, const bt_vel *v)
 {
-    const int64_t left = cell->n_contacts - i;
-    return (bt_mask){0, 1, 2, 3} < (bt_mask){left, left, left, left};
+    const bt_mask n = {batch->points[0], batch->points[1], batch->points[2], batch->points[3]}, none = {0};
+    return (four){.r = {.nx = batch->nx, .ny = batch->ny, .rat = batch->rat, .rbt = batch->rbt,
+                        .ran = {batch->ran[0], batch->ran[1]}, .rbn = {batch->rbn[0], batch->rbn[1]},
+                        .bias = {batch->bias[0], batch->bias[1]}, .mu = batch->mu,
+                        .ln = {batch->x[0], batch->x[1]}, .lt = batch->x[2], .one = n > none, .two = n > none + 1},
+                  .m = {.w = {batch->w[0], batch->w[1]}, .mn = {batch->mn[0], batch->mn[1]}, .wt = batch->wt,
+                        .mt = batch->mt},
+                  .a = bt_take_four(v, batch->a), .b = bt_take_four(v, batch->b)};
 }
+
+/// The first n lanes.
+BT_INLINE bt_mask first_lanes(int64_t n) { return (bt_mask){0, 1, 2, 3} < (bt_mask){n, n, n, n}; }
 
 BT_INLINE int64_t sum_of(bt_mask a) { return a[0] + a[1] + a[2] + a[3]; }
 
+/// A residual pass over a cell.
+typedef struct {
+    const bt_problem *problem;
+    const bt_vel *v;
+    const bt_inv *inv;
+    bt_found found;
+    bt_vec most;
+    bt_mask rows, bad;
+} look;
+
+/// Of `most` and `flat` the lower one: nothing rises here.
 BT_INLINE bt_vec limits_of(const bt_limit *const limit[BT_LANES], int c)
 {
-    // of `most` and `flat` the lower one: nothing rises here
     bt_vec most = {limit[0]->most[c], limit[1]->most[c], limit[2]->most[c], limit[3]->most[c]};
     return bt_smaller(most, (bt_vec){limit[0]->flat[c], limit[1]->flat[c], limit[2]->flat[c], limit[3]->flat[c]});
 }
 
-/// As bt_contact_residual and the list of residual_in_place (solver.c).
-BT_INLINE bt_found residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem,
-                            const uint8_t *moved, bool bounded)
+/// What a look at four contacts gives, lane by lane: squares of their rows, and which of them bear load or close.
+typedef struct {
+    lanes square[3];
+    bt_mask on;
+} seen;
+
+/// As bt_contact_residual, of the first n lanes but for sheets; limit: their bounds, or NULL.
+BT_INLINE seen look_at(look *o, const four *f, const bt_limit *const *limit, int n)
 {
-    const double near = BT_NEAR * problem->tolerance;
     const bt_vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY};
-    const bt_limit *limits = cell->laws.limits;
-    bt_found found = {0};
-    bt_vec most = zero;
-    bt_mask rows = {0}, bad = {0};
-    for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
-        const four o = four_from(cell, i, v, inv);
-        const bt_contact *const *contact = o.u;
-        const bt_four_rows r = o.r;
-        const bt_masses m = o.m;
-        const bt_motions a = o.a, b = o.b;
-        const bt_limit *limit[BT_LANES];
-        for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &limits[contact[l] - cell->contacts];
-        const bt_vec dx = b.x - a.x, dy = b.y - a.y, un = r.nx * dx + r.ny * dy;
-        bt_vec worst = zero, square[3], total = zero;
-        bt_mask on = (r.ln[0] + r.ln[1] > zero) | (r.lt != zero);
-        for (int c = 0; c < 2; c++) {
-            const bt_mask there = c ? r.two : r.one;
-            const bt_vec w = un + r.rbn[c] * b.w - r.ran[c] * a.w + r.bias[c];
-            bt_vec map;
-            if (bounded) {
-                const bt_vec to = w - m.w[c] * r.ln[c];
-                map = bt_larger(zero, bt_smaller(-to * m.mn[c], limits_of(limit, c)));
-            } else {
-                map = bt_larger(zero, r.ln[c] - w * m.mn[c]);
-            }
-            const bt_vec more = map - r.ln[c];
-            bt_vec e = bt_only(there, bt_size_of(more * m.w[c]));
-            if (bounded) { // bt_short_residual
-                const bt_vec lacks = bt_smaller(-w, (more / map) * (problem->tolerance / BT_SHORT));
-                e = bt_larger(e, bt_only(there & (more > zero), lacks));
-            }
-            worst = bt_larger(worst, e);
-            square[c] = e * e;
-            total += bt_only(there, r.ln[c]);
-            on |= there & ~(w >= zero);
+    const double tolerance = o->problem->tolerance;
+    const bt_four_rows *r = &f->r;
+    const bt_masses *m = &f->m;
+    const bt_vec dx = f->b.x - f->a.x, dy = f->b.y - f->a.y, un = r->nx * dx + r->ny * dy;
+    bt_vec worst = zero, total = zero;
+    seen s = {.on = (r->ln[0] + r->ln[1] > zero) | (r->lt != zero)};
+    for (int c = 0; c < 2; c++) {
+        const bt_mask there = c ? r->two : r->one;
+        const bt_vec w = un + r->rbn[c] * f->b.w - r->ran[c] * f->a.w + r->bias[c];
+        bt_vec map;
+        if (limit) map = bt_larger(zero, bt_smaller(-(w - m->w[c] * r->ln[c]) * m->mn[c], limits_of(limit, c)));
+        else map = bt_larger(zero, r->ln[c] - w * m->mn[c]);
+        const bt_vec more = map - r->ln[c];
+        bt_vec e = bt_only(there, bt_size_of(more * m->w[c]));
+        if (limit) { // bt_short_residual
+            const bt_vec lacks = bt_smaller(-w, (more / map) * (tolerance / BT_SHORT));
+            e = bt_larger(e, bt_only(there & (more > zero), lacks));
         }
-        const bt_vec wt = r.nx * dy - r.ny * dx + r.rbt * b.w - r.rat * a.w, bound = r.mu * total;
-        const bt_vec e = (bt_larger(-bound, bt_smaller(bound, r.lt - wt * m.mt)) - r.lt) * m.wt;
-        square[2] = e * e;
-        worst = bt_choose(bt_size_of(wt) < endless, bt_larger(worst, bt_size_of(e)), endless);
-        const bt_mask counts = there_are(cell, i) & (bounded ? r.one : ~(bt_mask){0}); // sheets one by one
-        most = bt_larger(most, bt_only(counts, worst));
-        bad -= counts & (worst > near);
-        rows += counts & (1 - r.one - r.two);
-        const lanes normal = lanes_of(square[0]), second = lanes_of(square[1]), tangent = lanes_of(square[2]);
-        for (int l = 0; l < BT_LANES && i + l < cell->n_contacts; l++) {
-            bool listed = problem->plain || on[l] || moved[i + l];
-            if (bounded && contact[l]->n == 0) {
-                const bt_mass own = bt_mass_of(contact[l], inv);
-                const double largest = bt_sheets_residual(contact[l], &own, limit[l], v, problem->tolerance,
-                                                          &found.squares);
-                listed = problem->plain || contact[l]->ln[0] + contact[l]->ln[1] > 0 || contact[l]->lt != 0 ||
-                         moved[i + l] || largest > 0;
-                found.most = bt_max(found.most, largest);
-                found.bad += largest > near;
-                found.rows += 2;
-            } else {
-                found.squares += normal.of[l];
-                found.squares += second.of[l];
-                found.squares += tangent.of[l];
-            }
-            cell->work.list[cell->work.n_list] = i + l;
-            cell->work.n_list += listed;
-        }
+        worst = bt_larger(worst, e);
+        s.square[c] = lanes_of(e * e);
+        total += bt_only(there, r->ln[c]);
+        s.on |= there & ~(w >= zero);
     }
-    found.most = bt_max(found.most, bt_largest_lane(most));
-    found.bad += sum_of(bad);
-    found.rows += sum_of(rows);
-    return found;
+    const bt_vec wt = r->nx * dy - r->ny * dx + r->rbt * f->b.w - r->rat * f->a.w, bound = r->mu * total;
+    const bt_vec e = (bt_larger(-bound, bt_smaller(bound, r->lt - wt * m->mt)) - r->lt) * m->wt;
+    s.square[2] = lanes_of(e * e);
+    worst = bt_choose(bt_size_of(wt) < endless, bt_larger(worst, bt_size_of(e)), endless);
+    const bt_mask counts = first_lanes(n) & (limit ? r->one : ~(bt_mask){0});
+    o->most = bt_larger(o->most, bt_only(counts, worst));
+    o->bad -= counts & (worst > BT_NEAR * tolerance);
+    o->rows += counts & (1 - r->one - r->two);
+    return s;
+}
+
+static bool lane_is_on(look *o, const seen *s, int l)
+{
+    for (int c = 0; c < 3; c++) o->found.squares += s->square[c].of[l];
+    return s->on[l];
+}
+
+/// The same of sheets, one by one.
+static bool sheets_are_on(look *o, const bt_contact *contact, const bt_mass *m, const bt_limit *limit)
+{
+    const double r = bt_sheets_residual(contact, m, limit, o->v, o->problem->tolerance, &o->found.squares);
+    o->found.most = bt_max(o->found.most, r);
+    o->found.bad += r > BT_NEAR * o->problem->tolerance;
+    o->found.rows += 2;
+    return contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || r > 0;
+}
+
+/// UNSEEN: in no batch. LEAVES: in a batch, and to be swept no more. LISTED: to be swept.
+enum { UNSEEN, LEAVES, LISTED };
+
+/// Contacts index[n] of the cell.
+BT_INLINE void look_at_records(look *o, const bt_cell *cell, bool bounded, const bt_contact *const contact[BT_LANES],
+                               const bt_idx index[BT_LANES], int n, uint8_t *mark)
+{
+    const bt_limit *limit[BT_LANES];
+    for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws.limits[index[l]];
+    const four f = four_from(contact, o->v, o->inv);
+    const seen s = bounded ? look_at(o, &f, limit, n) : look_at(o, &f, NULL, n);
+    for (int l = 0; l < n; l++) {
+        bool on;
+        if (bounded && contact[l]->n == 0) {
+            const bt_mass m = bt_mass_of(contact[l], o->inv);
+            on = sheets_are_on(o, contact[l], &m, limit[l]);
+        } else {
+            on = lane_is_on(o, &s, l);
+        }
+        if (on || o->problem->plain) mark[index[l]] = LISTED;
+    }
+}
+
+/// The sheets in lane l of a batch, with all that their residual needs.
+static bt_contact sheets_of(const bt_batch *batch, int l)
+{
+    return (bt_contact){.nx = batch->nx[l], .ny = batch->ny[l], .rat = batch->rat[l], .rbt = batch->rbt[l],
+                        .ran = {batch->ran[0][l]}, .rbn = {batch->rbn[0][l]}, .ln = {batch->x[0][l]},
+                        .lt = batch->x[2][l], .a = batch->a[l], .b = batch->b[l]};
+}
+
+/// Has the last sweep moved the contact in lane l?
+static bool was_moved(const bt_batch *batch, int l)
+{
+    return batch->x[0][l] != batch->before[0][l] || batch->x[1][l] != batch->before[1][l] ||
+           batch->x[2][l] != batch->before[2][l];
+}
+
+BT_INLINE void look_at_batch(look *o, const bt_cell *cell, bool bounded, const bt_batch *batch, uint8_t *mark)
+{
+    const bt_limit *limit[BT_LANES];
+    const bool sheets = bounded && batch->kind == BT_BATCH_SHEETS;
+    for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws.limits[batch->contact[l]];
+    seen s;
+    if (!sheets) {
+        const four f = four_of(batch, o->v);
+        s = bounded ? look_at(o, &f, limit, batch->n) : look_at(o, &f, NULL, batch->n);
+    }
+    for (int l = 0; l < batch->n; l++) {
+        bool on;
+        if (sheets) {
+            const bt_contact contact = sheets_of(batch, l);
+            const bt_mass m = {.w = {batch->w[0][l]}, .mn = {batch->mn[0][l]}, .wt = batch->wt[l], .mt = batch->mt[l]};
+            on = sheets_are_on(o, &contact, &m, limit[l]);
+        } else {
+            on = lane_is_on(o, &s, l);
+        }
+        mark[batch->contact[l]] = on || was_moved(batch, l) || o->problem->plain ? LISTED : LEAVES;
+    }
+}
+
+/// Marks what the last sweep has moved.
+static void mark_moved(const bt_cell *cell, uint8_t *mark)
+{
+    for (bt_idx k = 0; k < cell->work.n_last; k++) {
+        const bt_unknowns *last = &cell->work.last[k];
+        const bt_contact *contact = &cell->contacts[last->contact];
+        if (contact->ln[0] != last->before[0] || contact->ln[1] != last->before[1] || contact->lt != last->before[2])
+            mark[last->contact] = LISTED;
+    }
+}
+
+/// Four at a time the contacts that are in no batch.
+BT_INLINE void look_at_rest(look *o, const bt_cell *cell, bool bounded, const bt_contact *records, uint8_t *mark)
+{
+    const bt_contact *contact[BT_LANES];
+    bt_idx index[BT_LANES];
+    int n = 0;
+    for (bt_idx i = 0; i <= cell->n_contacts; i++) {
+        const bool ends = i == cell->n_contacts;
+        if (!ends && cell->work.packed && mark[i] != UNSEEN) continue;
+        if (!ends) contact[n] = records++, index[n++] = i;
+        if (n == 0 || !(ends || n == BT_LANES)) continue;
+        for (int l = n; l < BT_LANES; l++) contact[l] = contact[n - 1], index[l] = index[n - 1];
+        look_at_records(o, cell, bounded, contact, index, n, mark);
+        n = 0;
+    }
+}
+
+BT_INLINE void look_at_all(look *o, const bt_cell *cell, bool bounded, uint8_t *mark)
+{
+    const bool packed = cell->work.packed;
+    for (bt_idx k = 0; packed && k < cell->work.n_batches; k++)
+        look_at_batch(o, cell, bounded, &cell->work.batch[k], mark);
+    look_at_rest(o, cell, bounded, packed ? bt_batch_others(cell) : cell->contacts, mark);
+    o->found.most = bt_max(o->found.most, bt_largest_lane(o->most));
+    o->found.bad += sum_of(o->bad);
+    o->found.rows += sum_of(o->rows);
 }
 
 BT_FOR_EACH_CPU
-static bt_found residual_of_rigid(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem,
-                                  const uint8_t *moved)
-{
-    return residual(cell, v, inv, problem, moved, false);
-}
+static void look_at_rigid(look *o, const bt_cell *cell, uint8_t *mark) { look_at_all(o, cell, false, mark); }
 
 BT_FOR_EACH_CPU
-static bt_found residual_of_bounded(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem,
-                                    const uint8_t *moved)
+static void look_at_bounded(look *o, const bt_cell *cell, uint8_t *mark) { look_at_all(o, cell, true, mark); }
+
+/// The list of the marks; batches of the same contacts stay as they are.
+static void list_marked(bt_cell *cell, const uint8_t *mark)
 {
-    return residual(cell, v, inv, problem, moved, true);
+    bt_idx listed = 0, in_batches = 0;
+    bool same = cell->work.packed;
+    for (bt_idx k = 0; same && k < cell->work.n_batches; k++) in_batches += cell->work.batch[k].n;
+    for (bt_idx i = 0; i < cell->n_contacts; i++) {
+        listed += mark[i] == LISTED;
+        same = same && mark[i] != LEAVES;
+    }
+    if (same && listed == in_batches) {
+        cell->work.n_list = listed;
+        return;
+    }
+    bt_batch_unpack(cell);
+    bt_rounds_list(cell);
+    for (bt_idx i = 0; i < cell->n_contacts; i++) {
+        cell->work.list[cell->work.n_list] = i;
+        cell->work.n_list += mark[i] == LISTED;
+    }
 }
 
 bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem)
 {
-    last_sweep last;
-    take_last(cell, false, &last);
-    const bt_found found = cell->laws.limits ? residual_of_bounded(cell, v, inv, problem, last.moved)
-                                             : residual_of_rigid(cell, v, inv, problem, last.moved);
-    free_last(&last);
-    return found;
+    const size_t n = (size_t)cell->n_contacts;
+    uint8_t few[BT_FEW], *mark = n <= BT_FEW ? few : bt_realloc(NULL, n, sizeof *mark);
+    if (n > 0) memset(mark, UNSEEN, n);
+    if (!cell->work.packed) mark_moved(cell, mark);
+    look o = {.problem = problem, .v = v, .inv = inv};
+    (cell->laws.limits ? look_at_bounded : look_at_rigid)(&o, cell, mark);
+    list_marked(cell, mark);
+    if (mark != few) free(mark);
+    return o.found;
+}
+
+// --- of the position projection --------------------------------------------------------------------------------------
+
+/// Which contacts the last sweep of the projection has moved, and their multipliers; 0 of contacts in no batch.
+typedef struct {
+    uint8_t few_moved[BT_FEW], *moved; // [n_contacts]
+    double few_x[BT_FEW][2], (*x)[2];  // [n_contacts]
+} last_sweep;
+
+static void take_last(const bt_cell *cell, last_sweep *last)
+{
+    const size_t n = (size_t)cell->n_contacts;
+    const bool few = n <= BT_FEW;
+    last->moved = few ? last->few_moved : bt_realloc(NULL, n, sizeof *last->moved);
+    last->x = few ? last->few_x : bt_realloc(NULL, n, sizeof *last->x);
+    if (n > 0) memset(last->moved, 0, n * sizeof *last->moved), memset(last->x, 0, n * sizeof *last->x);
+    for (bt_idx k = 0; k < cell->work.n_last; k++) {
+        const bt_unknowns *o = &cell->work.last[k];
+        last->moved[o->contact] = o->multiplier[0] != o->before[0] || o->multiplier[1] != o->before[1];
+        memcpy(last->x[o->contact], o->multiplier, sizeof o->multiplier);
+    }
+}
+
+static void free_last(last_sweep *last)
+{
+    if (last->moved != last->few_moved) free(last->moved);
+    if (last->x != last->few_x) free(last->x);
+}
+
+/// The last contact of the cell again where there are no more.
+BT_INLINE void contacts_from(const bt_cell *cell, bt_idx i, const bt_contact *contact[BT_LANES])
+{
+    for (int l = 0; l < BT_LANES; l++)
+        contact[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
 }
 
 /// As residual_in_place of project.c.
@@ -208,8 +325,9 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
     bt_vec most = zero;
     bt_mask rows = {0}, bad = {0};
     for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
-        const four o = four_from(cell, i, d, inv);
-        const bt_contact *const *contact = o.u;
+        const bt_contact *contact[BT_LANES];
+        contacts_from(cell, i, contact);
+        const four o = four_from(contact, d, inv);
         const bt_four_rows r = o.r;
         const bt_masses m = o.m;
         const bt_motions a = o.a, b = o.b;
@@ -229,7 +347,7 @@ static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel 
             square[c] = e * e;
             on |= there & ((x > zero) | ~(open >= zero));
         }
-        const bt_mask counts = there_are(cell, i);
+        const bt_mask counts = first_lanes(cell->n_contacts - i);
         most = bt_larger(most, bt_only(counts, worst));
         bad -= counts & (worst > near);
         rows += counts & (-r.one - r.two);
@@ -251,7 +369,7 @@ bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *
                                       const bt_problem *problem)
 {
     last_sweep last;
-    take_last(cell, true, &last);
+    take_last(cell, &last);
     const bt_found found = residual_of_projection(cell, slop, d, inv, problem, &last);
     free_last(&last);
     return found;

@@ -154,6 +154,30 @@ BT_INLINE vec update(bt_batch *batch, const vec *limits, bt_vel *v)
     return bt_larger(bt_larger(bt_size_of(u1), bt_size_of(u2)), bt_size_of(dt) * batch->wt);
 }
 
+/// As bt_apply with all of the impulses.
+BT_INLINE void apply(const bt_batch *batch, bt_vel *v)
+{
+    motion a = bt_take_four(v, batch->a), b = bt_take_four(v, batch->b);
+    const vec jn = batch->x[0] + batch->x[1], t = batch->x[2], jx = jn * batch->nx - t * batch->ny,
+              jy = jn * batch->ny + t * batch->nx;
+    a.x -= batch->ma * jx;
+    a.y -= batch->ma * jy;
+    a.w -= batch->ia * (batch->x[0] * batch->ran[0] + batch->x[1] * batch->ran[1] + t * batch->rat);
+    b.x += batch->mb * jx;
+    b.y += batch->mb * jy;
+    b.w += batch->ib * (batch->x[0] * batch->rbn[0] + batch->x[1] * batch->rbn[1] + t * batch->rbt);
+    store(v, batch->a, batch->moves_a, a);
+    store(v, batch->b, batch->moves_b, b);
+}
+
+BT_FOR_EACH_CPU
+static void apply_all(const bt_batch *batches, bt_idx n, bt_vel *v)
+{
+    for (bt_idx k = 0; k < n; k++) apply(&batches[k], v);
+}
+
+void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work.batch, cell->work.n_batches, v); }
+
 /// As the update of one contact in project.c: its points one after the other.
 BT_INLINE vec project(bt_batch *batch, bt_vel *d)
 {
@@ -179,111 +203,146 @@ BT_INLINE vec project(bt_batch *batch, bt_vel *d)
     return most;
 }
 
-BT_FOR_EACH_CPU
-static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
-{
-    vec most = {0};
-    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, update(&batch[k], NULL, v));
-    return bt_largest_lane(most);
-}
-
-BT_FOR_EACH_CPU
-static double pass_projection(bt_batch *batch, bt_idx n, bt_vel *d)
-{
-    vec most = {0};
-    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, project(&batch[k], d));
-    return bt_largest_lane(most);
-}
-
-/// The same where contacts have bounds; apart, or rigid ice would pay for the registers that this takes.
-BT_FOR_EACH_CPU
-static double pass_bounded(bt_batch *batch, bt_idx n, bt_vel *v)
-{
-    vec most = {0};
-    for (bt_idx k = 0; k < n; k++) {
-        bt_batch *o = &batch[k];
-        const vec *limits = ((const bt_batch_bounds *)(batch + n))[k].of;
-        most = bt_larger(most, o->kind == BT_BATCH_SHEETS ? update_sheets(o, limits[0], v) : update(o, limits, v));
-    }
-    return bt_largest_lane(most);
-}
-
 /// Unknowns of a batch after their move: of one visit to a cell.
 typedef struct {
     vec x[3];
 } moved;
 
-BT_INLINE void move_unknowns(bt_batch *batch, bt_idx n, int unknowns, double beta, moved *y)
+/// What a visit to a cell does, and has done.
+typedef struct {
+    const bt_sweep *sweep;
+    int times;            // passes at most
+    double calm;          // an update after which a batch rests, m/s, or m of the projection
+    moved *y;             // [n_batches]
+    bt_rest *rests;       // [n_batches]
+    bt_idx *due, *again;  // [n_batches] of the first pass; of the next
+    int64_t moved, done;  // contacts that were moved; updates
+    double most, against; // largest update of the first pass; J
+} visit;
+
+/// After the moves that it has missed while it rested.
+BT_INLINE void move(bt_batch *batch, int unknowns, double lead, double lag, moved *y)
 {
-    for (bt_idx k = 0; k < n; k++) {
-        bt_batch *o = &batch[k];
-        for (int c = 0; c < unknowns; c++) {
-            const vec now = o->x[c];
-            if (beta > 0) o->x[c] = now + beta * (now - o->before[c]);
-            o->before[c] = now;
-            y[k].x[c] = o->x[c];
-        }
+    for (int c = 0; c < unknowns; c++) {
+        const vec now = batch->x[c], change = now - batch->before[c];
+        batch->x[c] = now + lead * change;
+        batch->before[c] = now + lag * change;
+        y->x[c] = batch->x[c];
     }
 }
 
-BT_INLINE double sum_against(const bt_batch *batch, bt_idx n, int unknowns, const moved *y)
+/// How far it turned against its move, as bt_rounds_against.
+BT_INLINE vec turned(const bt_batch *batch, int unknowns, const moved *y)
 {
     vec sum = {0};
+    for (int c = 0; c < unknowns; c++)
+        sum += (c < 2 ? batch->w[c] : batch->wt) * (y->x[c] - batch->x[c]) * (batch->x[c] - batch->before[c]);
+    return sum;
+}
+
+/// The batches that do not rest; the others have one sweep less to rest. Returns how many.
+BT_INLINE bt_idx find_due(bt_rest *rests, bt_idx n, bool all, bt_idx *due)
+{
+    bt_idx n_due = 0;
     for (bt_idx k = 0; k < n; k++) {
-        const bt_batch *o = &batch[k];
-        for (int c = 0; c < unknowns; c++)
-            sum += (c < 2 ? o->w[c] : o->wt) * (y[k].x[c] - o->x[c]) * (o->x[c] - o->before[c]);
+        const bool rests_on = rests[k].to_come > 0 && !all;
+        due[n_due] = k;
+        n_due += !rests_on;
+        rests[k].to_come -= rests_on, rests[k].done += rests_on;
     }
-    return sum[0] + sum[1] + sum[2] + sum[3];
+    return n_due;
 }
 
-BT_FOR_EACH_CPU
-static void move(bt_batch *batch, bt_idx n, double beta, moved *y) { move_unknowns(batch, n, 3, beta, y); }
-
-BT_FOR_EACH_CPU
-static double against(const bt_batch *batch, bt_idx n, const moved *y) { return sum_against(batch, n, 3, y); }
-
-BT_FOR_EACH_CPU
-static void move_projection(bt_batch *batch, bt_idx n, double beta, moved *y) { move_unknowns(batch, n, 2, beta, y); }
-
-BT_FOR_EACH_CPU
-static double against_projection(const bt_batch *batch, bt_idx n, const moved *y)
+/// The first pass is over the batches that are due, each other one over those that the last has not left calm.
+BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bt_batch_kind kind, visit *o)
 {
-    return sum_against(batch, n, 2, y);
-}
-
-typedef double pass_of_batches(bt_batch *batch, bt_idx n, bt_vel *v);
-
-static double visit(bt_cell *cell, bt_vel *v, pass_of_batches *once, const bt_sweep *sweep, int times, double enough,
-                    int64_t *done, double *most)
-{
-    bt_batch *batch = cell->work.batch;
-    const bt_idx n_batches = cell->work.n_batches;
-    moved few[BT_FEW / BT_LANES], *y = few;
-    if (sweep->moves && n_batches > BT_FEW / BT_LANES) y = bt_alloc_aligned((size_t)n_batches, sizeof *y);
-    const bool projection = once == pass_projection;
-    if (sweep->moves) (projection ? move_projection : move)(batch, n_batches, sweep->beta, y);
-    double last = INFINITY;
-    for (int n = 0; n == 0 || (n < times && last > enough); n++) {
-        last = once(batch, n_batches, v);
-        if (n == 0) *most = last;
-        *done += cell->work.n_list;
+    const int unknowns = kind == BT_BATCH_PROJECTION ? 2 : 3;
+    const bt_batch_bounds *bounds = (const bt_batch_bounds *)(batches + n);
+    const bt_sweep *sweep = o->sweep;
+    vec most = {0}, against = {0};
+    const bt_idx n_due = find_due(o->rests, n, sweep->all, o->due);
+    bt_idx left = n_due;
+    for (int t = 0; left > 0 && t < o->times; t++) {
+        const bt_idx *now = t == 0 ? o->due : o->again, n_now = left;
+        left = 0;
+        for (bt_idx j = 0; j < n_now; j++) {
+            const bt_idx k = now[j];
+            bt_batch *batch = &batches[k];
+            bt_rest *rest = &o->rests[k];
+            if (t == 0 && sweep->moves) {
+                move(batch, unknowns, sweep->lead[rest->done], sweep->lag[rest->done], &o->y[k]);
+                o->moved += sweep->beta > 0 ? batch->n : 0;
+            }
+            vec change;
+            if (kind == BT_BATCH_PROJECTION) change = project(batch, v);
+            else if (kind == BT_BATCH_RIGID) change = update(batch, NULL, v);
+            else if (batch->kind == BT_BATCH_SHEETS) change = update_sheets(batch, bounds[k].of[0], v);
+            else change = update(batch, bounds[k].of, v);
+            if (t == 0) most = bt_larger(most, change);
+            o->done += batch->n;
+            const bool calm = bt_largest_lane(change) <= o->calm;
+            rest->in_all = calm ? (uint8_t)bt_min(BT_REST, 2 * rest->in_all + 1) : 0;
+            rest->to_come = rest->in_all, rest->done = 0;
+            o->again[left] = k;
+            left += !calm;
+        }
     }
-    const double turned = !sweep->moves ? 0 : (projection ? against_projection : against)(batch, n_batches, y);
-    if (y != few) free(y);
-    return turned;
+    for (bt_idx j = 0; sweep->moves && j < n_due; j++)
+        against += turned(&batches[o->due[j]], unknowns, &o->y[o->due[j]]);
+    o->most = bt_largest_lane(most);
+    o->against = against[0] + against[1] + against[2] + against[3];
 }
 
-double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, double enough,
-                      int64_t *done, double *most)
+BT_FOR_EACH_CPU
+static void go_through_rigid(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
+{
+    go_through(batches, n, v, BT_BATCH_RIGID, o);
+}
+
+/// Where contacts have bounds; apart, or rigid ice would pay for the registers that this takes.
+BT_FOR_EACH_CPU
+static void go_through_bounded(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
+{
+    go_through(batches, n, v, BT_BATCH_BOUNDED, o);
+}
+
+BT_FOR_EACH_CPU
+static void go_through_projection(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
+{
+    go_through(batches, n, v, BT_BATCH_PROJECTION, o);
+}
+
+typedef void all_batches(bt_batch *batches, bt_idx n, bt_vel *v, visit *o);
+
+static void visit_cell(bt_cell *cell, bt_vel *v, all_batches *pass, visit *o, bt_totals *totals)
+{
+    const bt_idx n = cell->work.n_batches;
+    moved few[BT_FEW / BT_LANES];
+    bt_idx few_due[2 * BT_FEW / BT_LANES];
+    const bool many = n > BT_FEW / BT_LANES;
+    o->y = many ? bt_alloc_aligned((size_t)n, sizeof *o->y) : few;
+    o->due = many ? bt_alloc(2 * (size_t)n, sizeof *o->due) : few_due;
+    o->again = o->due + n;
+    o->rests = bt_batch_rests(cell);
+    pass(cell->work.batch, n, v, o);
+    if (many) free(o->y), free(o->due);
+    totals->most = bt_max(totals->most, o->most);
+    cell->work.updates += o->done;
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)o->done);
+    if (o->sweep->moves) bt_rounds_moved(o->sweep, o->moved, o->against, totals);
+}
+
+void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals)
 {
     if (!cell->work.packed) bt_batch_pack(cell, inv, NULL);
-    return visit(cell, v, cell->laws.limits ? pass_bounded : pass, sweep, times, enough, done, most);
+    visit o = {.sweep = sweep, .times = times > 1 ? times : 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
+    visit_cell(cell, v, cell->laws.limits ? go_through_bounded : go_through_rigid, &o, totals);
 }
 
-double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep, int64_t *done,
-                        double *most)
+void bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep,
+                      bt_totals *totals)
 {
     if (!cell->work.packed) bt_batch_pack(cell, inv, &slop);
-    return visit(cell, d, pass_projection, sweep, 1, 0, done, most);
+    visit o = {.sweep = sweep, .times = 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
+    visit_cell(cell, d, go_through_projection, &o, totals);
 }

@@ -173,7 +173,7 @@ static void push(bt_world *world, bt_idx k, const void *context, bt_totals *tota
 static void form_change(bt_world *world, const loads *found)
 {
     bt_totals totals = {0};
-    bt_phases_run(world, &(bt_before){no_change, NULL}, push, found, world->solver->shift, &totals);
+    bt_phases_run(world, BT_WITH_WORK, &(bt_before){no_change, NULL}, push, found, world->solver->shift, &totals);
     bt_domain_settle(world, world->solver->shift);
 }
 
@@ -195,7 +195,7 @@ static void balance(bt_world *world, const loads *found)
     form_change(world, found);
     for (int sweep = 0; sweep < BT_LOCKED_SWEEPS; sweep++) {
         bt_totals totals = {0};
-        bt_phases_run(world, NULL, relax, found, world->solver->shift, &totals);
+        bt_phases_run(world, BT_WITH_WORK, NULL, relax, found, world->solver->shift, &totals);
         bt_domain_maxima(world, &totals.most, 1);
         if (totals.most <= BT_LOCKED_AT_REST * found->closing) break;
     }

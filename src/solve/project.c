@@ -169,13 +169,7 @@ static void project_cell(bt_world *world, bt_idx k, const void *context, bt_tota
     bt_cell *cell = &world->cells->cell[k];
     if (cell->work.n_list == 0) return;
     if (in_batches(cell, sweep->problem->plain)) {
-        int64_t done = 0;
-        double most = 0;
-        const double against = bt_batch_project(cell, world->par.slop, world->solver->shift, world->bodies.inv, sweep,
-                                                &done, &most);
-        totals->most = bt_max(totals->most, most);
-        bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)done);
-        if (sweep->moves) bt_rounds_moved(cell, sweep, against, totals);
+        bt_batch_project(cell, world->par.slop, world->solver->shift, world->bodies.inv, sweep, totals);
         return;
     }
     bt_moved moved;

@@ -121,6 +121,9 @@ static void mark_swept(bt_world *world)
         mark_cell_of(world, large->contacts[j].b);
     }
     bt_domain_beside_large(world, mark_cell_of);
+    cells->n_swept = 0;
+    for (bt_idx j = 0; j < cells->n_busy; j++)
+        if (cells->cell[cells->busy[j]].work.swept) cells->swept[cells->n_swept++] = cells->busy[j];
 }
 
 static void lists_are_new(bt_world *world)
@@ -239,31 +242,40 @@ static void move_bodies(bt_world *world, bt_idx k, const void *context, bt_total
     (void)totals;
     const body_move *m = context;
     bt_cell *cell = &world->cells->cell[k];
-    if (!cell->work.swept) return;
     const double beta = cell->work.still ? 0 : m->beta;
     cell->work.still = false;
     move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 
-/// Returns the largest update. `first` moves the bodies on.
-static double sweep(bt_world *world, const bt_problem *problem, const bt_before *first, bool moves, double beta,
-                    bt_work *work, double *against)
+/// How far sweeps move on along the last change: the next one, and those before it.
+typedef struct {
+    double theta, beta[BT_REST + 1];
+    double against; ///< of the last sweep
+} momentum;
+
+/// Returns the largest update.
+static double sweep(bt_world *world, const bt_problem *problem, const bt_before *first, bool all, momentum *m,
+                    bt_work *work)
 {
     bt_totals totals = {.n_sums = BT_SWEEP_N};
-    const bt_sweep sweep = {.problem = problem, .moves = moves, .beta = beta};
-    bt_phases_run(world, first, problem->sweep, &sweep, problem->vel, &totals);
+    bt_sweep sweep = {.problem = problem, .moves = !problem->plain, .all = all, .beta = m->beta[0],
+                      .lead = {m->beta[0]}};
+    for (int k = 1; k <= BT_REST; k++) {
+        sweep.lead[k] = m->beta[k] * (1 + sweep.lead[k - 1]);
+        sweep.lag[k] = m->beta[k] * (1 + sweep.lag[k - 1]);
+    }
+    bt_phases_run(world, BT_LISTED, first, problem->sweep, &sweep, problem->vel, &totals);
     bt_domain_reduce(world, &totals);
     work->sweeps++;
     work->updates += (int64_t)bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]);
     work->moves += (int64_t)bt_sum_value(&totals.sum[BT_SWEEP_MOVED]);
-    *against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
+    m->against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
     return totals.most;
 }
 
 double bt_rounds_sweep(bt_world *world, const bt_problem *problem, bt_work *work)
 {
-    double against;
-    return sweep(world, problem, NULL, false, 0, work, &against);
+    return sweep(world, problem, NULL, true, &(momentum){0}, work);
 }
 
 /// What counts against the limit.
@@ -273,19 +285,16 @@ static double spent(const bt_problem *problem, const bt_work *work)
     return (double)(work->updates + work->checks) + (1 + LEAST_SWEEP * (double)work->contacts) * (double)work->sweeps;
 }
 
-typedef struct {
-    double theta, beta;
-    double against; ///< of the last sweep
-} momentum;
-
 /// How far the next sweep moves on from where the last one has come to.
 static void gather(double cap, momentum *m)
 {
+    double *beta = m->beta;
+    memmove(beta + 1, beta, BT_REST * sizeof *beta);
     if (!(m->against <= 0)) { // or not a number
-        m->theta = 1, m->beta = 0;
+        m->theta = 1, *beta = 0;
     } else {
         const double next = 0.5 * (1 + sqrt(1 + 4 * m->theta * m->theta));
-        m->beta = bt_min(cap, (m->theta - 1) / next);
+        *beta = bt_min(cap, (m->theta - 1) / next);
         m->theta = next;
     }
 }
@@ -295,13 +304,16 @@ static bool run_round(bt_world *world, const bt_problem *problem, int length, do
                       double small, momentum *m, bt_work *work)
 {
     if (!on) *m = (momentum){.theta = 1};
-    for (int n = 0;; n++) {
-        const bool moves_on = !problem->plain && (n > 0 || on);
+    bool all = true;
+    for (int n = 1;; n++) {
+        const bool moves_on = !problem->plain && (n > 1 || on);
         if (moves_on) gather(cap, m);
-        const bt_before move = {move_bodies, &(body_move){problem->vel, world->solver->before, m->beta}};
-        if (sweep(world, problem, moves_on ? &move : NULL, !problem->plain, m->beta, work, &m->against) <= small)
-            return true;
-        if (n + 1 == length || spent(problem, work) >= limit) return false;
+        const bt_before move = {move_bodies, &(body_move){problem->vel, world->solver->before, *m->beta}};
+        const double most = sweep(world, problem, moves_on ? &move : NULL, all, m, work);
+        const bool over = spent(problem, work) >= limit;
+        if (all && most <= small) return true;
+        if (all && (n >= length || over)) return false;
+        all = problem->plain || n + 1 >= length || over || most <= small;
     }
 }
 

@@ -87,7 +87,6 @@ bool bt_restitution_lower(bt_world *world)
 #endif
 
 #define UPDATES 6.0 // of every contact that one of max_sweeps stands for
-#define ENOUGH 0.3 // of the tolerance: a cell that changes less is not swept again in the same turn
 
 bt_solver *bt_solver_create(void)
 {
@@ -136,6 +135,7 @@ static bt_tow *line_of(const bt_world *world, bt_idx cell)
 static void start_impulses(bt_cell *cell, const bt_inv *inv)
 {
     const bool in_place = !bt_batch_is_for(cell);
+    bt_batch_unpack(cell);
     bt_rounds_list(cell);
     bt_batch_begin(cell);
     if (in_place) bt_rounds_in_place(cell, inv);
@@ -157,9 +157,9 @@ static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_to
     bt_cell *cell = &world->cells->cell[k];
     bt_vel *v = world->bodies.vel;
     const bt_inv *inv = world->bodies.inv;
-    bt_batch_unpack(cell);
     if (warm) start_impulses(cell, inv);
-    for (bt_idx i = 0; i < cell->n_contacts; i++) {
+    if (cell->work.packed) bt_batch_apply(cell, v);
+    for (bt_idx i = 0; !cell->work.packed && i < cell->n_contacts; i++) {
         const bt_contact *contact = &cell->contacts[i];
         const double total = contact->ln[0] + contact->ln[1];
         if (total == 0 && contact->lt == 0) continue;
@@ -186,6 +186,7 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
 {
     const double near = BT_NEAR * problem->tolerance;
     bt_found found = {0};
+    bt_rounds_list(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         const bt_contact *contact = &cell->contacts[i];
         const bt_mass *m = &cell->work.in_place[i].mass;
@@ -215,8 +216,6 @@ static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_
     const bt_problem *problem = context;
     bt_cell *cell = &world->cells->cell[k];
     const bt_vel *v = world->bodies.vel;
-    bt_batch_unpack(cell);
-    bt_rounds_list(cell);
     bt_found found = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, world->bodies.inv, problem)
                                            : residual_in_place(cell, v, problem);
     const bt_tow *line = line_of(world, k);
@@ -245,7 +244,8 @@ static void free_velocities(bt_world *world, bt_idx k, const void *context, bt_t
 static bool form_velocities(bt_world *world, bool warm)
 {
     bt_totals totals = {0};
-    bt_phases_run(world, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, world->bodies.vel, &totals);
+    bt_phases_run(world, BT_WITH_WORK, &(bt_before){free_velocities, NULL}, apply_impulses, &warm, world->bodies.vel,
+                  &totals);
     return totals.most > 0;
 }
 
@@ -300,18 +300,6 @@ static double contacts_against(const bt_cell *cell, double (*y)[3])
     return sum;
 }
 
-static void sweep_in_batches(bt_world *world, bt_cell *cell, const bt_sweep *sweep, bt_totals *totals)
-{
-    int64_t done = 0;
-    double most = 0;
-    const double against = bt_batch_sweep(cell, world->bodies.vel, world->bodies.inv, sweep, world->par.inner_sweeps,
-                                          ENOUGH * sweep->problem->tolerance, &done, &most);
-    totals->most = bt_max(totals->most, most);
-    cell->work.updates += done;
-    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)done);
-    if (sweep->moves) bt_rounds_moved(cell, sweep, against, totals);
-}
-
 static void sweep_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     const bt_sweep *sweep = context;
@@ -319,7 +307,7 @@ static void sweep_cell(bt_world *world, bt_idx k, const void *context, bt_totals
     bt_tow *line = line_of(world, k);
     if (cell->work.n_list == 0 && !line) return;
     if (bt_batch_is_for(cell)) {
-        sweep_in_batches(world, cell, sweep, totals);
+        bt_batch_sweep(cell, world->bodies.vel, world->bodies.inv, sweep, world->par.inner_sweeps, totals);
         return;
     }
     bt_vel *v = world->bodies.vel, *towed = line ? &v[bt_world_towed(world)] : NULL;
@@ -335,7 +323,7 @@ static void sweep_cell(bt_world *world, bt_idx k, const void *context, bt_totals
     double most = INFINITY;
     for (; times < world->par.inner_sweeps || times == 0; times++) {
         // more would be for nothing until the neighbours have changed
-        if (most <= ENOUGH * sweep->problem->tolerance) break;
+        if (most <= BT_ENOUGH * sweep->problem->tolerance) break;
         most = update_list(cell, v, world->bodies.inv);
         if (line) most = bt_max(most, bt_tow_update(line, towed, world->bodies.inv[bt_world_towed(world)]));
         if (times == 0) totals->most = bt_max(totals->most, most);
@@ -374,6 +362,12 @@ static void keep_impulses(bt_world *world, bt_idx k, const void *context, bt_tot
         if (what == BT_PUT_BACK) *now = *x;
         else *x = *now;
     }
+}
+
+static void unpack_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+{
+    (void)context, (void)totals;
+    bt_batch_unpack(&world->cells->cell[k]);
 }
 
 static bt_problem contact_problem(const bt_world *world)
@@ -444,6 +438,7 @@ static void sweep_to_tolerance(bt_world *world)
         bt_rounds_residual(world, &problem, BT_SWEPT, &work);
     }
     if (work.residual > problem.tolerance) bt_rounds_run(world, &problem, &work);
+    bt_phases_any_order(world, unpack_cell, NULL, &(bt_totals){0});
     st->sweeps += work.sweeps;
     st->contact_updates += work.updates;
     st->contact_moves += work.moves;

@@ -123,7 +123,8 @@ void bt_cells_free(bt_cells *cells)
     if (!cells) return;
     for (bt_idx k = 0; k < cells->n; k++) free_cell(&cells->cell[k]);
     void *arrays[] = {cells->at,   cells->speed,   cells->bound, cells->moved, cells->asleep, cells->awake,
-                      cells->busy, cells->is_busy, cells->order, cells->turn,  cells->share,  cells->cell,  cells};
+                      cells->busy, cells->is_busy, cells->order, cells->turn,  cells->share,  cells->swept,
+                      cells->cell, cells};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -422,6 +423,7 @@ static void make_cells(bt_world *world)
     cells->asleep = bt_realloc(cells->asleep, n, sizeof *cells->asleep);
     cells->awake = bt_realloc(cells->awake, n, sizeof *cells->awake);
     cells->order = bt_realloc(cells->order, n, sizeof *cells->order);
+    cells->swept = bt_realloc(cells->swept, n, sizeof *cells->swept);
     free(cells->turn);
     cells->turn = bt_alloc_aligned(n, sizeof *cells->turn);
     cells->n_passes = 0;

@@ -198,7 +198,8 @@ typedef struct bt_cell {
 typedef struct bt_turn {
     _Atomic uint32_t done;          ///< number of the last pass that has visited it
     bt_idx n_before, before[8];     ///< cells around it that a pass visits first
-    char apart[64 - 10 * sizeof(bt_idx)]; ///< a cache line each
+    bt_idx n_listed;                ///< of these the first, that a sweep visits, too
+    char apart[64 - 11 * sizeof(bt_idx)]; ///< a cache line each
 } bt_turn;
 
 /// What one thread is to do of one stretch of the order (src/space/phases.h).
@@ -255,8 +256,10 @@ typedef struct bt_cells {
     bt_idx n_border[BT_PHASES];     ///< cells at the border among those of each phase
     bt_turn *turn;                  ///< [n]
     uint32_t n_passes;              ///< passes in the order of the phases so far
-    bt_share *share;                ///< [BT_STRETCHES][n_shares] at the border and not, of every phase
+    bt_share *share;                ///< [2][BT_STRETCHES][n_shares] of every phase, at the border and not: all; listed
     bt_idx n_shares, cap_shares;    ///< threads
+    bt_idx *swept;                  ///< [n_swept] of the busy cells those whose bodies sweeps over the lists may move
+    bt_idx n_swept;
     bt_idx n_contacts;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its cell: renew before the next step
     bool still;                     ///< the water is at rest

@@ -28,21 +28,44 @@ static bool has_work(const bt_world *world, bt_idx k)
     return cells->cell[k].own && (cells->cell[k].n_contacts > 0 || (k == cells->n - 1 && bt_tow_has_line(world->tow)));
 }
 
-/// Stretches of cells [begin, end) of the order with equal parts of the listed contacts, one a share. A cell itself
-/// costs something, too.
-static void deal_stretch(bt_cells *cells, bt_idx begin, bt_idx end, bt_share *share)
+static bool is_listed(const bt_world *world, bt_idx k)
 {
-    enum { CELL = 4 }; // contacts
+    return world->cells->cell[k].work.n_list > 0 || (k == world->cells->n - 1 && bt_tow_has_line(world->tow));
+}
+
+/// What a visit to cell k takes, in contacts. A cell itself costs something, too.
+static int64_t cost_of(const bt_cells *cells, bt_idx k, bt_which which)
+{
+    enum { CELL = 4 };
+    return CELL + (which == BT_LISTED ? cells->cell[k].work.n_list : cells->cell[k].n_contacts);
+}
+
+/// Stretches of cells [begin, end) of the order with equal parts of the work, one a share.
+static void deal_stretch(bt_cells *cells, bt_which which, bt_idx begin, bt_idx end, bt_share *share)
+{
     int64_t all = 0, before = 0;
-    for (bt_idx i = begin; i < end; i++) all += CELL + cells->cell[cells->order[i]].work.n_list;
+    for (bt_idx i = begin; i < end; i++) all += cost_of(cells, cells->order[i], which);
     bt_idx i = begin;
     for (bt_idx s = 0; s < cells->n_shares; s++) {
         share[s].begin = i;
         for (; i < end && before * cells->n_shares < all * (s + 1); i++)
-            before += CELL + cells->cell[cells->order[i]].work.n_list;
+            before += cost_of(cells, cells->order[i], which);
         share[s].end = i;
     }
     share[cells->n_shares - 1].end = end;
+}
+
+/// Of n cells first those that are listed, otherwise as they stand. Returns how many these are.
+static bt_idx listed_first(const bt_world *world, bt_idx *cell, bt_idx n)
+{
+    bt_idx listed = 0;
+    for (bt_idx i = 0; i < n; i++) {
+        const bt_idx k = cell[i];
+        if (!is_listed(world, k)) continue;
+        memmove(cell + listed + 1, cell + listed, (size_t)(i - listed) * sizeof *cell);
+        cell[listed++] = k;
+    }
+    return listed;
 }
 
 void bt_phases_distribute(bt_world *world)
@@ -53,14 +76,20 @@ void bt_phases_distribute(bt_world *world)
     const bt_idx n = BT_MANY(listed, BT_FEW_CONTACTS) ? omp_get_max_threads() : 1;
     if (n > cells->cap_shares) {
         free(cells->share);
-        cells->share = bt_alloc_aligned(BT_STRETCHES * (size_t)n, sizeof *cells->share);
+        cells->share = bt_alloc_aligned(2 * BT_STRETCHES * (size_t)n, sizeof *cells->share);
         cells->cap_shares = n;
     }
     cells->n_shares = n;
-    for (int p = 0; p < BT_PHASES; p++) {
-        const bt_idx middle = cells->start[p] + cells->n_border[p];
-        deal_stretch(cells, cells->start[p], middle, &cells->share[2 * p * n]);
-        deal_stretch(cells, middle, cells->start[p + 1], &cells->share[(2 * p + 1) * n]);
+    for (int s = 0; s < BT_STRETCHES; s++) {
+        const bt_idx first = cells->start[s / 2], middle = first + cells->n_border[s / 2],
+                     begin = s % 2 ? middle : first, end = s % 2 ? cells->start[s / 2 + 1] : middle;
+        const bt_idx n_listed = listed_first(world, cells->order + begin, end - begin);
+        deal_stretch(cells, BT_WITH_WORK, begin, end, &cells->share[s * n]);
+        deal_stretch(cells, BT_LISTED, begin, begin + n_listed, &cells->share[(BT_STRETCHES + s) * n]);
+    }
+    for (bt_idx i = 0; n > 1 && i < cells->n_order; i++) {
+        bt_turn *turn = &cells->turn[cells->order[i]];
+        turn->n_listed = listed_first(world, turn->before, turn->n_before);
     }
 }
 
@@ -123,17 +152,18 @@ typedef struct pass {
     const void *context;
     bt_vel *exchanged;
     uint32_t number; ///< of the pass; 0: in any order
+    bt_which which;
     bt_idx me, team; ///< number of the thread, and how many there are
     bt_totals *own;  ///< what the thread adds up
 } pass;
 
-/// A pass over the cells with work.
-static pass in_order(bt_world *world, bt_visit *visit, const void *context)
+static pass in_order(bt_world *world, bt_which which, bt_visit *visit, const void *context)
 {
     bt_cells *cells = world->cells;
     return (pass){.w = world,
+                  .which = which,
                   .list = cells->order,
-                  .share = cells->share,
+                  .share = cells->share + (which == BT_LISTED ? BT_STRETCHES * cells->n_shares : 0),
                   .n_stretches = BT_STRETCHES,
                   .n_shares = cells->n_shares,
                   .visit = visit,
@@ -153,7 +183,8 @@ static void visit_cell(const pass *mine, bt_idx k)
 {
     bt_turn *turn = &mine->w->cells->turn[k];
     const bool waits = mine->team > 1 && mine->number;
-    for (bt_idx j = 0; waits && j < turn->n_before; j++) wait_for_cell(mine, turn->before[j]);
+    const bt_idx n = mine->which == BT_LISTED ? turn->n_listed : turn->n_before;
+    for (bt_idx j = 0; waits && j < n; j++) wait_for_cell(mine, turn->before[j]);
     mine->visit(mine->w, k, mine->context, mine->own);
     if (waits) atomic_store_explicit(&turn->done, mine->number, memory_order_release);
 }
@@ -181,14 +212,15 @@ static void wait_for_team(const pass *mine)
 #pragma omp barrier
 }
 
-/// All busy cells, a stretch of them for each thread.
+/// A stretch of the cells for each thread.
 static void visit_before(pass *mine)
 {
     if (!mine->before) return;
     const bt_cells *cells = mine->w->cells;
-    const int64_t n = cells->n_busy;
+    const bt_idx *list = mine->which == BT_LISTED ? cells->swept : cells->busy;
+    const int64_t n = mine->which == BT_LISTED ? cells->n_swept : cells->n_busy;
     for (int64_t j = n * mine->me / mine->team, end = n * (mine->me + 1) / mine->team; j < end; j++)
-        mine->before->visit(mine->w, cells->busy[j], mine->before->context, NULL);
+        mine->before->visit(mine->w, list[j], mine->before->context, NULL);
     wait_for_team(mine);
 }
 
@@ -257,22 +289,22 @@ static void run_plain(bt_world *world, const bt_before *before, bt_visit *visit,
     }
 }
 
-void bt_phases_run(bt_world *world, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
-                   bt_totals *totals)
+void bt_phases_run(bt_world *world, bt_which which, const bt_before *before, bt_visit *visit, const void *context,
+                   bt_vel *exchanged, bt_totals *totals)
 {
     if (world->par.plain_schedule) {
         run_plain(world, before, visit, context, exchanged, totals);
         return;
     }
     if (++world->cells->n_passes == 0) world->cells->n_passes = 1;
-    pass mine = in_order(world, visit, context);
+    pass mine = in_order(world, which, visit, context);
     mine.before = before, mine.exchanged = exchanged, mine.number = world->cells->n_passes;
     run_on_team(run_phases, &mine, totals);
 }
 
 void bt_phases_any_order(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals)
 {
-    pass mine = in_order(world, visit, context);
+    pass mine = in_order(world, BT_WITH_WORK, visit, context);
     run_on_team(run_stretches, &mine, totals);
 }
 

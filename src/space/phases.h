@@ -52,11 +52,15 @@ typedef void bt_visit(bt_world *world, bt_idx cell, const void *context, bt_tota
 /// been made.
 void bt_phases_order(bt_world *world);
 
-/// Assign the cells to threads by the contacts that are listed in them. No result depends on it.
+/// After new lists: assign the cells to threads by the contacts that are listed in them, and put those with a list
+/// first. No result depends on it.
 void bt_phases_distribute(bt_world *world);
 
-/// What a pass does first, with all busy cells, also those without contacts and of other ranks, for the sake of their
-/// bodies, in any order; no totals (NULL).
+/// The cells of a pass: all with work, or those that sweeps change: with listed contacts, or a line.
+typedef enum { BT_WITH_WORK, BT_LISTED } bt_which;
+
+/// What a pass does first, in any order, with all busy cells, or those whose bodies sweeps may move, for the sake of
+/// their bodies: also with cells without contacts and of other ranks; no totals (NULL).
 typedef struct bt_before {
     bt_visit *visit;
     const void *context;
@@ -65,8 +69,8 @@ typedef struct bt_before {
 /// Collective. After what comes before it (or NULL), visit the cells of phase 0, then those of phase 1, ...: those of
 /// one phase share no movable body and are done at once by threads and ranks. After each phase, `exchanged` (an array
 /// over the bodies, or NULL) is brought up to date on all ranks, while the other cells are still worked on.
-void bt_phases_run(bt_world *world, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
-                   bt_totals *totals);
+void bt_phases_run(bt_world *world, bt_which which, const bt_before *before, bt_visit *visit, const void *context,
+                   bt_vel *exchanged, bt_totals *totals);
 
 /// Visit the cells with work in any order, all at once.
 void bt_phases_any_order(bt_world *world, bt_visit *visit, const void *context, bt_totals *totals);

@@ -87,7 +87,8 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
         s->v[i] = (bt_vel){any(rng), any(rng), any(rng), 0};
     }
     s->cell =
-        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS, .work.list = s->list};
+        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS,
+                  .work = {.list = s->list, .cap_list = CONTACTS}};
     for (bt_idx i = 0; i < CONTACTS; i++) {
         s->contacts[i] = random_contact(rng, s->inv);
         if (scene_uniform(rng) < listed) s->list[s->cell.work.n_list++] = i;
@@ -155,14 +156,15 @@ static void swept_order(const bt_cell *cell, bt_idx *contact)
         for (int l = 0; l < cell->work.batch[k].n; l++) *contact++ = cell->work.batch[k].contact[l];
 }
 
-/// The residual pass four at a time against one by one, sums included, bit for bit.
+/// The residual pass four at a time against one by one, bit for bit; the sum of squares of a packed cell but for
+/// rounding.
 static void check_residual(knot_of_floes *four, knot_of_floes *one)
 {
     const bt_problem p = {.tolerance = 1e-3};
     bt_idx list[CONTACTS], n = 0;
     const bt_idx n_list = four->cell.work.n_list;
     memcpy(list, four->list, sizeof list);
-    four->cell.work.n_list = 0;
+    const bool packed = four->cell.work.packed;
     const bt_found f = bt_batch_residual(&four->cell, four->v, four->inv, &p);
     bt_found e = {0};
     for (bt_idx i = 0; i < CONTACTS; i++) {
@@ -180,10 +182,19 @@ static void check_residual(knot_of_floes *four, knot_of_floes *one)
         if (on) assert_true(n < four->cell.work.n_list && four->list[n] == i), n++;
     }
     assert_int_equal(n, four->cell.work.n_list);
-    assert_true(f.most == e.most && f.squares == e.squares && f.rows == e.rows && f.bad == e.bad);
+    assert_true(f.most == e.most && f.rows == e.rows && f.bad == e.bad);
+    CHECK_CLOSE(f.squares, e.squares, packed ? 1e-13 * e.squares : 0);
+    const bool same = n == n_list && memcmp(list, four->list, (size_t)n * sizeof *list) == 0;
+    assert_true(four->cell.work.packed == (packed && same)); // batches of the same contacts stay
     memcpy(four->list, list, sizeof list);
     four->cell.work.n_list = n_list;
 }
+
+/// Totals of a sweep that adds up what it turned against its moves in units of 1 J.
+static bt_totals no_totals(void) { return (bt_totals){.n_sums = BT_SWEEP_N}; }
+
+static const bt_problem never_calm = {.tolerance = -1, .per_energy = 1},
+                        always_calm = {.tolerance = INFINITY, .per_energy = 1};
 
 TEST(batches_do_what_single_updates_do)
 {
@@ -200,14 +211,18 @@ TEST(batches_do_what_single_updates_do)
         // A list, and then another, in which contacts that were in the first move on.
         for (int round = 0; round < 2; round++) {
             if (round > 0) list_all(&four.cell), one.cell.work.n_list = CONTACTS;
-            const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
-            int64_t done = 0;
-            double most = 0, most_of_one = 0;
-            const double against = bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, 0, &done, &most);
+            const double beta = k % 4 == 1 ? 0.7 : 0;
+            const bt_sweep o = {.problem = &never_calm, .moves = k % 2, .beta = beta, .lead = {beta}};
+            bt_totals totals = no_totals();
+            double most_of_one = 0;
+            bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, &totals);
             assert_true(four.cell.work.packed);
-            assert_int_equal(done, times * four.cell.work.n_list);
+            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), times * four.cell.work.n_list, 0);
+            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_MOVED]), o.moves && beta > 0 ? four.cell.work.n_list : 0, 0);
             swept_order(&four.cell, order);
+            const double most = totals.most, against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
             CHECK_CLOSE(scalar_visit(&one, order, &o, times, &most_of_one), against, 1e-11 * (1 + fabs(against)));
+            if (k % 7 < 3) check_residual(&four, &one);
             bt_batch_unpack(&four.cell);
             assert_false(four.cell.work.packed);
             assert_int_equal(four.cell.work.n_last, four.cell.work.n_list);
@@ -309,12 +324,14 @@ TEST(batches_project_as_single_updates_do)
         const double slop = 0.1 * scene_uniform(&rng);
         for (int round = 0; round < 2; round++) {
             if (round > 0) list_all(&four.cell), one.cell.work.n_list = CONTACTS;
-            const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
-            int64_t done = 0;
-            double most = 0, most_of_one = 0;
-            const double against = bt_batch_project(&four.cell, slop, four.v, four.inv, &o, &done, &most);
-            assert_int_equal(done, four.cell.work.n_list);
+            const double beta = k % 4 == 1 ? 0.7 : 0;
+            const bt_sweep o = {.problem = &never_calm, .moves = k % 2, .beta = beta, .lead = {beta}};
+            bt_totals totals = no_totals();
+            double most_of_one = 0;
+            bt_batch_project(&four.cell, slop, four.v, four.inv, &o, &totals);
+            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), four.cell.work.n_list, 0);
             swept_order(&four.cell, order);
+            const double most = totals.most, against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
             CHECK_CLOSE(scalar_projection(&one, order, slop, &o, &most_of_one), against, 1e-11 * (1 + fabs(against)));
             bt_batch_unpack(&four.cell);
             CHECK_CLOSE(most, most_of_one, 0);
@@ -344,9 +361,8 @@ TEST(each_listed_contact_is_in_one_batch)
     own_contacts(&s);
     bt_idx order[CONTACTS];
     bool seen[CONTACTS] = {false};
-    int64_t done = 0;
-    double most = 0;
-    bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 1, 0, &done, &most);
+    bt_totals totals = no_totals();
+    bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){.problem = &never_calm}, 1, &totals);
     swept_order(&s.cell, order);
     for (bt_idx j = 0; j < s.cell.work.n_list; j++) {
         assert_false(seen[order[j]]);
@@ -354,10 +370,99 @@ TEST(each_listed_contact_is_in_one_batch)
     }
     assert_true(BT_LANES * s.cell.work.n_batches < 1.15 * s.cell.work.n_list);
     // A visit ends when a pass has changed nothing that matters.
-    done = 0;
-    bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 5, INFINITY, &done, &most);
-    assert_int_equal(done, s.cell.work.n_list);
+    totals = no_totals();
+    bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){.problem = &always_calm}, 5, &totals);
+    CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), s.cell.work.n_list, 0);
     free(s.cell.contacts);
+}
+
+/// A sweep with the moves beta, the last one first; returns the number of updates.
+static double sweep_once(knot_of_floes *s, const double beta[2], const bt_problem *problem)
+{
+    const bt_sweep o = {.problem = problem, .moves = true, .beta = beta[0], .lead = {beta[0], beta[1] * (1 + beta[0])},
+                        .lag = {0, beta[1]}};
+    bt_totals totals = no_totals();
+    bt_batch_sweep(&s->cell, s->v, s->inv, &o, 1, &totals);
+    return bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]);
+}
+
+/// Calm batches rest for one sweep, then for three. Their next update starts where the moves have come to meanwhile, as
+/// if each had been made in its sweep.
+TEST(a_batch_that_has_rested_catches_up_with_the_moves)
+{
+    static knot_of_floes s, one;
+    static double x0[CONTACTS][3], x1[CONTACTS][3];
+    bt_idx order[CONTACTS];
+    uint64_t rng = 9;
+    fill(&s, &rng, 1);
+    list_all(&s.cell);
+    set_out(&s);
+    one = s;
+    own_contacts(&s);
+    assert_true(sweep_once(&s, (double[2]){0}, &always_calm) == CONTACTS);
+    const bt_batch *batch = s.cell.work.batch;
+    for (bt_idx k = 0; k < s.cell.work.n_batches; k++)
+        for (int l = 0; l < batch[k].n; l++)
+            for (int c = 0; c < 3; c++)
+                x0[batch[k].contact[l]][c] = batch[k].before[c][l], x1[batch[k].contact[l]][c] = batch[k].x[c][l];
+    assert_true(sweep_once(&s, (double[2]){0.5}, &always_calm) == 0);
+    // by hand: the moves of two sweeps, and the update of the second
+    for (bt_idx i = 0; i < CONTACTS; i++) {
+        double x[3];
+        for (int c = 0; c < 3; c++) {
+            const double first = x1[i][c] + 0.5 * (x1[i][c] - x0[i][c]);
+            x[c] = first + 0.7 * (first - x1[i][c]);
+        }
+        one.contacts[i].ln[0] = x[0], one.contacts[i].ln[1] = x[1], one.contacts[i].lt = x[2];
+    }
+    memcpy(one.v, s.v, sizeof one.v);
+    swept_order(&s.cell, order);
+    double most;
+    scalar_visit(&one, order, &(bt_sweep){0}, 1, &most);
+    assert_true(sweep_once(&s, (double[2]){0.7, 0.5}, &always_calm) == CONTACTS);
+    for (bt_idx k = 0; k < s.cell.work.n_batches; k++)
+        for (int l = 0; l < batch[k].n; l++) {
+            const bt_idx i = batch[k].contact[l];
+            const bt_contact *u = &one.contacts[i];
+            // of points in one place either may bear the load
+            CHECK_CLOSE(batch[k].x[0][l] + batch[k].x[1][l], u->ln[0] + u->ln[1], 1e-12);
+            CHECK_CLOSE(batch[k].x[2][l], u->lt, 1e-12);
+            for (int c = 0; c < 3; c++)
+                CHECK_CLOSE(batch[k].before[c][l], x1[i][c] + 0.5 * (x1[i][c] - x0[i][c]), 1e-14);
+        }
+    for (int i = 0; i < 3; i++) assert_true(sweep_once(&s, (double[2]){0}, &always_calm) == 0);
+    assert_true(sweep_once(&s, (double[2]){0}, &never_calm) == CONTACTS);
+    assert_true(sweep_once(&s, (double[2]){0}, &never_calm) == CONTACTS);
+    free(s.cell.contacts);
+}
+
+TEST(impulses_of_batches_are_applied_as_those_of_contacts)
+{
+    static knot_of_floes four, one;
+    uint64_t rng = 17;
+    for (int k = 0; k < 20; k++) {
+        fill(&four, &rng, 1);
+        list_all(&four.cell);
+        if (k % 2) bind(&four, &rng);
+        one = four;
+        own_contacts(&four);
+        bt_batch_pack(&four.cell, four.inv, NULL);
+        bt_batch_apply(&four.cell, four.v);
+        for (bt_idx i = 0; i < CONTACTS; i++) {
+            const bt_contact *u = &one.contacts[i];
+            bt_vel a = one.v[u->a], b = one.v[u->b];
+            bt_apply(u, u->ln[0] + u->ln[1], u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1],
+                     u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], u->lt, one.inv[u->a], one.inv[u->b], &a, &b);
+            bt_store(&one.v[u->a], one.inv[u->a], &a);
+            bt_store(&one.v[u->b], one.inv[u->b], &b);
+        }
+        for (int i = 0; i < BODIES; i++) {
+            CHECK_CLOSE(four.v[i].x, one.v[i].x, 1e-12);
+            CHECK_CLOSE(four.v[i].y, one.v[i].y, 1e-12);
+            CHECK_CLOSE(four.v[i].w, one.v[i].w, 1e-12);
+        }
+        free(four.cell.contacts);
+    }
 }
 
 TEST_MAIN(NULL, NULL)

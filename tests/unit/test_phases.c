@@ -128,7 +128,7 @@ static void assert_sound(bt_world *w, int held_up)
     elsewhere.sent = elsewhere.received = elsewhere.wrong = 0;
     for (int p = 0; p < BT_PHASES; p++) elsewhere.at_work[p] = 0;
     log_of_pass *of_bodies = &log;
-    bt_phases_run(w, &(bt_before){see_to_bodies, &of_bodies}, visit, &(visitor){&log, held_up},
+    bt_phases_run(w, BT_WITH_WORK, &(bt_before){see_to_bodies, &of_bodies}, visit, &(visitor){&log, held_up},
                   w->exchange ? w->bodies.vel : NULL, &t);
     assert_int_equal(elsewhere.sent, w->exchange ? BT_PHASES : 0);
     assert_int_equal(elsewhere.received, elsewhere.sent);
@@ -225,7 +225,8 @@ TEST(the_border_is_done_before_it_is_sent)
     }
 }
 
-/// Lists of all lengths: the shares are of listed contacts, and hold every cell once.
+/// Lists of all lengths: the shares of a sweep are of listed contacts, and hold every cell with a list once, those of
+/// other passes are of all contacts and all cells.
 TEST(shares_follow_the_lists)
 {
     uint64_t rng = 3;
@@ -237,21 +238,26 @@ TEST(shares_follow_the_lists)
             t->cell[t->order[i]].work.n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
         bt_phases_distribute(w);
         assert_int_equal(t->n_shares, threads);
-        for (int p = 0; p < BT_COLOURS; p++) {
-            bt_idx at = t->start[p];
+        for (int p = 0; p < 2 * BT_COLOURS; p++) {
+            const bool listed = p % 2;
+            bt_idx at = t->start[p / 2];
             int64_t least = INT64_MAX, most = 0, largest = 0;
             for (bt_idx s = 0; s < threads; s++) {
-                const bt_share *share = &t->share[(2 * p + 1) * threads + s];
+                const bt_share *share = &t->share[((listed ? BT_STRETCHES : 0) + 2 * (p / 2) + 1) * threads + s];
                 assert_int_equal(share->begin, at);
                 at = share->end;
                 int64_t contacts = 0;
                 for (bt_idx i = share->begin; i < share->end; i++) {
-                    contacts += t->cell[t->order[i]].work.n_list;
-                    largest = t->cell[t->order[i]].work.n_list > largest ? t->cell[t->order[i]].work.n_list : largest;
+                    const bt_cell *cell = &t->cell[t->order[i]];
+                    const bt_idx n = listed ? cell->work.n_list : cell->n_contacts;
+                    assert_true(!listed || n > 0);
+                    contacts += n;
+                    largest = n > largest ? n : largest;
                 }
                 least = contacts < least ? contacts : least, most = contacts > most ? contacts : most;
             }
-            assert_int_equal(at, t->start[p + 1]);
+            for (; listed && at < t->start[p / 2 + 1]; at++) assert_int_equal(t->cell[t->order[at]].work.n_list, 0);
+            assert_int_equal(at, t->start[p / 2 + 1]);
             assert_true((double)(most - least) <= 2 * (double)largest + 0.05 * (double)most);
         }
         assert_sound(w, -1);
