@@ -80,8 +80,8 @@ static form form_of(const bt_split_floe *floe)
     return outline;
 }
 
-static const double STEP = 1.3; // ratio of the lengths between which a bound is taken at once
-static const double COARSE = 2;  // the same where it is taken for every floe of every step
+static const double STEP = 1.1;  // ratio of the lengths between which a bound is taken at once, for what a floe bears
+static const double COARSE = 2;  // the same for the loads of a step
 
 /// Of loads: G, |F|, |T| and P.
 typedef struct sums { double size, net, torque, opening; } sums;
@@ -343,7 +343,8 @@ static void search_sections(const search *s)
     // A chord at a third is at least half as long as its parallel through the centroid, which is at two thirds at most:
     // lengths of parallel chords are concave.
     const form *outline = s->form;
-    if (outline->inradius > safe || !major_axis(outline->xx, outline->xy, outline->yy, COMPACT * outline->polar / 2, &x, &y)) return;
+    if (outline->inradius > safe) return;
+    if (!major_axis(outline->xx, outline->xy, outline->yy, COMPACT * outline->polar / 2, &x, &y)) return;
     if (x * floe->outline[0] + y * floe->outline[1] < 0) x = -x, y = -y;
     double low = 0, high = 0;
     for (int i = 0; i < floe->n; i++) {

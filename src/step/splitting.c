@@ -182,7 +182,7 @@ static double peak_of(const bt_world *world, const bt_contact *contact, const bt
 typedef struct {
     double force, peak; ///< normal forces: what persists, and a collision at its peak, N; 0 = none
     double friction;    ///< per normal force
-    double opening[2];  ///< on a and on b: each force of the pair by which the other's vertex opens it, per normal force
+    double opening[2];  ///< of a and of b, by the other's vertex: each force of the pair, per normal force
     int at;             ///< the point that bears most
 } pressing;
 
