@@ -23,11 +23,12 @@
 // width of a convex body is at most its longest chord of any direction.
 //
 // Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
-// and loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here:
-//     |N| ≤ G + |T| √(A/J)/2:   a load pulls at the section by at most itself, less its share of the inertia;
-//         |S1| = |S2|, so each is at most half of ∫ r dA ≤ √(A J).
-//     |M| ≤ (R + e) G + |T| (1 + e √(A/J))/2:   M is that of either part, so at most the mean of both: of loads and F,
-//         (R + e)(G + G)/2; of T/J, (J1 + J2 + 2 |m| |S1|)/2.
+// and loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here. N and M
+// are those of either part, so at most the mean of both:
+//     |N| ≤ (G + |F|)/2 + |T| √(A/J)/2:   of F, |A1 − A2| |F|/(2 A); |S1| = |S2|, so each is at most half of
+//         ∫ r dA ≤ √(A J).
+//     |M| ≤ ((R + e) G + √(J/A + e²) |F| + |T| (1 + e √(A/J)))/2:   of F, ∫ |x − m| dA ≤ √(A (J + A e²)); of T/J,
+//         (J1 + J2 + 2 |m| |S1|)/2.
 // A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the
 // centroid and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a
 // point that is cut off, m the middle of the section and f ≤ l/(2 r) the share of the way from Q to c at which the
@@ -35,7 +36,7 @@
 // If not, m is beside the triangle, of which no more than l/2 is on the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2.
 // So |Q m| ≤ d with d = D l/(2 r). Nothing that is cut off is wider than l, so it has a share s ≤ l d/A of the area,
 // and
-//     |N| ≤ G + s (G + |T| R A/J),   |M| ≤ d (G + s (G + |T| R A/J))
+//     |N| ≤ G + s (|F| + |T| R A/J),   |M| ≤ d (G + s (|F| + |T| R A/J))
 // Pairs add p ≤ 4 P/(h l) at their own end and press on the other.
 // Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises:
 // between two lengths each is taken where it is largest.
@@ -79,49 +80,71 @@ static form form_of(const bt_split_floe *floe)
     return outline;
 }
 
-static const double STEP = 1.3; // ratio of the lengths between which a bound is taken at once
+static const double STEP = 1.1;  // ratio of the lengths between which a bound is taken at once, for what a floe bears
+static const double COARSE = 2;  // the same for the loads of a step
 
-/// Upper bound of stress over strength of sections of these lengths; size G, opening P.
-static double bound_between(const bt_split_floe *floe, const form *outline, double size, double torque, double opening,
-                            const bt_split_law *law, double low, double high)
+/// Of loads: G, |F|, |T| and P.
+typedef struct sums { double size, net, torque, opening; } sums;
+
+static sums sums_of(const bt_load_case *loads)
+{
+    return (sums){loads->size, bt_hypot(loads->fx, loads->fy), fabs(loads->torque), loads->opening};
+}
+
+/// Upper bound of stress over strength of sections of these lengths.
+static double bound_between(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law,
+                            double low, double high)
 {
     const double radius = outline->radius, ratio = outline->area / outline->polar;
     const double off = sqrt(bt_max(0, radius * radius - low * low / 4));
-    double normal = size + torque * sqrt(ratio) / 2;
-    double bending = ((radius + off) * size + torque * (1 + off * sqrt(ratio)) / 2) / low; // M/l
+    double normal = (s->size + s->net + s->torque * sqrt(ratio)) / 2;
+    double bending = ((radius + off) * s->size + sqrt(1 / ratio + off * off) * s->net +
+                      s->torque * (1 + off * sqrt(ratio))) / (2 * low); // M/l
     if (high <= 2 * outline->inradius) {
         const double slope = radius / outline->inradius + 2 * law->slop / low; // d/l
         const double share = bt_min(1, high * high * slope / outline->area);
-        const double part = size + share * (size + torque * radius * ratio);
+        const double part = s->size + share * (s->net + s->torque * radius * ratio);
         normal = bt_min(normal, part);
         bending = bt_min(bending, slope * part);
     }
     const double strength = bt_split_strength(law, low, false), hl = floe->thickness * low;
     double most = (normal + 6 * bending) / (hl * strength);
-    if (opening > 0) most += 4 * opening / (hl * bt_split_strength(law, low, true));
+    if (s->opening > 0) most += 4 * s->opening / (hl * bt_split_strength(law, low, true));
     // b = l of burst is below that; b = A/l is largest at l = D
     const double d = 2 * radius;
-    return bt_max(most, BURST_HELD * size * d / (floe->thickness * outline->area * bt_split_strength(law, d, false))) /
-           floe->factor;
+    return bt_max(most, BURST_HELD * s->size * d /
+                        (floe->thickness * outline->area * bt_split_strength(law, d, false))) / floe->factor;
 }
 
 /// Of all sections of length l and more.
-static double bound(const bt_split_floe *floe, const form *outline, double size, double torque, double opening,
-                    const bt_split_law *law, double l)
+static double bound(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law, double l)
 {
     double most = 0;
     while (l < 2 * outline->inradius) {
         const double high = bt_min(STEP * l, 2 * outline->inradius);
-        most = bt_max(most, bound_between(floe, outline, size, torque, opening, law, l, high));
+        most = bt_max(most, bound_between(floe, outline, s, law, l, high));
         l = high;
     }
-    return bt_max(most, bound_between(floe, outline, size, torque, opening, law, l, INFINITY));
+    return bt_max(most, bound_between(floe, outline, s, law, l, INFINITY));
+}
+
+/// A length from which on no section splits, m.
+static double safe_length(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law)
+{
+    double high = INFINITY, low = bt_max(2 * outline->inradius, law->least_width);
+    while (!(bound_between(floe, outline, s, law, low, high) > 1)) {
+        high = low;
+        if (!(low > law->least_width)) break;
+        low = bt_max(low / COARSE, law->least_width);
+    }
+    return high;
 }
 
 double bt_split_bound(const bt_split_floe *floe, const bt_load_case *loads, const bt_split_law *law, double l)
 {
     const form outline = form_of(floe);
-    return bound(floe, &outline, loads->size, fabs(loads->torque), loads->opening, law, l);
+    const sums s = sums_of(loads);
+    return bound(floe, &outline, &s, law, l);
 }
 
 double bt_split_borne(const bt_split_floe *floe, const bt_split_law *law)
@@ -129,7 +152,8 @@ double bt_split_borne(const bt_split_floe *floe, const bt_split_law *law)
     const form outline = form_of(floe);
     if (!(2 * outline.radius >= law->least_width)) return INFINITY;
     const double l = law->least_width; // the bound is linear in sizes and opening forces
-    return 1 / bt_max(bound(floe, &outline, 1, outline.radius, 0, law, l), bound(floe, &outline, 0, 0, 1, law, l));
+    const sums load = {.size = 1, .net = 1, .torque = outline.radius}, pair = {.opening = 1};
+    return 1 / bt_max(bound(floe, &outline, &load, law, l), bound_between(floe, &outline, &pair, law, l, INFINITY));
 }
 
 /// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
@@ -187,6 +211,8 @@ typedef struct search {
     const bt_split_floe *floe;
     const form *form;
     const bt_load_case *loads;
+    sums sums;
+    double safe;                     ///< m: no section of this length or longer splits
     const bt_split_law *law;
     bt_split *best;
 } search;
@@ -223,8 +249,8 @@ static void consider(const search *s, bt_chord chord, bool from_contact)
     bt_chord_place(s->floe->n, s->floe->outline, chord.b, b);
     const double l = bt_hypot(b[0] - a[0], b[1] - a[1]);
     const bt_load_case *loads = s->loads;
-    if (!(l >= s->law->least_width) || !(l > s->law->slop)) return;
-    if (!(bound_between(s->floe, s->form, loads->size, fabs(loads->torque), loads->opening, s->law, l, l) > 1)) return;
+    if (!(l >= s->law->least_width) || !(l > s->law->slop) || l >= s->safe) return;
+    if (!(bound_between(s->floe, s->form, &s->sums, s->law, l, l) > 1)) return;
     const bt_section section = bt_section_of(s->floe, s->form->area, s->form->polar, loads, &chord, s->law->slop);
     bt_split_mode mode;
     const double ratio = demand(s, &section, &mode);
@@ -294,23 +320,30 @@ static void search_sections(const search *s)
         memmove(chosen + least, chosen + least + 1, (size_t)(n - 1 - least) * sizeof *chosen);
         chosen[n - 1] = k;
     }
+    // Both ends of a section may move to a vertex.
+    const double safe = floe->convex ? s->safe + 2 * s->law->slop : INFINITY;
+    const bool central = !(2 * s->form->inradius > safe); // through the centroid
     double xx = 0, xy = 0, yy = 0, scale = 0;
     for (int i = 0; i < n; i++) {
         const bt_edge_load *edge = &loads->load[chosen[i]];
         consider_from(s, edge->place, edge->load->fx, edge->load->fy);
-        consider_from(s, edge->place, -edge->x, -edge->y);
+        if (central) consider_from(s, edge->place, -edge->x, -edge->y);
         // Both ends of a section are looked at; in an outline that is not convex the way back may be another.
         for (int j = floe->convex ? i + 1 : 0; j < n; j++) {
             const bt_edge_load *other = &loads->load[chosen[j]];
-            if (j != i) consider_from(s, edge->place, other->x - edge->x, other->y - edge->y);
+            const double dx = other->x - edge->x, dy = other->y - edge->y;
+            if (j != i && !(dx * dx + dy * dy > safe * safe)) consider_from(s, edge->place, dx, dy);
         }
         xx += edge->x * edge->load->fx, yy += edge->y * edge->load->fy;
         xy += (edge->x * edge->load->fy + edge->y * edge->load->fx) / 2;
         scale += s->form->radius * (fabs(edge->load->fx) + fabs(edge->load->fy));
     }
     double x, y;
-    if (major_axis(xx, xy, yy, EQUAL * scale, &x, &y)) consider_through(s, 0, 0, -y, x);
+    if (central && major_axis(xx, xy, yy, EQUAL * scale, &x, &y)) consider_through(s, 0, 0, -y, x);
+    // A chord at a third is at least half as long as its parallel through the centroid, which is at two thirds at most:
+    // lengths of parallel chords are concave.
     const form *outline = s->form;
+    if (outline->inradius > safe) return;
     if (!major_axis(outline->xx, outline->xy, outline->yy, COMPACT * outline->polar / 2, &x, &y)) return;
     if (x * floe->outline[0] + y * floe->outline[1] < 0) x = -x, y = -y;
     double low = 0, high = 0;
@@ -345,9 +378,9 @@ bool bt_split_find(const bt_split_floe *floe, bt_floe_load *load, int n_loads, c
     for (int k = -1; k < n_loads; k++) {
         if (k >= 0 && !load[k].collision) continue;
         const bt_load_case loads = bt_load_case_of(on_edge, n_loads, k);
-        if (!(bound(floe, &outline, loads.size, fabs(loads.torque), loads.opening, law, law->least_width) > 1))
-            continue;
-        search_sections(&(search){floe, &outline, &loads, law, best});
+        const sums s = sums_of(&loads);
+        const double safe = safe_length(floe, &outline, &s, law);
+        if (safe > law->least_width) search_sections(&(search){floe, &outline, &loads, s, safe, law, best});
     }
     if (on_edge != few) free(on_edge);
     return best->ratio > 0;

@@ -34,7 +34,7 @@ bt_chord_end bt_chord_nearest(int n, const double *v, double x, double y, double
     for (int i = 0; i < n; i++) {
         const double *a = v + 2 * i, *b = v + 2 * (i + 1 < n ? i + 1 : 0);
         const double ex = b[0] - a[0], ey = b[1] - a[1], l2 = ex * ex + ey * ey;
-        const double t = l2 > 0 ? bt_min(1, bt_max(0, ((x - a[0]) * ex + (y - a[1]) * ey) / l2)) : 0;
+        const double along = (x - a[0]) * ex + (y - a[1]) * ey, t = along <= 0 ? 0 : along < l2 ? along / l2 : 1;
         const double dx = x - a[0] - t * ex, dy = y - a[1] - t * ey, d2 = dx * dx + dy * dy;
         if (d2 < least) least = d2, edge = i, share = t;
     }

@@ -130,7 +130,6 @@ static bt_split_floe floe_of(const bt_world *world, bt_idx i)
 typedef struct {
     double ran, rbn;    ///< ra×n, rb×n of the centre, m
     double length;      ///< m
-    int at;             ///< the point that bears most
 } centre;
 
 /// Is contact j the edge of floes that have rafted (contact/raft.h)?
@@ -146,8 +145,7 @@ static centre centre_of(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
     const double total = contact->ln[0] + contact->ln[1], s0 = contact->ln[0] / total, s1 = contact->ln[1] / total;
-    centre c = {.ran = s0 * contact->ran[0] + s1 * contact->ran[1], .rbn = s0 * contact->rbn[0] + s1 * contact->rbn[1],
-                .at = s1 > s0};
+    centre c = {.ran = s0 * contact->ran[0] + s1 * contact->ran[1], .rbn = s0 * contact->rbn[0] + s1 * contact->rbn[1]};
     if (contact->n > 1)
         c.length = (2 * bt_min(s0, s1) + is_raft_edge(world, cell, j)) * fabs(contact->ran[1] - contact->ran[0]);
     const bt_bodies *bodies = &world->bodies;
@@ -163,16 +161,6 @@ static bool gives_way(const bt_world *world, int law, const bt_contact *contact)
 }
 
 #define WEDGE (BT_PI / 3) // half angle from which on the thrust of a wedge closes the crack that it would open
-
-/// A sharp vertex of another body that goes into the floe opens it by a pair of forces along the edge: each of them per
-/// normal force, 0 = none. A rigid vertex does not go in.
-static double wedge_of(const bt_world *world, const bt_contact *contact, const bt_contact_corner *corner, bool of_b)
-{
-    if (corner->of != (of_b ? 0 : 1)) return 0; // the vertex is not of the other body
-    if (!gives_way(world, BT_LAW_CRUSHING, contact) && !gives_way(world, BT_LAW_RAFTING, contact)) return 0;
-    const double wedge = bt_split_wedge(0.5 * corner->angle, contact->mu);
-    return 0.5 * corner->angle < WEDGE && wedge > 0 ? 1 / wedge : 0;
-}
 
 static bool is_collision(const bt_world *world, const bt_collision *collision)
 {
@@ -190,54 +178,57 @@ static double peak_of(const bt_world *world, const bt_contact *contact, const bt
     return impact.peak;
 }
 
-/// The loads that contact j puts on the floe on its side a or b: what persists, and a collision at its peak.
-static void add_side(const bt_world *world, const bt_cell *cell, bt_idx j, const centre *c,
-                     const bt_collision *collision, bool of_b, load_list *to)
+/// Sizes of the loads of a contact with a normal impulse.
+typedef struct {
+    double force, peak; ///< normal forces: what persists, and a collision at its peak, N; 0 = none
+    double friction;    ///< per normal force
+    double opening[2];  ///< of a and of b, by the other's vertex: each force of the pair, per normal force
+    int at;             ///< the point that bears most
+} pressing;
+
+/// A sharp vertex of another body that goes into a floe opens it by a pair of forces along the edge. A rigid vertex
+/// does not go in.
+static pressing pressing_of(const bt_world *world, const bt_cell *cell, bt_idx j)
+{
+    const bt_contact *contact = &cell->contacts[j];
+    const double total = contact->ln[0] + contact->ln[1];
+    const bt_collision collision = bt_contact_collision(world, contact);
+    const bool hit = is_collision(world, &collision);
+    pressing p = {.friction = contact->lt / total, .at = contact->ln[1] / total > contact->ln[0] / total};
+    const bool one = contact->n == 1 || contact->ln[1 - p.at] == 0,
+               sharp = one && !is_raft_edge(world, cell, j) && (gives_way(world, BT_LAW_CRUSHING, contact) ||
+                                                                gives_way(world, BT_LAW_RAFTING, contact));
+    if (sharp || hit) {
+        const bt_contact_corner corner = bt_contact_corner_of(
+            &world->bodies, contact, cell->search.pairs[contact->pair].part, cell->gaps[j].feature[p.at]);
+        const double half = 0.5 * corner.angle, wedge = half < WEDGE ? bt_split_wedge(half, contact->mu) : 0;
+        if (sharp && corner.of >= 0 && wedge > 0) p.opening[1 - corner.of] = 1 / wedge;
+        if (hit) p.peak = peak_of(world, contact, &collision, corner.angle);
+    }
+    p.force = bt_max(0, (hit ? total - collision.impulse : total) / world->par.dt);
+    return p;
+}
+
+/// The loads of contact j on the floe on its side a or b.
+static void add_side(const bt_world *world, const bt_cell *cell, bt_idx j, const pressing *p, const centre *c,
+                     bool of_b, load_list *to)
 {
     const bt_bodies *bodies = &world->bodies;
     const bt_contact *contact = &cell->contacts[j];
     const bt_idx i = of_b ? contact->b : contact->a, other = of_b ? contact->a : contact->b;
     const uint16_t *part = cell->search.pairs[contact->pair].part;
-    const double total = contact->ln[0] + contact->ln[1], along = of_b ? contact->rbt : contact->rat,
-                 across = of_b ? c->rbn : c->ran;
-    const double nx = contact->nx, ny = contact->ny, rho = contact->lt / total;
-    const bt_contact_corner corner =
-        bt_contact_corner_of(bodies, contact, part, cell->gaps[j].feature[c->at]);
-    const bool sharp = !is_raft_edge(world, cell, j) && (contact->n == 1 || contact->ln[1 - c->at] == 0);
-    load_row row = {
-        .floe = bodies->gid[i],
-        .load = {.x = along * nx + across * ny, .y = along * ny - across * nx, .edge_x = -ny, .edge_y = nx,
-                 .length = c->length, .other = bodies->gid[other], .part = part[0] << 16 | part[1], .point = c->at},
-    };
-    const double sign = of_b ? 1 : -1, fx = sign * (nx - rho * ny), fy = sign * (ny + rho * nx);
-    const double open = sharp ? wedge_of(world, contact, &corner, of_b) : 0;
-    double impulse = total;
-    if (is_collision(world, collision)) {
-        const double peak = peak_of(world, contact, collision, corner.angle);
-        load_row hit = row;
-        hit.load.fx = peak * fx, hit.load.fy = peak * fy, hit.load.opening = peak * open;
-        hit.load.collision = true;
-        add(to, &hit);
-        impulse -= collision->impulse;
+    const double along = of_b ? contact->rbt : contact->rat, across = of_b ? c->rbn : c->ran;
+    const double nx = contact->nx, ny = contact->ny, sign = of_b ? 1 : -1;
+    const double fx = sign * (nx - p->friction * ny), fy = sign * (ny + p->friction * nx);
+    for (int collision = 1; collision >= 0; collision--) {
+        const double force = collision ? p->peak : p->force;
+        if (!(force > 0)) continue;
+        const bt_floe_load load = {
+            .x = along * nx + across * ny, .y = along * ny - across * nx, .fx = force * fx, .fy = force * fy,
+            .edge_x = -ny, .edge_y = nx, .length = c->length, .opening = force * p->opening[of_b],
+            .other = bodies->gid[other], .part = part[0] << 16 | part[1], .point = p->at, .collision = collision};
+        add(to, &(load_row){bodies->gid[i], load});
     }
-    const double force = impulse / world->par.dt;
-    if (!(force > 0)) return;
-    row.load.fx = force * fx, row.load.fy = force * fy, row.load.opening = force * open;
-    add(to, &row);
-}
-
-/// Upper bound of the forces that a contact puts on a floe, opening ones with them, N. A wedge opens no more than one
-/// without an angle would, 1/(2 μ) of the normal force.
-static double most_of(const bt_world *world, const bt_contact *contact)
-{
-    const double total = contact->ln[0] + contact->ln[1];
-    const bt_collision collision = bt_contact_collision(world, contact);
-    double force = total / world->par.dt;
-    if (is_collision(world, &collision))
-        force += world->splitting->rule.real_corner ? INFINITY : peak_of(world, contact, &collision, NAN);
-    const bool pair = (contact->n == 1 || contact->ln[0] == 0 || contact->ln[1] == 0) &&
-                      (bt_law_on(&world->par, BT_LAW_CRUSHING) || bt_law_on(&world->par, BT_LAW_RAFTING));
-    return force * (1 + fabs(contact->lt) / total + (pair ? 1 / (2 * contact->mu) : 0));
 }
 
 /// What is done with the contacts of a cell.
@@ -247,6 +238,18 @@ typedef enum {
 } pass;
 
 static bool is_mine(const bt_world *world, bt_idx i) { return !world->domain || bt_domain_owns(world, i); }
+
+/// In the second pass only floes that may split by the sum of their loads.
+static bool is_looked_at(const bt_world *world, bt_idx i, pass what)
+{
+    return what == SUM || (is_mine(world, i) && world->splitting->sum[i] > 0);
+}
+
+/// Of the loads of a contact on its side a or b, with their opening forces, N.
+static double size_on(const pressing *p, bool of_b)
+{
+    return (p->force + p->peak) * (sqrt(1 + p->friction * p->friction) + p->opening[of_b]);
+}
 
 /// For body i of a contact: is its load to be listed? In the first pass `most`, N, is added where it is not.
 static bool is_listed(bt_world *world, bt_idx i, pass what, double most)
@@ -270,14 +273,16 @@ static void add_cell(bt_world *world, const bt_cell *cell, pass what, load_list 
             continue;
         }
         if (!(contact->ln[0] + contact->ln[1] > 0)) continue;
-        const double most = what == SUM ? most_of(world, contact) : 0;
-        const bool a = may_split(world, contact->a) && is_listed(world, contact->a, what, most),
-                   of_b = may_split(world, contact->b) && is_listed(world, contact->b, what, most);
-        if (!a && !of_b) continue;
+        const bool a = may_split(world, contact->a) && is_looked_at(world, contact->a, what),
+                   b = may_split(world, contact->b) && is_looked_at(world, contact->b, what);
+        if (!a && !b) continue;
+        const pressing p = pressing_of(world, cell, j);
+        const bool list_a = a && is_listed(world, contact->a, what, size_on(&p, false)),
+                   list_b = b && is_listed(world, contact->b, what, size_on(&p, true));
+        if (!list_a && !list_b) continue;
         const centre c = centre_of(world, cell, j);
-        const bt_collision collision = bt_contact_collision(world, contact);
-        if (a) add_side(world, cell, j, &c, &collision, false, to);
-        if (of_b) add_side(world, cell, j, &c, &collision, true, to);
+        if (list_a) add_side(world, cell, j, &p, &c, false, to);
+        if (list_b) add_side(world, cell, j, &p, &c, true, to);
     }
     for (bt_idx k = 0; k < cell->laws.n_memory; k++) {
         const bt_memory *memory = &cell->laws.memory[k];
@@ -430,7 +435,7 @@ static bt_idx by_floe(const bt_world *world, load_list *list, bt_idx **floe, siz
         if (count[i + 1] > 0) (*floe)[n] = i, (*first)[++n] = count[i] + count[i + 1];
         count[i + 1] += count[i];
     }
-    load_row *sorted = bt_alloc(list->n, sizeof *sorted);
+    load_row *sorted = bt_realloc(NULL, list->n, sizeof *sorted);
     for (size_t k = 0; k < list->n; k++) sorted[count[bt_world_index(world, list->row[k].floe)]++] = list->row[k];
     free(count);
     free(list->row);
