@@ -233,6 +233,7 @@ MUTANTS = {
          "cli/test_locked.py::test_friction_proves_nothing_of_loads_that_the_sweeps_have_not_come_to",
          "cli/test_locked.py::test_a_lock_below_the_tolerance_is_none_beside_a_jam_either",
          "cli/test_locked.py::test_a_jam_with_room_is_never_locked"], [
+        ("    drop_islands_without_loads(world, islands, &l);\n", "", "rounding proves a lock"),
         ("bodies->inv[contact->a].m == 0 || bodies->inv[contact->b].m == 0 || ", "", "a wall makes one island of all"),
         ("islands->root[islands_root(islands, contact->b)] = islands_root(islands, contact->a);", "",
          "every floe an island"),

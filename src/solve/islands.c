@@ -255,6 +255,20 @@ static void drop_islands_not_closing(bt_world *world, bt_islands *islands, const
     drop_islands_below(world, islands, world->par.tolerance);
 }
 
+/// Strike out islands of which rounding alone is left: no loads of theirs balance.
+static void drop_islands_without_loads(bt_world *world, bt_islands *islands, const loads *found)
+{
+    bt_islands_clear(world, islands);
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
+        const bt_contact *contact = &found->contact[i].u;
+        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
+                   contact->ln[0] + contact->ln[1] - BT_LOCKED_ROUNDING * found->contact[i].at_first);
+    }
+    bt_islands_add(world, islands);
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (!(bt_sum_value(&islands->sum[i]) > 0)) islands->share[i] = 0;
+}
+
 /// Strike out islands whose loads are not those that the sweeps have come to.
 static void drop_islands_moved(bt_world *world, bt_islands *islands, const loads *found)
 {
@@ -317,6 +331,7 @@ static bt_lock by_balance(bt_world *world, bt_islands *islands, const loads *fou
     balance(world, &l);
     mark(world, islands, &l, held ? BT_LOCKED_HELD_SPEEDS : BT_LOCKED_SPEEDS);
     drop_islands_not_closing(world, islands, &l);
+    drop_islands_without_loads(world, islands, &l);
     if (held) drop_islands_moved(world, islands, &l);
     free(l.contact);
     return marked(world, islands, found);

@@ -86,6 +86,8 @@ void bt_islands_add(const bt_world *world, bt_islands *islands);
 #define BT_LOCKED_STICKS 0.95
 /// Of the normal impulses: by so much may balanced loads differ from those that the sweeps have come to, assumed.
 #define BT_LOCKED_OTHER 0.1
+/// Of the normal impulses that the sweeps have come to: balanced loads below are rounding.
+#define BT_LOCKED_ROUNDING 1e-9
 /// Sweeps that balance the loads at most, and the change of speed, over the closing speed, that ends them.
 #define BT_LOCKED_SWEEPS 400
 #define BT_LOCKED_AT_REST 1e-12

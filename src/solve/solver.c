@@ -158,6 +158,7 @@ static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_to
     bt_vel *v = world->bodies.vel;
     const bt_inv *inv = world->bodies.inv;
     if (warm) start_impulses(cell, inv);
+    if (world->par.plain_sweeps) bt_batch_unpack(cell); // contact by contact, as fields have been made ever since
     if (cell->work.packed) bt_batch_apply(cell, v);
     for (bt_idx i = 0; !cell->work.packed && i < cell->n_contacts; i++) {
         const bt_contact *contact = &cell->contacts[i];
@@ -216,6 +217,7 @@ static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_
     const bt_problem *problem = context;
     bt_cell *cell = &world->cells->cell[k];
     const bt_vel *v = world->bodies.vel;
+    if (problem->plain) bt_batch_unpack(cell);
     bt_found found = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, world->bodies.inv, problem)
                                            : residual_in_place(cell, v, problem);
     const bt_tow *line = line_of(world, k);

@@ -856,7 +856,7 @@ POINT = {"type": "Point", "coordinates": [10, 80]}
 BAD = {
     "no such file": (lambda p: p / "none.shp", (), "no such file"),
     "nothing in it": (lambda p: write(p / "map.geojson", []), (), "holds no features"),
-    "points": (lambda p: write(p / "map.geojson", [POINT, POINT]), (), "holds no polygons (2 features"),
+    "points": (lambda p: write(p / "map.geojson", [POINT, POINT]), (), "holds no polygons (2 of its features"),
     "no map": (lambda p: text(p / "map.gpkg", "hello"), (), "no map that GDAL can read"),
     "a word for a number": (lambda p: text(p / "map.geojson", json.dumps({"type": "FeatureCollection", "features": [
         {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [

@@ -16,8 +16,8 @@ SPEED = {
     "run": {"dt": 0.125, "duration": 70},
     "domain": {"length": 26, "width": 18, "ends": "moving", "sides": "periodic"},
     "ice": {
-        "concentration": 0.45, "size": 1, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal",
-        "restitution": 0.1
+        "concentration": 0.45, "seed": 2, "size": 1, "size_law": "lognormal", "thickness": 0.04,
+        "thickness_law": "lognormal", "restitution": 0.1
     },
     "body": {"length": 2, "draft": 0.5},
     "tow": {"speed": 0.8, "ramp": 1},
