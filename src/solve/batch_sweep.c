@@ -212,7 +212,7 @@ typedef struct {
 typedef struct {
     const bt_sweep *sweep;
     int times;            // passes at most
-    double calm;          // an update after which a batch rests, m/s, or m of the projection
+    double calm;          // largest update after which a batch rests, m/s; m in the projection
     moved *y;             // [n_batches]
     bt_rest *rests;       // [n_batches]
     bt_idx *due, *again;  // [n_batches] of the first pass; of the next

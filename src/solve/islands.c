@@ -255,7 +255,7 @@ static void drop_islands_not_closing(bt_world *world, bt_islands *islands, const
     drop_islands_below(world, islands, world->par.tolerance);
 }
 
-/// Strike out islands of which rounding alone is left: no loads of theirs balance.
+/// Strike out islands whose balanced loads are no more than rounding errors: they prove nothing.
 static void drop_islands_without_loads(bt_world *world, bt_islands *islands, const loads *found)
 {
     bt_islands_clear(world, islands);

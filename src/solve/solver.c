@@ -158,7 +158,7 @@ static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_to
     bt_vel *v = world->bodies.vel;
     const bt_inv *inv = world->bodies.inv;
     if (warm) start_impulses(cell, inv);
-    if (world->par.plain_sweeps) bt_batch_unpack(cell); // contact by contact, as fields have been made ever since
+    if (world->par.plain_sweeps) bt_batch_unpack(cell); // contact by contact: keeps the bits of fields
     if (cell->work.packed) bt_batch_apply(cell, v);
     for (bt_idx i = 0; !cell->work.packed && i < cell->n_contacts; i++) {
         const bt_contact *contact = &cell->contacts[i];
