@@ -34,8 +34,8 @@ typedef struct scratch {
     size_t n, cap;
     double *number;
     size_t n_numbers, cap_numbers;
-    struct quarter *quarter;
-    size_t cap_quarters;
+    struct candidate *candidate;
+    size_t n_candidates, cap_candidates;
 } scratch;
 
 /// A copy of a floe, by its cell.
@@ -372,20 +372,17 @@ static double skin(const bt_world *world, bt_idx i, scratch *room)
 
 // --- who is near -----------------------------------------------------------------------------------------------------
 
-/// Floes of one cell, held here or copies, and the box about them from the middle of the cell that is looked at, m.
-typedef struct quarter {
+/// A floe in the cells about the one that is looked at, and the box about it from the middle of that cell, m.
+typedef struct candidate {
     const bt_bodies *b;
-    const placed *copy; ///< [first, end); NULL = bodies [first, end)
-    bt_idx first, end;
+    bt_idx i;
     double low[2], high[2];
-} quarter;
+} candidate;
 
 /// Where obstacles of floe i may stand: from its centroid, m.
 typedef struct region {
     double low[2], high[2];
 } region;
-
-static bt_idx floe_of(const quarter *q, bt_idx k) { return q->copy ? q->copy[k].i : k; }
 
 static double offset(const bt_world *world, const bt_pose *pose, const double from[2], int axis)
 {
@@ -400,15 +397,13 @@ static bool misses(const region *r, const double at[2], const double low[2], con
            high[1] < at[1] + r->low[1];
 }
 
-static void consider(const bt_world *world, bt_idx i, const region *r, const bt_bodies *bodies, bt_idx j, scratch *room)
+static void consider(const bt_world *world, bt_idx i, const bt_bodies *bodies, bt_idx j, scratch *room)
 {
-    const double h = bodies->thickness[j], size = bodies->radius[j],
-                 reach = world->bodies.radius[i] + size + lee_reach(&world->par) * h,
+    const double h = bodies->thickness[j],
+                 reach = world->bodies.radius[i] + bodies->radius[j] + lee_reach(&world->par) * h,
                  from[2] = {world->bodies.pose[i].x, world->bodies.pose[i].y},
                  d[2] = {offset(world, &bodies->pose[j], from, 0), offset(world, &bodies->pose[j], from, 1)};
     if (d[0] * d[0] + d[1] * d[1] >= reach * reach || !(h > 0) || bodies->gid[j] == world->bodies.gid[i]) return;
-    const double low[2] = {d[0] - size, d[1] - size}, high[2] = {d[0] + size, d[1] + size};
-    if (misses(r, (const double[]){0, 0}, low, high)) return;
     BT_MAKE_ROOM(room->near, room->n, room->cap, 32);
     room->near[room->n++] = (neighbour){bodies, j, d[0], d[1]};
 }
@@ -441,9 +436,22 @@ static void find_copies(const surroundings *around, int32_t x, int32_t y, bt_idx
     for (*first = *end = low; *end < around->copies.n && !by_cell(&copy[*end], &at);) ++*end;
 }
 
-/// The quarters about cell k, of which [0, n) are returned; about its middle.
-static size_t quarters(const bt_world *world, const surroundings *around, bt_idx k, const double middle[2],
-                       scratch *room)
+static void add_candidate(const bt_world *world, const bt_bodies *bodies, bt_idx i, const double middle[2],
+                          const bool round[2], scratch *room)
+{
+    candidate new = {.b = bodies, .i = i};
+    for (int axis = 0; axis < 2; axis++) {
+        const double d = round[axis] ? 0 : offset(world, &bodies->pose[i], middle, axis),
+                     size = round[axis] ? INFINITY : bodies->radius[i];
+        new.low[axis] = d - size, new.high[axis] = d + size;
+    }
+    BT_MAKE_ROOM(room->candidate, room->n_candidates, room->cap_candidates, 64);
+    room->candidate[room->n_candidates++] = new;
+}
+
+/// Lists the floes in the cells about cell k, held here or copies.
+static void list_candidates(const bt_world *world, const surroundings *around, bt_idx k, const double middle[2],
+                            scratch *room)
 {
     const bt_cells *cells = world->cells;
     const bt_cell *cell = &cells->cell[k];
@@ -451,38 +459,17 @@ static size_t quarters(const bt_world *world, const surroundings *around, bt_idx
     const int32_t n_x = span(cell->x, around->rings[0], cells->wrap_x, &from[0]),
                   n_y = span(cell->y, around->rings[1], cells->wrap_y, &from[1]);
     const bool round[2] = {n_x == cells->wrap_x, n_y == cells->wrap_y}; // no box goes all around a period
-    size_t n = 0;
-    if (room->cap_quarters < 2 * (size_t)n_x * (size_t)n_y) {
-        room->cap_quarters = 2 * (size_t)n_x * (size_t)n_y;
-        room->quarter = bt_realloc(room->quarter, room->cap_quarters, sizeof *room->quarter);
-    }
     for (int32_t c = 0; c < n_x * n_y; c++) {
         int32_t x = from[0] + c % n_x, y = from[1] + c / n_x;
         if (cells->wrap_x) x = bt_cells_wrapped(x, cells->wrap_x);
         if (cells->wrap_y) y = bt_cells_wrapped(y, cells->wrap_y);
         const bt_idx held = bt_cells_at(cells, x, y);
-        quarter q = {.b = &world->bodies};
-        if (held >= 0) q.first = cells->cell[held].first, q.end = cells->cell[held].end;
-        for (int copies = 0; copies < 2; copies++) {
-            if (copies) {
-                q.b = &around->copies, q.copy = around->sorted;
-                find_copies(around, x, y, &q.first, &q.end);
-            }
-            if (q.first == q.end) continue;
-            for (int axis = 0; axis < 2; axis++) q.low[axis] = INFINITY, q.high[axis] = -INFINITY;
-            for (bt_idx j = q.first; j < q.end; j++) {
-                const bt_idx i = floe_of(&q, j);
-                for (int axis = 0; axis < 2; axis++) {
-                    const double d = round[axis] ? 0 : offset(world, &q.b->pose[i], middle, axis),
-                                 size = round[axis] ? INFINITY : q.b->radius[i];
-                    q.low[axis] = bt_min(q.low[axis], d - size);
-                    q.high[axis] = bt_max(q.high[axis], d + size);
-                }
-            }
-            room->quarter[n++] = q;
-        }
+        bt_idx copy, end;
+        find_copies(around, x, y, &copy, &end);
+        for (bt_idx j = held < 0 ? 0 : cells->cell[held].first; held >= 0 && j < cells->cell[held].end; j++)
+            add_candidate(world, &world->bodies, j, middle, round, room);
+        for (; copy < end; copy++) add_candidate(world, &around->copies, around->sorted[copy].i, middle, round, room);
     }
-    return n;
 }
 
 /// Where fluids that flow past floe i at v may come from: the circle about it, drawn out upstream by the farthest lee.
@@ -501,23 +488,21 @@ static region upstream(const bt_world *world, bt_idx i, const double v[2][2])
     return of;
 }
 
-/// All floes that may shelter or cover floe i of a cell with n quarters about its middle.
+/// All floes that may shelter or cover floe i of a cell, whose candidates are listed about its middle.
 static void gather(const bt_world *world, const surroundings *around, bt_idx i, const double v[2][2],
-                   const double middle[2], size_t n, scratch *room)
+                   const double middle[2], scratch *room)
 {
     const bt_cells *cells = world->cells;
     const bt_bodies *bodies = &world->bodies;
-    const region r = upstream(world, i, v);
     room->n = 0;
-    for (bt_idx j = bodies->large[i] ? 0 : cells->n_in_cells; j < bodies->n; j++)
-        consider(world, i, &r, bodies, j, room);
-    for (bt_idx j = 0; bodies->large[i] && j < around->copies.n; j++) consider(world, i, &r, &around->copies, j, room);
+    for (bt_idx j = bodies->large[i] ? 0 : cells->n_in_cells; j < bodies->n; j++) consider(world, i, bodies, j, room);
+    for (bt_idx j = 0; bodies->large[i] && j < around->copies.n; j++) consider(world, i, &around->copies, j, room);
     if (bodies->large[i]) return;
+    const region r = upstream(world, i, v);
     const double at[2] = {offset(world, &bodies->pose[i], middle, 0), offset(world, &bodies->pose[i], middle, 1)};
-    for (size_t k = 0; k < n; k++) {
-        const quarter *q = &room->quarter[k];
-        if (misses(&r, at, q->low, q->high)) continue;
-        for (bt_idx j = q->first; j < q->end; j++) consider(world, i, &r, q->b, floe_of(q, j), room);
+    for (size_t k = 0; k < room->n_candidates; k++) {
+        const candidate *c = &room->candidate[k];
+        if (!misses(&r, at, c->low, c->high)) consider(world, i, c->b, c->i, room);
     }
 }
 
@@ -562,17 +547,18 @@ static void look_cell(bt_world *world, bt_idx k, const void *around, bt_totals *
     if (cells->asleep[k] == BT_ASLEEP) return;
     const double middle[2] = {cells->x0 + (cell->x + 0.5) * cells->side_x, cells->y0 + (cell->y + 0.5) * cells->side_y};
     scratch room = {0};
-    size_t n = 0;
+    bool listed = k == cells->n - 1; // bodies of the last cell look at all others
     for (bt_idx i = cell->first; i < cell->end; i++) {
         double v[2][2];
         if (!flows(world, i, v)) continue;
-        if (n == 0 && k < cells->n - 1) n = quarters(world, around, k, middle, &room);
-        gather(world, around, i, (const double(*)[2])v, middle, n, &room);
+        if (!listed) list_candidates(world, around, k, middle, &room);
+        listed = true;
+        gather(world, around, i, (const double(*)[2])v, middle, &room);
         look_at(world, i, (const double(*)[2])v, &room);
     }
     free(room.near);
     free(room.number);
-    free(room.quarter);
+    free(room.candidate);
 }
 
 /// Rings of cells that the floes near one of the middle cell stand in.
