@@ -69,6 +69,7 @@ static inline const char *bt_plural(int64_t n)
 void *bt_alloc(size_t n, size_t size);             ///< zeroed
 void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size
 void *bt_alloc_aligned(size_t n, size_t size);     ///< zeroed, 64-byte aligned, release with free()
+void *bt_alloc_unset(size_t n, size_t size);       ///< the same, not zeroed
 
 /// Called before memory that has run out ends the program, with a message on stderr otherwise: for a program that
 /// wants to say so itself, or to save what is its own. It cannot be averted: report must not call this library.

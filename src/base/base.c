@@ -54,13 +54,14 @@ void *bt_realloc(void *p, size_t n, size_t size)
     return q;
 }
 
-void *bt_alloc_aligned(size_t n, size_t size)
+void *bt_alloc_unset(size_t n, size_t size)
 {
-    size_t total = (bytes_of(n, size) + 63) & ~(size_t)63;
-    void *p = aligned_alloc(64, total);
+    void *p = aligned_alloc(64, (bytes_of(n, size) + 63) & ~(size_t)63);
     if (!p) out_of_memory(n, size);
-    return memset(p, 0, total);
+    return p;
 }
+
+void *bt_alloc_aligned(size_t n, size_t size) { return memset(bt_alloc_unset(n, size), 0, bytes_of(n, size)); }
 
 void *bt_point_begin(void)
 {

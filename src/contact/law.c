@@ -82,8 +82,8 @@ void bt_laws_reserve(bt_cell *cell)
     cell->laws.cap_limits = bt_cells_room(cell->n_contacts);
     free(cell->laws.limits);
     free(cell->laws.rises);
-    cell->laws.limits = bt_alloc_aligned((size_t)cell->laws.cap_limits, sizeof *cell->laws.limits);
-    cell->laws.rises = cell->laws.rising ? bt_alloc_aligned((size_t)cell->laws.cap_limits, sizeof *cell->laws.rises)
+    cell->laws.limits = bt_alloc_unset((size_t)cell->laws.cap_limits, sizeof *cell->laws.limits);
+    cell->laws.rises = cell->laws.rising ? bt_alloc_unset((size_t)cell->laws.cap_limits, sizeof *cell->laws.rises)
                                          : NULL;
 }
 

@@ -228,7 +228,7 @@ void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch)
     if ((bt_idx)scratch->n > cell->cap_contacts) {
         cell->cap_contacts = bt_cells_room((bt_idx)scratch->n);
         free(cell->gaps);
-        cell->gaps = bt_alloc_aligned((size_t)cell->cap_contacts, sizeof *cell->gaps);
+        cell->gaps = bt_alloc_unset((size_t)cell->cap_contacts, sizeof *cell->gaps);
     }
     cell->n_contacts = (bt_idx)scratch->n;
     cell->n_points = 0;

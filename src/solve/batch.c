@@ -12,15 +12,6 @@
 
 enum { OPEN = 8 }; // batches that wait for more contacts, when a cell is packed
 
-/// The projection has two unknowns and no friction, and keeps what it has no use for in the place of what it does not
-/// use.
-#define KEPT_BIAS_0 w12
-#define KEPT_BIAS_1 per_det
-#define KEPT_MU wt
-#define KEPT_LT mt
-#define KEPT_LN_0 x[2]
-#define KEPT_LN_1 before[2]
-
 static bt_batch_bounds *bounds_of(const bt_cell *cell)
 {
     return (bt_batch_bounds *)(cell->work.batch + cell->work.n_batches);
@@ -52,8 +43,6 @@ bool bt_batch_is_for(const bt_cell *cell)
     return !(cell->laws.limits && cell->laws.rising) && cell->phase != BT_COLOURS;
 }
 
-bool bt_batch_projects(const bt_cell *cell) { return cell->phase != BT_COLOURS; }
-
 size_t bt_batch_bytes(const bt_cell *cell)
 {
     const size_t own = bt_batch_is_for(cell) ? batch_bytes(cell) / BT_LANES
@@ -63,11 +52,15 @@ size_t bt_batch_bytes(const bt_cell *cell)
 
 // --- packing ---------------------------------------------------------------------------------------------------------
 
-void bt_batch_begin(bt_cell *cell) { cell->work.n_last = 0; }
-
-static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *contact, bool projection)
+void bt_batch_begin(bt_cell *cell)
 {
-    if (projection) return BT_BATCH_PROJECTION;
+    cell->work.packed = false;
+    cell->work.batch = NULL;
+    cell->work.n_batches = cell->work.n_last = 0;
+}
+
+static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *contact)
+{
     return !cell->laws.limits ? BT_BATCH_RIGID : contact->n > 0 ? BT_BATCH_BOUNDED : BT_BATCH_SHEETS;
 }
 
@@ -95,7 +88,7 @@ static void begin_packing(packing *pack, const bt_cell *cell)
 {
     const size_t n = (size_t)cell->n_contacts, n_list = (size_t)cell->work.n_list;
     const bool few = n <= BT_FEW;
-    pack->place = n_list > BT_FEW ? bt_alloc_aligned(n_list, sizeof *pack->place) : pack->few_places;
+    pack->place = n_list > BT_FEW ? bt_alloc_unset(n_list, sizeof *pack->place) : pack->few_places;
     pack->of = few ? pack->few_unknowns : bt_realloc(NULL, n, sizeof *pack->of);
     pack->u = few ? pack->few_records : bt_realloc(NULL, n, sizeof *pack->u);
     pack->listed = few ? pack->few_listed : bt_realloc(NULL, n, sizeof *pack->listed);
@@ -122,14 +115,14 @@ BT_INLINE bool fits(const place *slot, bt_batch_kind kind, bt_idx a, bt_idx b)
 /// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
 /// bodies that can be moved. Those that filled up leave the window. Returns the number of batches.
 BT_FOR_EACH_CPU
-static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv *inv, bool projection, place *o)
+static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv *inv, place *o)
 {
     bt_idx open[OPEN], n_batches = 0;
     int n_open = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
         const bt_contact *contact = &contacts[i];
-        const bt_batch_kind kind = kind_of(cell, contact, projection);
+        const bt_batch_kind kind = kind_of(cell, contact);
         const bt_idx a = inv[contact->a].m > 0 ? contact->a : FIXED, b = inv[contact->b].m > 0 ? contact->b : FIXED;
         int k = 0;
         while (k < n_open && !fits(&o[open[k]], kind, a, b)) k++;
@@ -148,34 +141,16 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
     return n_batches;
 }
 
-/// What the last list hands on to the next one. A contact that was not in it has not been moved since; it has no
-/// multiplier.
-static void take_unknowns(const bt_cell *cell, bool projection, packing *pack)
+/// What the last list hands on to the next one. A contact that was not in it has not been moved since.
+static void take_unknowns(const bt_cell *cell, packing *pack)
 {
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx i = cell->work.list[j];
         const bt_contact *contact = &pack->u[i];
-        pack->of[i] = projection ? (bt_unknowns){0}
-                                 : (bt_unknowns){.before = {contact->ln[0], contact->ln[1], contact->lt}};
+        pack->of[i] = (bt_unknowns){.before = {contact->ln[0], contact->ln[1], contact->lt}};
         pack->listed[i] = true;
     }
     for (bt_idx k = 0; k < cell->work.n_last; k++) pack->of[cell->work.last[k].contact] = cell->work.last[k];
-}
-
-/// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there,
-/// have none.
-static void put_projection(bt_batch *batch, const bt_cell *cell, const bt_unknowns *of, double slop)
-{
-    batch->KEPT_BIAS_0 = batch->bias[0], batch->KEPT_BIAS_1 = batch->bias[1], batch->KEPT_MU = batch->mu;
-    batch->KEPT_LN_1 = batch->x[1], batch->KEPT_LT = batch->x[2], batch->KEPT_LN_0 = batch->x[0];
-    for (int l = 0; l < batch->n; l++) {
-        const bt_idx i = batch->contact[l];
-        batch->mu[l] = slop;
-        for (int c = 0; c < 2; c++) {
-            batch->bias[c][l] = c < batch->points[l] ? cell->gaps[i].gap[c] : 0;
-            batch->x[c][l] = of[i].multiplier[c];
-        }
-    }
 }
 
 /// Masses of sheets one by one: they have a root.
@@ -242,12 +217,11 @@ static void put_aside(const bt_cell *cell,
                       bt_contact *contact) { copy_records(contact, cell->contacts, cell->n_contacts); }
 
 BT_FOR_EACH_CPU
-static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv, const double *slop)
+static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv)
 {
     for (bt_idx k = 0; k < cell->work.n_batches; k++) {
         bt_batch *batch = &cell->work.batch[k];
         put(batch, pack->u, cell->laws.limits, &pack->place[k], pack->of, inv);
-        if (slop) put_projection(batch, cell, pack->of, *slop);
         if (!cell->laws.limits) continue;
         bt_batch_bounds *at = &bounds_of(cell)[k];
         *at = (bt_batch_bounds){0};
@@ -260,20 +234,20 @@ static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv, const
         if (!pack->listed[i]) copy_records(other++, &pack->u[i], 1);
 }
 
-void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
+void bt_batch_pack(bt_cell *cell, const bt_inv *inv)
 {
     packing pack;
     begin_packing(&pack, cell);
     put_aside(cell, pack.u);
-    take_unknowns(cell, slop != NULL, &pack);
-    const bt_idx n_batches = deal(cell, pack.u, inv, slop != NULL, pack.place);
+    take_unknowns(cell, &pack);
+    const bt_idx n_batches = deal(cell, pack.u, inv, pack.place);
     const size_t n_others = (size_t)(cell->n_contacts - cell->work.n_list);
     bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + rest_bytes(n_batches) +
                                  n_others * sizeof(bt_contact));
     cell->work.n_batches = n_batches;
     cell->work.batch = (bt_batch *)cell->contacts;
     cell->work.packed = true;
-    put_all(cell, &pack, inv, slop);
+    put_all(cell, &pack, inv);
     end_packing(&pack);
 }
 
@@ -282,19 +256,16 @@ void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop)
 /// The records of the contacts of a batch.
 BT_INLINE void take_records(const bt_batch *batch, bt_contact *contact)
 {
-    const bool projection = batch->kind == BT_BATCH_PROJECTION;
     bt_vec line[4][BT_LANES];
     int32_t bodies[BT_LANES][2], tail[BT_LANES][2];
     for (int l = 0; l < BT_LANES; l++) {
         bodies[l][0] = batch->a[l], bodies[l][1] = batch->b[l];
         tail[l][0] = batch->points[l], tail[l][1] = batch->pair[l];
     }
-    bt_motions m[4] =
-        {{batch->nx, batch->ny, batch->rat, batch->rbt}, {batch->ran[0], batch->ran[1], batch->rbn[0], batch->rbn[1]}};
-    m[2] = projection ? (bt_motions){.x = batch->KEPT_BIAS_0, .y = batch->KEPT_BIAS_1, .w = batch->KEPT_MU}
-                      : (bt_motions){.x = batch->bias[0], .y = batch->bias[1], .w = batch->mu};
-    m[3] = projection ? (bt_motions){.x = batch->KEPT_LN_0, .y = batch->KEPT_LN_1, .w = batch->KEPT_LT}
-                      : (bt_motions){.x = batch->x[0], .y = batch->x[1], .w = batch->x[2]};
+    bt_motions m[4] = {{batch->nx, batch->ny, batch->rat, batch->rbt},
+                       {batch->ran[0], batch->ran[1], batch->rbn[0], batch->rbn[1]},
+                       {.x = batch->bias[0], .y = batch->bias[1], .w = batch->mu},
+                       {.x = batch->x[0], .y = batch->x[1], .w = batch->x[2]}};
     _Static_assert(offsetof(bt_contact, a) == 88 && offsetof(bt_contact, b) == 92, "end of the third line");
     _Static_assert(offsetof(bt_contact, n) == 120 && offsetof(bt_contact, pair) == 124, "end of the fourth line");
     memcpy(&m[2].unused, bodies, sizeof bodies);
@@ -310,12 +281,9 @@ BT_INLINE void take_records(const bt_batch *batch, bt_contact *contact)
 
 static void take_out(const bt_batch *batch, bt_unknowns *of)
 {
-    const bool projection = batch->kind == BT_BATCH_PROJECTION;
     for (int l = 0; l < batch->n; l++) {
-        bt_unknowns *to = &of[l];
-        to->contact = batch->contact[l];
-        for (int c = 0; c < 2; c++) to->before[c] = batch->before[c][l], to->multiplier[c] = batch->x[c][l];
-        to->before[2] = projection ? 0 : batch->before[2][l];
+        of[l].contact = batch->contact[l];
+        for (int c = 0; c < 3; c++) of[l].before[c] = batch->before[c][l];
     }
 }
 
@@ -349,9 +317,7 @@ void bt_batch_unpack(bt_cell *cell)
     const bt_idx n_last = take_all(cell, &pack);
     const size_t bytes = (size_t)cell->n_contacts * sizeof *pack.u, more = (size_t)n_last * sizeof *pack.of;
     bt_cells_make_room(cell, bytes + more);
-    cell->work.packed = false;
-    cell->work.batch = NULL;
-    cell->work.n_batches = 0;
+    bt_batch_begin(cell);
     cell->work.last = (bt_unknowns *)((char *)cell->contacts + bytes);
     cell->work.n_last = n_last;
     put_back(cell, pack.u);

@@ -13,15 +13,14 @@
 // instructions it is translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for
 // AVX2 and for any, and the loader takes the one that fits. The scalar update of src/solve/kernel.h remains for
 // contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch holds
-// contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h). The position projection has batches
-// of its own kind, whose unknowns are the multipliers of the points (project.c).
+// contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
 //
 // Packing happens before the first sweep over a new list. Batches take the place of the records, in the memory of the
 // contacts, for both together would be a third of all memory of dense ice; the records of what is not listed stand
 // after them. Residual passes look at the contacts in either form, and take apart the batches of a cell whose list has
 // changed. The records are put back before anybody else looks at the contacts. What an unknown was before the last
-// sweep, and the multipliers of the projection, then stand after the records until the next list is packed: a contact
-// that was in no batch was not moved, for otherwise it would have been listed.
+// sweep then stands after the records until the next list is packed: a contact that was in no batch was not moved, for
+// otherwise it would have been listed.
 #ifndef BERGTOW_BATCH_H
 #define BERGTOW_BATCH_H
 
@@ -29,8 +28,6 @@
 
 /// Are the contacts of this cell swept in batches?
 bool bt_batch_is_for(const bt_cell *cell);
-/// And in the position projection?
-bool bt_batch_projects(const bt_cell *cell);
 
 /// Bytes that a sweep goes through for a contact of the cell: its part of a full batch and the velocities of both
 /// bodies, or its record and all that is hot of them.
@@ -42,19 +39,12 @@ void bt_batch_begin(bt_cell *cell);
 /// Apply all impulses of a packed cell to its bodies; contacts that are in no batch have none.
 void bt_batch_apply(const bt_cell *cell, bt_vel *v);
 
-/// What a residual pass finds in the cell; it lists the contacts to be swept. Or in the position projection of a cell
-/// that is not packed, with room for the list, d: displacements, slop: overlap that is left alone, m.
+/// What a residual pass finds in the cell; it lists the contacts to be swept.
 bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem);
-bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
-                                      const bt_problem *problem);
 
 /// One visit of a sweep to the cell: its move, and at most `times` passes, each over what the one before has not left
 /// calm.
 void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals);
-
-/// The same for the position projection, in one pass.
-void bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep,
-                      bt_totals *totals);
 
 /// The contacts again, with their impulses; nothing when they are there.
 void bt_batch_unpack(bt_cell *cell);

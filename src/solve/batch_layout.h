@@ -11,15 +11,14 @@
 /// sixty.
 enum { BT_FEW = 128 };
 
-typedef enum { BT_BATCH_RIGID, BT_BATCH_BOUNDED, BT_BATCH_SHEETS, BT_BATCH_PROJECTION } bt_batch_kind;
+typedef enum { BT_BATCH_RIGID, BT_BATCH_BOUNDED, BT_BATCH_SHEETS } bt_batch_kind;
 
 /// Names as in bt_contact and bt_mass; lanes without a contact are zero. It is all there is of its contacts while they
 /// are packed.
 typedef struct bt_batch {
-    bt_vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2];
-    bt_vec mu;              // friction; of the projection: the overlap that is left alone, m
+    bt_vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2], mu;
     bt_vec ma, ia, mb, ib;  // inverse masses and moments of inertia of a and b
-    bt_vec x[3], before[3]; // impulses, or multipliers: now, before the last sweep
+    bt_vec x[3], before[3]; // impulses: now, before the last sweep
     bt_idx a[BT_LANES], b[BT_LANES], contact[BT_LANES], pair[BT_LANES];
     bool moves_a[BT_LANES], moves_b[BT_LANES];
     uint8_t points[BT_LANES], n, kind;
@@ -41,15 +40,14 @@ typedef struct bt_rest {
     uint8_t in_all, to_come, done;
 } bt_rest;
 
-/// Of one contact: unknowns before the last sweep, and the multipliers of the projection.
+/// Of one contact: unknowns before the last sweep.
 typedef struct bt_unknowns {
-    double before[3], multiplier[2];
+    double before[3];
     bt_idx contact;
 } bt_unknowns;
 
-/// The listed contacts of a cell into batches of sweeps, slop: NULL; or of the position projection, *slop: overlap that
-/// is left alone, m.
-void bt_batch_pack(bt_cell *cell, const bt_inv *inv, const double *slop);
+/// The listed contacts of a cell into batches of sweeps.
+void bt_batch_pack(bt_cell *cell, const bt_inv *inv);
 
 /// After the batches of a packed cell: [n_batches] what they rest, and the records of the contacts in none, ascending.
 bt_rest *bt_batch_rests(const bt_cell *cell);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Residual passes four contacts at a time: the same numbers and the same list as contact by contact (solver.c,
-// project.c). Contacts are looked at where they are, in batches or not; they leave their batches only when the list has
+// Residual passes four contacts at a time: the same numbers and the same list as contact by contact (solver.c).
+// Contacts are looked at where they are, in batches or not; they leave their batches only when the list has
 // changed, which it has in a tenth of the cells.
 #include "solve/batch.h"
 
@@ -11,8 +11,6 @@
 #include "solve/batch_layout.h"
 #include "solve/kernel.h"
 #include "solve/rows.h"
-
-// --- of the contact law ----------------------------------------------------------------------------------------------
 
 /// Lanes of a vector for loops over contacts.
 typedef struct {
@@ -26,7 +24,7 @@ static inline lanes lanes_of(bt_vec a)
     return o;
 }
 
-/// Four contacts with their masses, and what their bodies move by (velocities, or displacements).
+/// Four contacts with their masses and the velocities of their bodies.
 typedef struct {
     bt_four_rows r;
     bt_masses m;
@@ -277,100 +275,4 @@ bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, co
     list_marked(cell, mark);
     if (mark != few) free(mark);
     return o.found;
-}
-
-// --- of the position projection --------------------------------------------------------------------------------------
-
-/// Which contacts the last sweep of the projection has moved, and their multipliers; 0 of contacts in no batch.
-typedef struct {
-    uint8_t few_moved[BT_FEW], *moved; // [n_contacts]
-    double few_x[BT_FEW][2], (*x)[2];  // [n_contacts]
-} last_sweep;
-
-static void take_last(const bt_cell *cell, last_sweep *last)
-{
-    const size_t n = (size_t)cell->n_contacts;
-    const bool few = n <= BT_FEW;
-    last->moved = few ? last->few_moved : bt_realloc(NULL, n, sizeof *last->moved);
-    last->x = few ? last->few_x : bt_realloc(NULL, n, sizeof *last->x);
-    if (n > 0) memset(last->moved, 0, n * sizeof *last->moved), memset(last->x, 0, n * sizeof *last->x);
-    for (bt_idx k = 0; k < cell->work.n_last; k++) {
-        const bt_unknowns *o = &cell->work.last[k];
-        last->moved[o->contact] = o->multiplier[0] != o->before[0] || o->multiplier[1] != o->before[1];
-        memcpy(last->x[o->contact], o->multiplier, sizeof o->multiplier);
-    }
-}
-
-static void free_last(last_sweep *last)
-{
-    if (last->moved != last->few_moved) free(last->moved);
-    if (last->x != last->few_x) free(last->x);
-}
-
-/// The last contact of the cell again where there are no more.
-BT_INLINE void contacts_from(const bt_cell *cell, bt_idx i, const bt_contact *contact[BT_LANES])
-{
-    for (int l = 0; l < BT_LANES; l++)
-        contact[l] = &cell->contacts[i + l < cell->n_contacts ? i + l : cell->n_contacts - 1];
-}
-
-/// As residual_in_place of project.c.
-BT_FOR_EACH_CPU
-static bt_found residual_of_projection(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
-                                       const bt_problem *problem, const last_sweep *last)
-{
-    const double near = BT_NEAR * problem->tolerance;
-    const bt_vec zero = {0};
-    bt_found found = {0};
-    bt_vec most = zero;
-    bt_mask rows = {0}, bad = {0};
-    for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
-        const bt_contact *contact[BT_LANES];
-        contacts_from(cell, i, contact);
-        const four o = four_from(contact, d, inv);
-        const bt_four_rows r = o.r;
-        const bt_masses m = o.m;
-        const bt_motions a = o.a, b = o.b;
-        const bt_vec un = r.nx * (b.x - a.x) + r.ny * (b.y - a.y);
-        bt_vec worst = zero, square[2];
-        bt_mask on = {0};
-        for (int c = 0; c < 2; c++) {
-            const bt_mask there = c ? r.two : r.one;
-            bt_vec gap, x;
-            for (int l = 0; l < BT_LANES; l++) {
-                const bt_idx j = (bt_idx)(contact[l] - cell->contacts);
-                gap[l] = cell->gaps[j].gap[c], x[l] = last->x[j][c];
-            }
-            const bt_vec open = un + r.rbn[c] * b.w - r.ran[c] * a.w + gap + slop;
-            const bt_vec e = bt_only(there, bt_size_of(bt_larger(zero, x - open * m.mn[c]) - x) * m.w[c]);
-            worst = bt_larger(worst, e);
-            square[c] = e * e;
-            on |= there & ((x > zero) | ~(open >= zero));
-        }
-        const bt_mask counts = first_lanes(cell->n_contacts - i);
-        most = bt_larger(most, bt_only(counts, worst));
-        bad -= counts & (worst > near);
-        rows += counts & (-r.one - r.two);
-        const lanes first = lanes_of(square[0]), second = lanes_of(square[1]);
-        for (int l = 0; l < BT_LANES && i + l < cell->n_contacts; l++) {
-            found.squares += first.of[l];
-            found.squares += second.of[l];
-            cell->work.list[cell->work.n_list] = i + l;
-            cell->work.n_list += on[l] || last->moved[i + l];
-        }
-    }
-    found.most = bt_max(found.most, bt_largest_lane(most));
-    found.bad += sum_of(bad);
-    found.rows += sum_of(rows);
-    return found;
-}
-
-bt_found bt_batch_projection_residual(bt_cell *cell, double slop, const bt_vel *d, const bt_inv *inv,
-                                      const bt_problem *problem)
-{
-    last_sweep last;
-    take_last(cell, &last);
-    const bt_found found = residual_of_projection(cell, slop, d, inv, problem, &last);
-    free_last(&last);
-    return found;
 }

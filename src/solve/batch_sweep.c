@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sweeps through the batches of a cell: the arithmetic of bt_update_contact (kernel.h) and of the position projection,
-// four contacts at a time, with the move of their unknowns before it.
+// Sweeps through the batches of a cell: the arithmetic of bt_update_contact (kernel.h), four contacts at a time, with
+// the move of their unknowns before it.
 #include "solve/batch.h"
 
 #include <math.h>
@@ -178,31 +178,6 @@ static void apply_all(const bt_batch *batches, bt_idx n, bt_vel *v)
 
 void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work.batch, cell->work.n_batches, v); }
 
-/// As the update of one contact in project.c: its points one after the other.
-BT_INLINE vec project(bt_batch *batch, bt_vel *d)
-{
-    motion a = bt_take_four(d, batch->a), b = bt_take_four(d, batch->b);
-    const vec zero = {0};
-    vec most = zero;
-    for (int i = 0; i < 2; i++) {
-        const vec un = batch->nx * (b.x - a.x) + batch->ny * (b.y - a.y) + batch->rbn[i] * b.w - batch->ran[i] * a.w;
-        const vec open = un + batch->bias[i] + batch->mu, p = bt_larger(zero, batch->x[i] - open * batch->mn[i]),
-                  step = p - batch->x[i];
-        const vec x = step * batch->nx, y = step * batch->ny;
-        a.x -= batch->ma * x;
-        a.y -= batch->ma * y;
-        a.w -= batch->ia * (step * batch->ran[i]);
-        b.x += batch->mb * x;
-        b.y += batch->mb * y;
-        b.w += batch->ib * (step * batch->rbn[i]);
-        batch->x[i] = p;
-        most = bt_larger(most, bt_size_of(step) * batch->w[i]);
-    }
-    store(d, batch->a, batch->moves_a, a);
-    store(d, batch->b, batch->moves_b, b);
-    return most;
-}
-
 /// Unknowns of a batch after their move: of one visit to a cell.
 typedef struct {
     vec x[3];
@@ -212,7 +187,7 @@ typedef struct {
 typedef struct {
     const bt_sweep *sweep;
     int times;            // passes at most
-    double calm;          // largest update after which a batch rests, m/s; m in the projection
+    double calm;          // largest update after which a batch rests, m/s
     moved *y;             // [n_batches]
     bt_rest *rests;       // [n_batches]
     bt_idx *due, *again;  // [n_batches] of the first pass; of the next
@@ -221,9 +196,9 @@ typedef struct {
 } visit;
 
 /// After the moves that it has missed while it rested.
-BT_INLINE void move(bt_batch *batch, int unknowns, double lead, double lag, moved *y)
+BT_INLINE void move(bt_batch *batch, double lead, double lag, moved *y)
 {
-    for (int c = 0; c < unknowns; c++) {
+    for (int c = 0; c < 3; c++) {
         const vec now = batch->x[c], change = now - batch->before[c];
         batch->x[c] = now + lead * change;
         batch->before[c] = now + lag * change;
@@ -232,10 +207,10 @@ BT_INLINE void move(bt_batch *batch, int unknowns, double lead, double lag, move
 }
 
 /// How far it turned against its move, as bt_rounds_against.
-BT_INLINE vec turned(const bt_batch *batch, int unknowns, const moved *y)
+BT_INLINE vec turned(const bt_batch *batch, const moved *y)
 {
     vec sum = {0};
-    for (int c = 0; c < unknowns; c++)
+    for (int c = 0; c < 3; c++)
         sum += (c < 2 ? batch->w[c] : batch->wt) * (y->x[c] - batch->x[c]) * (batch->x[c] - batch->before[c]);
     return sum;
 }
@@ -254,9 +229,8 @@ BT_INLINE bt_idx find_due(bt_rest *rests, bt_idx n, bool all, bt_idx *due)
 }
 
 /// The first pass is over the batches that are due, each other one over those that the last has not left calm.
-BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bt_batch_kind kind, visit *o)
+BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bool bounded, visit *o)
 {
-    const int unknowns = kind == BT_BATCH_PROJECTION ? 2 : 3;
     const bt_batch_bounds *bounds = (const bt_batch_bounds *)(batches + n);
     const bt_sweep *sweep = o->sweep;
     vec most = {0}, against = {0};
@@ -270,12 +244,11 @@ BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bt_batch_kind 
             bt_batch *batch = &batches[k];
             bt_rest *rest = &o->rests[k];
             if (t == 0 && sweep->moves) {
-                move(batch, unknowns, sweep->lead[rest->done], sweep->lag[rest->done], &o->y[k]);
+                move(batch, sweep->lead[rest->done], sweep->lag[rest->done], &o->y[k]);
                 o->moved += sweep->beta > 0 ? batch->n : 0;
             }
             vec change;
-            if (kind == BT_BATCH_PROJECTION) change = project(batch, v);
-            else if (kind == BT_BATCH_RIGID) change = update(batch, NULL, v);
+            if (!bounded) change = update(batch, NULL, v);
             else if (batch->kind == BT_BATCH_SHEETS) change = update_sheets(batch, bounds[k].of[0], v);
             else change = update(batch, bounds[k].of, v);
             if (t == 0) most = bt_larger(most, change);
@@ -288,7 +261,7 @@ BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bt_batch_kind 
         }
     }
     for (bt_idx j = 0; sweep->moves && j < n_due; j++)
-        against += turned(&batches[o->due[j]], unknowns, &o->y[o->due[j]]);
+        against += turned(&batches[o->due[j]], &o->y[o->due[j]]);
     o->most = bt_largest_lane(most);
     o->against = against[0] + against[1] + against[2] + against[3];
 }
@@ -296,53 +269,32 @@ BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bt_batch_kind 
 BT_FOR_EACH_CPU
 static void go_through_rigid(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
 {
-    go_through(batches, n, v, BT_BATCH_RIGID, o);
+    go_through(batches, n, v, false, o);
 }
 
 /// Where contacts have bounds; apart, or rigid ice would pay for the registers that this takes.
 BT_FOR_EACH_CPU
 static void go_through_bounded(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
 {
-    go_through(batches, n, v, BT_BATCH_BOUNDED, o);
-}
-
-BT_FOR_EACH_CPU
-static void go_through_projection(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
-{
-    go_through(batches, n, v, BT_BATCH_PROJECTION, o);
-}
-
-typedef void all_batches(bt_batch *batches, bt_idx n, bt_vel *v, visit *o);
-
-static void visit_cell(bt_cell *cell, bt_vel *v, all_batches *pass, visit *o, bt_totals *totals)
-{
-    const bt_idx n = cell->work.n_batches;
-    moved few[BT_FEW / BT_LANES];
-    bt_idx few_due[2 * BT_FEW / BT_LANES];
-    const bool many = n > BT_FEW / BT_LANES;
-    o->y = many ? bt_alloc_aligned((size_t)n, sizeof *o->y) : few;
-    o->due = many ? bt_alloc(2 * (size_t)n, sizeof *o->due) : few_due;
-    o->again = o->due + n;
-    o->rests = bt_batch_rests(cell);
-    pass(cell->work.batch, n, v, o);
-    if (many) free(o->y), free(o->due);
-    totals->most = bt_max(totals->most, o->most);
-    cell->work.updates += o->done;
-    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)o->done);
-    if (o->sweep->moves) bt_rounds_moved(o->sweep, o->moved, o->against, totals);
+    go_through(batches, n, v, true, o);
 }
 
 void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals)
 {
-    if (!cell->work.packed) bt_batch_pack(cell, inv, NULL);
+    if (!cell->work.packed) bt_batch_pack(cell, inv);
     visit o = {.sweep = sweep, .times = times > 1 ? times : 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
-    visit_cell(cell, v, cell->laws.limits ? go_through_bounded : go_through_rigid, &o, totals);
-}
-
-void bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep,
-                      bt_totals *totals)
-{
-    if (!cell->work.packed) bt_batch_pack(cell, inv, &slop);
-    visit o = {.sweep = sweep, .times = 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
-    visit_cell(cell, d, go_through_projection, &o, totals);
+    const bt_idx n = cell->work.n_batches;
+    moved few[BT_FEW / BT_LANES];
+    bt_idx few_due[2 * BT_FEW / BT_LANES];
+    const bool many = n > BT_FEW / BT_LANES;
+    o.y = many ? bt_alloc_unset((size_t)n, sizeof *o.y) : few;
+    o.due = many ? bt_alloc(2 * (size_t)n, sizeof *o.due) : few_due;
+    o.again = o.due + n;
+    o.rests = bt_batch_rests(cell);
+    (cell->laws.limits ? go_through_bounded : go_through_rigid)(cell->work.batch, n, v, &o);
+    if (many) free(o.y), free(o.due);
+    totals->most = bt_max(totals->most, o.most);
+    cell->work.updates += o.done;
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)o.done);
+    if (sweep->moves) bt_rounds_moved(sweep, o.moved, o.against, totals);
 }

@@ -171,24 +171,17 @@ static inline double bt_contact_residual(const bt_contact *contact, const bt_mas
     return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY; // the maximum itself passes over a NaN
 }
 
-/// How far point i is open beyond the slop after the displacements da and db, m (solve/project.c).
-static inline double bt_opening(const bt_contact *contact, const bt_gaps *gaps, double slop, int i, const bt_vel *da,
-                                const bt_vel *db)
-{
-    return bt_normal_velocity(contact, i, da, db) + gaps->gap[i] + slop;
-}
-
-/// Gauss–Seidel update of the multipliers of a contact in the position projection, kg m, d: displacements. Returns the
-/// largest correction, m.
-static inline double bt_project_contact(const bt_contact *contact, const bt_mass *m, const bt_gaps *gaps,
-                                        double multiplier[2], double slop, bt_vel *d, const bt_inv *inv)
+/// Gauss–Seidel update in the plain position projection (solve/project.c): point by point, the biases are the gaps, m,
+/// the impulses the multipliers, kg m, d: displacements. Returns the largest correction, m.
+static inline double bt_project_contact(bt_contact *contact, const bt_mass *m, double slop, bt_vel *d,
+                                        const bt_inv *inv)
 {
     bt_vel da = d[contact->a], db = d[contact->b];
     double most = 0;
     for (int i = 0; i < contact->n; i++) {
-        const double p = bt_max(0, multiplier[i] - bt_opening(contact, gaps, slop, i, &da, &db) * m->mn[i]);
-        const double step = p - multiplier[i];
-        multiplier[i] = p;
+        const double open = bt_normal_velocity(contact, i, &da, &db) + contact->bias[i] + slop,
+                     p = bt_max(0, contact->ln[i] - open * m->mn[i]), step = p - contact->ln[i];
+        contact->ln[i] = p;
         bt_apply(contact, step, step * contact->ran[i], step * contact->rbn[i], 0, inv[contact->a], inv[contact->b],
                  &da, &db);
         most = bt_max(most, fabs(step) * m->w[i]);

@@ -4,16 +4,18 @@
 // With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M̃⁻¹ J_nᵀ p, M̃ as in
 // solver.h, with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
-// by the same rows without friction, in rounds over the points that bear or overlap (rounds.h). Touching contacts (g2 ≥
-// −slop) take part, so that pushing two floes apart does not press either into a third. Velocity-level correction
-// (Baumgarte) would add kinetic energy and load that is not there (Metrikin 2014).
+// by the same rows without friction. That is a contact problem of the same form, and the solver's own sweeps and
+// residuals solve it (solver.h): for the time of the projection, cells have other contacts, with the gaps as biases and
+// no friction, and no bounds. Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart does not press
+// either into a third. Velocity-level correction (Baumgarte) would add kinetic energy and load that is not there
+// (Metrikin 2014).
 //
 // Second pass. The gaps above are linear in the turns of a step. Two bodies that turn by θ against each other may end
 // θ²/2 of their radii inside each other: at 5 s a floe that rolls along a hull does. So where a turn can have left more
 // than LEFT slops, those pairs are looked for anew where they are now: the floe that rolls along a hull touches it
 // metres from where it did. If one of them is that deep, their new rows part the bodies once more, with the rows of all
-// other pairs as they were; then contacts are again those that bore the loads of the step. Most steps have no such
-// turn; most that have need no second pass. Not for the plain reference, which also makes the fields.
+// other pairs as they were. Most steps have no such turn; most that have need no second pass. Not for the plain
+// reference, which also makes the fields: it has sweeps of its own, point by point, and fields keep their bits.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -51,22 +53,10 @@ static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double l
     return limit->grown[0] == 0 && limit->grown[1] == 0;
 }
 
-/// Fields are shaken plain, and keep their bits.
-static bool in_batches(const bt_cell *cell, bool plain) { return bt_batch_projects(cell) && !plain; }
-
-/// No multipliers yet.
-static void begin(const bt_world *world, bt_cell *cell)
-{
-    bt_rounds_list(cell);
-    bt_batch_begin(cell);
-    if (!in_batches(cell, world->par.plain_sweeps)) bt_rounds_in_place(cell, world->bodies.inv);
-}
-
 static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
     bt_cell *cell = &world->cells->cell[k];
-    begin(world, cell);
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];
         bt_gaps *gaps = &cell->gaps[j];
@@ -85,116 +75,98 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
     }
 }
 
-/// Keep contact j of cell k as it is.
-static void keep(bt_solver *solver, bt_idx k, bt_idx j, const bt_contact *contact)
+/// Gaps after the first pass, and the row where a pair that has turned touches now.
+static void look_again(bt_world *world, bt_cell *cell, bt_idx j, bt_contact *row, bt_totals *totals)
 {
-#pragma omp critical
-    {
-        if (solver->n_kept == solver->cap_kept)
-            solver->kept = bt_realloc(solver->kept, (size_t)(solver->cap_kept = 2 * solver->cap_kept + 8),
-                                      sizeof *solver->kept);
-        solver->kept[solver->n_kept++] = (bt_kept_rows){k, j, *contact};
-    }
-}
-
-/// Gaps after the first pass, and new rows of the pairs that have turned.
-static void find_left(bt_world *world, bt_idx k, const void *shifted, bt_totals *totals)
-{
-    bt_cell *cell = &world->cells->cell[k];
+    const bt_contact *contact = &cell->contacts[j];
     const bt_vel *d = world->solver->shift;
-    for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        bt_contact *contact = &cell->contacts[j];
-        bt_gaps *gaps = &cell->gaps[j];
-        for (int i = 0; i < contact->n; i++)
-            if (*(const bool *)shifted) gaps->gap[i] += bt_normal_velocity(contact, i, &d[contact->a], &d[contact->b]);
-        if (!turns(world, cell, j, LEFT * world->par.slop)) continue;
-        bt_manifold manifold;
-        const bt_pair *pair = &cell->search.pairs[contact->pair];
-        bt_axes axes = pair->axes;
-        if (!bt_contacts_parts(world, contact->a, contact->b, pair->part, 0, (int)(gaps->feature[0] >> 31), &manifold,
-                               &axes)) continue;
-        keep(world->solver, k, j, contact);
-        bt_pack_rows(world, &manifold, contact);
-        for (int i = 0; i < manifold.n_points; i++) {
-            gaps->gap[i] = manifold.p[i].gap;
-            totals->most = bt_max(totals->most, -gaps->gap[i]);
-        }
+    bt_gaps *gaps = &cell->gaps[j];
+    for (int i = 0; world->solver->shifted && i < contact->n; i++)
+        gaps->gap[i] += bt_normal_velocity(contact, i, &d[contact->a], &d[contact->b]);
+    if (!turns(world, cell, j, LEFT * world->par.slop)) return;
+    bt_manifold manifold;
+    const bt_pair *pair = &cell->search.pairs[contact->pair];
+    bt_axes axes = pair->axes;
+    if (!bt_contacts_parts(world, contact->a, contact->b, pair->part, 0, (int)(gaps->feature[0] >> 31), &manifold,
+                           &axes)) return;
+    bt_pack_rows(world, &manifold, row);
+    for (int i = 0; i < manifold.n_points; i++) {
+        gaps->gap[i] = manifold.p[i].gap;
+        totals->most = bt_max(totals->most, -gaps->gap[i]);
     }
-    begin(world, cell); // with the new rows
 }
 
-static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, const bt_problem *problem)
-{
-    bt_found found = {0};
-    for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        const bt_contact *contact = &cell->contacts[j];
-        const bt_gaps *gaps = &cell->gaps[j];
-        const bt_in_place *in_place = &cell->work.in_place[j];
-        double worst = 0;
-        bool on = problem->plain;
-        for (int i = 0; i < contact->n; i++) {
-            const double open = bt_opening(contact, gaps, slop, i, &d[contact->a], &d[contact->b]),
-                         x = in_place->multiplier[i];
-            const double r = fabs(bt_max(0, x - open * in_place->mass.mn[i]) - x) * in_place->mass.w[i];
-            worst = bt_max(worst, r);
-            found.squares += r * r;
-            on = on || x > 0 || x != in_place->before[i] || !(open >= 0);
-        }
-        found.most = bt_max(found.most, worst);
-        found.bad += worst > BT_NEAR * problem->tolerance;
-        found.rows += contact->n;
-        if (on) cell->work.list[cell->work.n_list++] = j;
-    }
-    return found;
-}
+/// What a cell has put aside.
+typedef struct bt_aside {
+    bt_contact *contacts;
+    size_t bytes;
+    bt_idx n;
+    struct bt_limit *limits;
+} bt_aside;
 
-static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+/// In place of the contacts of cell k those of the projection; sheets have none.
+static void put_rows(bt_world *world, bt_idx k, const void *again, bt_totals *totals)
 {
-    (void)totals;
-    const bt_problem *problem = context;
     bt_cell *cell = &world->cells->cell[k];
-    const bt_vel *d = world->solver->shift;
-    const double slop = world->par.slop;
-    bt_batch_unpack(cell);
-    bt_rounds_list(cell);
-    const bt_found found = in_batches(cell, problem->plain)
-                           ? bt_batch_projection_residual(cell, slop, d, world->bodies.inv, problem)
-                                                            : residual_in_place(cell, slop, d, problem);
-    bt_rounds_found(cell, &found);
+    bt_contact *rows = bt_alloc_unset((size_t)cell->n_contacts, sizeof *rows);
+    const double slop = world->par.plain_sweeps ? 0 : world->par.slop;
+    bt_idx n = 0;
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        bt_contact *row = &rows[n];
+        *row = cell->contacts[j];
+        if (*(const bool *)again) look_again(world, cell, j, row, totals);
+        row->ln[0] = row->ln[1] = row->lt = row->mu = 0;
+        for (int i = 0; i < row->n; i++) row->bias[i] = cell->gaps[j].gap[i] + slop;
+        n += row->n > 0;
+    }
+    world->solver->aside[k] =
+        (bt_aside){cell->contacts, cell->contact_bytes, cell->n_contacts, cell->laws.limits};
+    cell->contacts = rows;
+    cell->contact_bytes = (size_t)cell->n_contacts * sizeof *rows;
+    cell->n_contacts = n;
+    cell->laws.limits = NULL;
+    bt_solver_begin_cell(world, cell);
+    if (world->par.plain_sweeps) bt_rounds_in_place(cell, world->bodies.inv);
 }
 
-static void project_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+static void put_back(bt_world *world)
 {
-    const bt_sweep *sweep = context;
+    for (bt_idx i = 0; i < world->cells->n_order; i++) {
+        const bt_idx k = world->cells->order[i];
+        bt_cell *cell = &world->cells->cell[k];
+        const bt_aside *aside = &world->solver->aside[k];
+        free(cell->contacts);
+        cell->contacts = aside->contacts;
+        cell->contact_bytes = aside->bytes;
+        cell->n_contacts = aside->n;
+        cell->laws.limits = aside->limits;
+        bt_batch_begin(cell);
+    }
+    free(world->solver->aside);
+    world->solver->aside = NULL;
+}
+
+/// The deepest overlap of pairs that have turned, m.
+static double put_aside(bt_world *world, bool again)
+{
+    bt_totals totals = {0};
+    world->solver->aside = bt_alloc((size_t)world->cells->n, sizeof *world->solver->aside);
+    bt_phases_any_order(world, put_rows, &again, &totals);
+    bt_domain_reduce(world, &totals);
+    return totals.most;
+}
+
+static void sweep_plain(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+{
+    (void)context;
     bt_cell *cell = &world->cells->cell[k];
-    if (cell->work.n_list == 0) return;
-    if (in_batches(cell, sweep->problem->plain)) {
-        bt_batch_project(cell, world->par.slop, world->solver->shift, world->bodies.inv, sweep, totals);
-        return;
-    }
-    bt_moved moved;
-    if (sweep->moves) bt_moved_begin(&moved, cell);
-    for (bt_idx j = 0; sweep->moves && j < cell->work.n_list; j++) {
-        bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
-        bt_rounds_move(sweep, in_place->multiplier, in_place->before, moved.y[j], 2);
-    }
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx u = cell->work.list[j];
-        bt_in_place *in_place = &cell->work.in_place[u];
-        totals->most = bt_max(totals->most, bt_project_contact(&cell->contacts[u], &in_place->mass, &cell->gaps[u],
-                                                               in_place->multiplier, world->par.slop,
-                                                               world->solver->shift, world->bodies.inv));
+        const bt_idx i = cell->work.list[j];
+        totals->most = bt_max(totals->most, bt_project_contact(&cell->contacts[i], &cell->work.in_place[i].mass,
+                                                               world->par.slop, world->solver->shift,
+                                                               world->bodies.inv));
     }
     bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->work.n_list);
-    if (!sweep->moves) return;
-    double against = 0;
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
-        for (int i = 0; i < 2; i++)
-            against += bt_rounds_against(in_place->mass.w[i], in_place->multiplier[i], in_place->before[i],
-                                         moved.y[j][i]);
-    }
-    bt_moved_end(&moved, cell, sweep, against, totals);
 }
 
 void bt_solver_make_shift(bt_world *world)
@@ -203,14 +175,14 @@ void bt_solver_make_shift(bt_world *world)
     if (solver->shift && world->bodies.n <= solver->cap_bodies) return;
     solver->cap_bodies = world->bodies.n > 0 ? world->bodies.n : 1; // a rank may own nothing
     free(solver->shift);
-    solver->shift = bt_alloc_aligned((size_t)solver->cap_bodies, sizeof *solver->shift);
+    solver->shift = bt_alloc_unset((size_t)solver->cap_bodies, sizeof *solver->shift);
 }
 
 static void solve_apart(bt_world *world)
 {
     bt_step_stats *st = &world->stats;
-    bt_problem problem = {.residual = residual_of_cell,
-                          .sweep = project_cell,
+    bt_problem problem = {.residual = bt_solver_residual_of_cell,
+                          .sweep = world->par.plain_sweeps ? sweep_plain : bt_solver_sweep_cell,
                           .vel = world->solver->shift,
                           .tolerance = 0.1 * world->par.slop,
                           .cap = 0.9,
@@ -229,7 +201,7 @@ static void solve_apart(bt_world *world)
     st->projected = st->projected && work.residual <= problem.tolerance;
 }
 
-/// Part what overlaps by the gaps as they have been found: bt_solver.shift.
+/// Part what overlaps by the rows that cells have: bt_solver.shift. They have their contacts again after it.
 static void part(bt_world *world)
 {
     const bt_cells *ts = world->cells;
@@ -242,6 +214,7 @@ static void part(bt_world *world)
                    (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *solver->shift);
     }
     bt_domain_solve(world, solve_apart, solver->shift);
+    put_back(world);
 }
 
 void bt_solver_project(bt_world *world)
@@ -250,28 +223,22 @@ void bt_solver_project(bt_world *world)
     bt_step_stats *st = &world->stats;
     st->position_sweeps = st->position_updates = 0;
     st->projected = true;
-    solver->n_kept = 0;
     bt_totals totals = {.n_sums = N_FOUND};
     bt_phases_any_order(world, find_overlap, NULL, &totals);
     bt_domain_reduce(world, &totals);
     solver->turned = bt_sum_value(&totals.sum[TURNS]) > 0;
     solver->shifted = totals.most > world->par.slop;
-    if (solver->shifted) part(world);
+    if (!solver->shifted) return;
+    put_aside(world, false);
+    part(world);
 }
 
 bool bt_solver_project_again(bt_world *world)
 {
     bt_solver *solver = world->solver;
-    if (!solver->turned) return false;
-    bt_totals totals = {0};
-    bt_phases_any_order(world, find_left, &solver->shifted, &totals);
-    bt_domain_reduce(world, &totals);
-    const bool deep = totals.most > LEFT * world->par.slop;
-    if (deep) part(world);
-    for (bt_idx i = 0; i < solver->n_kept; i++) {
-        const bt_kept_rows *kept = &solver->kept[i];
-        world->cells->cell[kept->cell].contacts[kept->at] = kept->was;
-    }
-    solver->shifted = solver->shifted || deep;
-    return deep;
+    solver->parted_again = solver->turned && put_aside(world, true) > LEFT * world->par.slop;
+    if (solver->parted_again) part(world);
+    else if (solver->turned) put_back(world);
+    solver->shifted = solver->shifted || solver->parted_again;
+    return solver->parted_again;
 }

@@ -371,7 +371,7 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
     if (world->bodies.n > solver->cap_before) {
         solver->cap_before = world->bodies.n;
         free(solver->before);
-        solver->before = bt_alloc_aligned((size_t)solver->cap_before, sizeof *solver->before);
+        solver->before = bt_alloc_unset((size_t)solver->cap_before, sizeof *solver->before);
     }
     pace a = {.cap = problem->cap, .mark = INFINITY, .length = problem->plain ? INT_MAX : problem->length};
     momentum m = {.theta = 1};

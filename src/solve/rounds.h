@@ -98,6 +98,7 @@ typedef struct bt_problem {
     bt_visit *keep;       ///< keep the unknowns of a cell, put them back, or forget them; context: bt_keeping. Or NULL
     void (*settle)(bt_world *world); ///< velocities anew from the impulses, or NULL
     bt_vel *vel;          ///< [n bodies] moved by the sweeps
+    struct bt_tow *line;  ///< swept after the last cell, or NULL
     double tolerance;     ///< of the residual
     double per_square;    ///< factor on sums of squares, see bt_sum
     double most_squares;  ///< of one cell, times that
@@ -141,7 +142,6 @@ void bt_rounds_scale(bt_problem *problem, const bt_cells *t);
 typedef struct bt_in_place {
     bt_mass mass;
     double before[3];     ///< unknowns before the last sweep
-    double multiplier[2]; ///< multipliers of the position projection, kg m
 } bt_in_place;
 
 /// An empty list for a cell with room for all its contacts: what a residual pass calls before it lists.

@@ -99,10 +99,8 @@ static void give_back(bt_solver *solver)
 {
     free(solver->before);
     free(solver->shift);
-    free(solver->kept);
     solver->before = solver->shift = NULL;
-    solver->kept = NULL;
-    solver->cap_before = solver->cap_bodies = solver->cap_kept = 0;
+    solver->cap_before = solver->cap_bodies = 0;
 }
 
 void bt_solver_free(bt_solver *solver)
@@ -131,14 +129,13 @@ static bt_tow *line_of(const bt_world *world, bt_idx cell)
 
 // --- velocities from impulses, and what they leave of the contact law ------------------------------------------------
 
-/// Impulses of the last step, without what a new geometry, or a bound, no longer allows; nothing moves yet.
-static void start_impulses(bt_cell *cell, const bt_inv *inv)
+void bt_solver_begin_cell(bt_world *world, bt_cell *cell)
 {
     const bool in_place = !bt_batch_is_for(cell);
     bt_batch_unpack(cell);
     bt_rounds_list(cell);
     bt_batch_begin(cell);
-    if (in_place) bt_rounds_in_place(cell, inv);
+    if (in_place) bt_rounds_in_place(cell, world->bodies.inv);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         bt_contact *contact = &cell->contacts[i];
         for (int j = 0; cell->laws.limits && j < contact->n; j++)
@@ -157,7 +154,7 @@ static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_to
     bt_cell *cell = &world->cells->cell[k];
     bt_vel *v = world->bodies.vel;
     const bt_inv *inv = world->bodies.inv;
-    if (warm) start_impulses(cell, inv);
+    if (warm) bt_solver_begin_cell(world, cell);
     if (world->par.plain_sweeps) bt_batch_unpack(cell); // contact by contact: keeps the bits of fields
     if (cell->work.packed) bt_batch_apply(cell, v);
     for (bt_idx i = 0; !cell->work.packed && i < cell->n_contacts; i++) {
@@ -211,16 +208,16 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
 }
 
 /// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
-static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+void bt_solver_residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)totals;
     const bt_problem *problem = context;
     bt_cell *cell = &world->cells->cell[k];
-    const bt_vel *v = world->bodies.vel;
+    const bt_vel *v = problem->vel;
     if (problem->plain) bt_batch_unpack(cell);
     bt_found found = bt_batch_is_for(cell) ? bt_batch_residual(cell, v, world->bodies.inv, problem)
                                            : residual_in_place(cell, v, problem);
-    const bt_tow *line = line_of(world, k);
+    const bt_tow *line = k == world->cells->n - 1 ? problem->line : NULL;
     if (line) {
         const double r = bt_tow_residual(line, &v[bt_world_towed(world)]);
         found.most = bt_max(found.most, r);
@@ -302,17 +299,17 @@ static double contacts_against(const bt_cell *cell, double (*y)[3])
     return sum;
 }
 
-static void sweep_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+void bt_solver_sweep_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     const bt_sweep *sweep = context;
     bt_cell *cell = &world->cells->cell[k];
-    bt_tow *line = line_of(world, k);
+    bt_tow *line = k == world->cells->n - 1 ? sweep->problem->line : NULL;
+    bt_vel *v = sweep->problem->vel, *towed = line ? &v[bt_world_towed(world)] : NULL;
     if (cell->work.n_list == 0 && !line) return;
     if (bt_batch_is_for(cell)) {
-        bt_batch_sweep(cell, world->bodies.vel, world->bodies.inv, sweep, world->par.inner_sweeps, totals);
+        bt_batch_sweep(cell, v, world->bodies.inv, sweep, world->par.inner_sweeps, totals);
         return;
     }
-    bt_vel *v = world->bodies.vel, *towed = line ? &v[bt_world_towed(world)] : NULL;
     double line_y[BT_MAX_BRANCHES] = {0};
     bt_moved moved;
     if (sweep->moves) {
@@ -375,11 +372,12 @@ static void unpack_cell(bt_world *world, bt_idx k, const void *context, bt_total
 static bt_problem contact_problem(const bt_world *world)
 {
     bt_problem problem = {
-        .residual = residual_of_cell,
-        .sweep = sweep_cell,
+        .residual = bt_solver_residual_of_cell,
+        .sweep = bt_solver_sweep_cell,
         .keep = keep_impulses,
         .settle = settle,
         .vel = world->bodies.vel,
+        .line = line_of(world, world->cells->n - 1),
         .tolerance = world->par.tolerance,
         .cap = 0.9,
         .length = 20,
@@ -404,8 +402,8 @@ static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_
 {
     bt_cell *cell = &world->cells->cell[k];
     if (!cell->fresh) return;
-    start_impulses(cell, world->bodies.inv);
-    residual_of_cell(world, k, context, totals);
+    bt_solver_begin_cell(world, cell);
+    bt_solver_residual_of_cell(world, k, context, totals);
     const bool same = bt_contacts_load(cell) == cell->load;
     totals->most = bt_max(totals->most, same ? cell->work.found.most : INFINITY);
     bt_sum_add(&totals->sum[0], cell->n_contacts);

@@ -61,12 +61,6 @@ bool bt_restitution_begin(bt_world *world);
 /// rows solved to the residual may do (λ times the residual, and rounding). True when there was one.
 bool bt_restitution_lower(bt_world *world);
 
-/// A contact that has other rows for a moment (src/solve/project.c).
-typedef struct bt_kept_rows {
-    bt_idx cell, at;
-    bt_contact was;
-} bt_kept_rows;
-
 typedef struct bt_solver {
     bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/solve/rounds.h)
     bt_idx cap_before;
@@ -76,8 +70,8 @@ typedef struct bt_solver {
     bt_idx cap_bodies;
     bool shifted;                ///< the projection, or its second pass, has moved something
     bool turned;                 ///< some pair has turned so far that there may be a second pass
-    bt_kept_rows *kept;          ///< [n_kept] in any order
-    bt_idx n_kept, cap_kept;
+    bool parted_again;           ///< which has moved something
+    struct bt_aside *aside;      ///< [cells] what cells have put aside while they are projected (solve/project.c)
     bool rebounds;               ///< some contact of this step has a restitution
     bool extends;                ///< the solution of this step at hand may hold with the contacts that were added
     struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)
@@ -93,6 +87,14 @@ void bt_solver_free(bt_solver *solver);
 /// halved, and again, at last with none, where the work is never positive. `extends`: vel is a solution of this step
 /// before its last detection, which stays where the contacts that were added allow it.
 void bt_solver_solve(bt_world *world, bool extends);
+
+/// A cell whose contacts are about to be solved for: its lists are empty, impulses that their bounds no longer allow are
+/// cut, nothing has moved.
+void bt_solver_begin_cell(bt_world *world, bt_cell *cell);
+
+/// Passes over a cell (bt_problem.residual and .sweep): contacts, biases, bounds and masses are those of the cell,
+/// velocities those of the problem.
+bt_visit bt_solver_residual_of_cell, bt_solver_sweep_cell;
 
 /// Memory that the next step takes anew goes back, for what is written between steps.
 void bt_solver_rest(bt_world *world);

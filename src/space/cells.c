@@ -57,13 +57,13 @@ void bt_cells_make_room(bt_cell *cell, size_t bytes)
     if (bytes <= cell->contact_bytes) return;
     free(cell->contacts);
     cell->contact_bytes = bytes + bytes / 32;
-    cell->contacts = bt_alloc_aligned(cell->contact_bytes, 1);
+    cell->contacts = bt_alloc_unset(cell->contact_bytes, 1);
 }
 
 /// The contacts into memory of their own.
 static void move_contacts(bt_cell *cell, size_t bytes)
 {
-    bt_contact *contacts = bt_alloc_aligned(bytes, 1);
+    bt_contact *contacts = bt_alloc_unset(bytes, 1);
     if (cell->n_contacts > 0) memcpy(contacts, cell->contacts, (size_t)cell->n_contacts * sizeof *contacts);
     free(cell->contacts);
     cell->contacts = contacts;

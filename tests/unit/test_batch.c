@@ -245,113 +245,6 @@ TEST(batches_do_what_single_updates_do)
     }
 }
 
-/// Overlaps for the position projection of contacts, of which some are sheets.
-static void overlap(knot_of_floes *s, uint64_t *rng)
-{
-    for (bt_idx i = 0; i < CONTACTS; i++) {
-        if (scene_uniform(rng) < 0.1) make_sheets(&s->contacts[i], rng);
-        for (int c = 0; c < s->contacts[i].n; c++) {
-            s->gaps[i].gap[c] = any(rng);
-        }
-    }
-}
-
-/// The same visit of the position projection with the scalar update.
-static double scalar_projection(knot_of_floes *s, const bt_idx *order, double slop, const bt_sweep *o, double *most)
-{
-    static double y[CONTACTS][3];
-    double sum = 0;
-    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++)
-        bt_rounds_move(o, s->in_place[order[j]].multiplier, s->in_place[order[j]].before, y[j], 2);
-    for (bt_idx j = 0; j < s->cell.work.n_list; j++) {
-        bt_in_place *p = &s->in_place[order[j]];
-        *most = bt_max(*most, bt_project_contact(&s->contacts[order[j]], &p->mass, &s->gaps[order[j]], p->multiplier,
-                                                 slop, s->v, s->inv));
-    }
-    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
-        const bt_in_place *p = &s->in_place[order[j]];
-        for (int c = 0; c < 2; c++) sum += bt_rounds_against(p->mass.w[c], p->multiplier[c], p->before[c], y[j][c]);
-    }
-    return sum;
-}
-
-/// As check_residual.
-static void check_projection_residual(knot_of_floes *four, knot_of_floes *one, double slop)
-{
-    const bt_problem p = {.tolerance = 1e-3};
-    bt_idx list[CONTACTS], n = 0;
-    const bt_idx n_list = four->cell.work.n_list;
-    memcpy(list, four->list, sizeof list);
-    four->cell.work.n_list = 0;
-    const bt_found f = bt_batch_projection_residual(&four->cell, slop, four->v, four->inv, &p);
-    bt_found e = {0};
-    for (bt_idx i = 0; i < CONTACTS; i++) {
-        const bt_contact *u = &one->contacts[i];
-        const bt_in_place *o = &one->in_place[i];
-        double worst = 0;
-        bool on = false;
-        for (int c = 0; c < u->n; c++) {
-            const double open = bt_opening(u, &one->gaps[i], slop, c, &one->v[u->a], &one->v[u->b]),
-                         x = o->multiplier[c];
-            const double r = fabs(bt_max(0, x - open * o->mass.mn[c]) - x) * o->mass.w[c];
-            worst = bt_max(worst, r);
-            e.squares += r * r;
-            on = on || x > 0 || x != o->before[c] || !(open >= 0);
-        }
-        e.most = bt_max(e.most, worst);
-        e.rows += u->n;
-        e.bad += worst > BT_NEAR * p.tolerance;
-        if (on) assert_true(n < four->cell.work.n_list && four->list[n] == i), n++;
-    }
-    assert_int_equal(n, four->cell.work.n_list);
-    assert_true(f.most == e.most && f.squares == e.squares && f.rows == e.rows && f.bad == e.bad);
-    memcpy(four->list, list, sizeof list);
-    four->cell.work.n_list = n_list;
-}
-
-TEST(batches_project_as_single_updates_do)
-{
-    static knot_of_floes four, one;
-    bt_idx order[CONTACTS];
-    uint64_t rng = 11;
-    for (int k = 0; k < 200; k++) {
-        fill(&four, &rng, k % 3 ? 0.8 : 0.03);
-        overlap(&four, &rng);
-        set_out(&four);
-        for (bt_idx i = 0; i < CONTACTS; i++) memset(four.in_place[i].before, 0, sizeof four.in_place[i].before);
-        one = four;
-        own_contacts(&four);
-        const double slop = 0.1 * scene_uniform(&rng);
-        for (int round = 0; round < 2; round++) {
-            if (round > 0) list_all(&four.cell), one.cell.work.n_list = CONTACTS;
-            const double beta = k % 4 == 1 ? 0.7 : 0;
-            const bt_sweep o = {.problem = &never_calm, .moves = k % 2, .beta = beta, .lead = {beta}};
-            bt_totals totals = no_totals();
-            double most_of_one = 0;
-            bt_batch_project(&four.cell, slop, four.v, four.inv, &o, &totals);
-            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), four.cell.work.n_list, 0);
-            swept_order(&four.cell, order);
-            const double most = totals.most, against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
-            CHECK_CLOSE(scalar_projection(&one, order, slop, &o, &most_of_one), against, 1e-11 * (1 + fabs(against)));
-            bt_batch_unpack(&four.cell);
-            CHECK_CLOSE(most, most_of_one, 0);
-            for (int i = 0; i < BODIES; i++)
-                assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
-            for (bt_idx i = 0; i < four.cell.work.n_last; i++) {
-                const bt_unknowns *p = &four.cell.work.last[i];
-                const bt_in_place *q = &one.in_place[p->contact];
-                for (int c = 0; c < 2; c++) {
-                    assert_true(p->multiplier[c] == q->multiplier[c]);
-                    if (o.moves) assert_true(p->before[c] == q->before[c]);
-                }
-            }
-            assert_memory_equal(four.cell.contacts, one.contacts, sizeof one.contacts);
-            check_projection_residual(&four, &one, slop);
-        }
-        free(four.cell.contacts);
-    }
-}
-
 /// Every listed contact is swept once, and not much is left empty where there is a choice.
 TEST(each_listed_contact_is_in_one_batch)
 {
@@ -446,7 +339,7 @@ TEST(impulses_of_batches_are_applied_as_those_of_contacts)
         if (k % 2) bind(&four, &rng);
         one = four;
         own_contacts(&four);
-        bt_batch_pack(&four.cell, four.inv, NULL);
+        bt_batch_pack(&four.cell, four.inv);
         bt_batch_apply(&four.cell, four.v);
         for (bt_idx i = 0; i < CONTACTS; i++) {
             const bt_contact *u = &one.contacts[i];
