@@ -10,6 +10,7 @@
 #include "contact/row.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
+#include "solve/rounds.h"
 #include "solve/solver.h"
 #include "space/phases.h"
 
@@ -341,7 +342,7 @@ bt_lock bt_locked(bt_world *world)
 {
     bt_islands *islands = world->solver->islands;
     const loads found = collect(world);
-    bt_solver_make_shift(world);
+    bt_rounds_make_shift(world);
     bt_islands_make(world, islands, is_hard);
     bt_lock lock = {0};
     for (int held = 0; held < 2 && !lock.towed; held++) {

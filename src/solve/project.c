@@ -169,15 +169,6 @@ static void sweep_plain(bt_world *world, bt_idx k, const void *context, bt_total
     bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->work.n_list);
 }
 
-void bt_solver_make_shift(bt_world *world)
-{
-    bt_solver *solver = world->solver;
-    if (solver->shift && world->bodies.n <= solver->cap_bodies) return;
-    solver->cap_bodies = world->bodies.n > 0 ? world->bodies.n : 1; // a rank may own nothing
-    free(solver->shift);
-    solver->shift = bt_alloc_unset((size_t)solver->cap_bodies, sizeof *solver->shift);
-}
-
 static void solve_apart(bt_world *world)
 {
     bt_step_stats *st = &world->stats;
@@ -206,7 +197,7 @@ static void part(bt_world *world)
 {
     const bt_cells *ts = world->cells;
     bt_solver *solver = world->solver;
-    bt_solver_make_shift(world);
+    bt_rounds_make_shift(world);
     for (bt_idx j = 0; j < ts->n_busy; j++) {
         const bt_idx k = ts->busy[j];
         if (k == ts->n - 1 || bt_cells_moves(ts, k))

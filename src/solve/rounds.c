@@ -365,6 +365,15 @@ static bool back_to_best(bt_world *world, const bt_problem *problem, bt_work *wo
     return true;
 }
 
+void bt_rounds_make_shift(bt_world *world)
+{
+    bt_solver *solver = world->solver;
+    if (solver->shift && world->bodies.n <= solver->cap_bodies) return;
+    solver->cap_bodies = world->bodies.n > 0 ? world->bodies.n : 1; // a rank may own nothing
+    free(solver->shift);
+    solver->shift = bt_alloc_unset((size_t)solver->cap_bodies, sizeof *solver->shift);
+}
+
 void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
 {
     bt_solver *solver = world->solver;

@@ -160,6 +160,9 @@ double bt_rounds_sweep(bt_world *world, const bt_problem *problem, bt_work *work
 /// pass that found it not to be.
 void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work);
 
+/// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
+void bt_rounds_make_shift(bt_world *world);
+
 /// What a residual pass finds in a cell.
 typedef struct bt_found {
     double most, squares;

@@ -88,8 +88,8 @@ void bt_solver_free(bt_solver *solver);
 /// before its last detection, which stays where the contacts that were added allow it.
 void bt_solver_solve(bt_world *world, bool extends);
 
-/// A cell whose contacts are about to be solved for: its lists are empty, impulses that their bounds no longer allow are
-/// cut, nothing has moved.
+/// A cell whose contacts are about to be solved for: its lists are empty, impulses are cut to what their bounds allow
+/// now, nothing has moved.
 void bt_solver_begin_cell(bt_world *world, bt_cell *cell);
 
 /// Passes over a cell (bt_problem.residual and .sweep): contacts, biases, bounds and masses are those of the cell,
@@ -98,9 +98,6 @@ bt_visit bt_solver_residual_of_cell, bt_solver_sweep_cell;
 
 /// Memory that the next step takes anew goes back, for what is written between steps.
 void bt_solver_rest(bt_world *world);
-
-/// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
-void bt_solver_make_shift(bt_world *world);
 
 /// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
 /// same rows without friction; they move poses and never touch velocities.
