@@ -344,6 +344,11 @@ variants:
     ice.rafting.kappa: 10  # Flato
   more:
     ice.rafting.kappa: 17
+  pieces:
+    ice.splitting.toughness: 150 kPa m^0.5
+  both:
+    ice.splitting.toughness: 50 kPa m^0.5
+    ice.crushing.pressure: 2 MPa
   parts:
     tow.line.breaking_load: 90 kN
     tow.speed: 0.2 m/s
@@ -356,6 +361,11 @@ variants:
     for said in ("For variant rafting; variant more: floes are rigid except that they slide over each other (raft) "
                  "above a load that grows with the square of their thickness, κ = 10 to 17. They do not break, bend or "
                  "crush.",
+                 "For variant pieces: floes are rigid except that they split along straight lines at a toughness of "
+                 "50000 Pa m^0.5 to 150000 Pa m^0.5. They do not bend, crush or raft. Nothing limits the force of a "
+                 "jam of pieces that are too small to split.",
+                 "For variant both: floes are rigid except that they split along straight lines at a toughness of "
+                 "50000 Pa m^0.5 to 150000 Pa m^0.5 and their edges crush at 2e+06 Pa. They do not bend or raft.",
                  "For variant parts: floes are rigid: they neither break, bend, crush nor raft, so nothing limits the "
                  "force of a jam.", "For variant rafting; variant more: no line parts: the case sets no breaking load.",
                  "The towing end of the line moves as prescribed: the vessel neither slows down nor stops."):

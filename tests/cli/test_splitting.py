@@ -146,7 +146,9 @@ def test_generations_and_reserve_are_limits_that_are_told(tmp_path):
     few = run(tmp_path / "few", weak(reserve=3))
     s = few.summary["splitting"]
     assert s["splits"] == 3 and s["refused_reserve"] > 0
-    assert "split_reserve" in [w["code"] for w in few.summary["warnings"]]
+    warned = {w["code"]: w for w in few.summary["warnings"]}
+    assert warned["split_reserve"]["values"]["reserve"] == 3  # as the key has it, and not ids of pieces
+    assert "after 3 splits" in warned["split_reserve"]["text"]
     small = run(tmp_path / "small", weak(least_size=0.6)).summary["splitting"]
     assert small["refused_size"] > 0 and small["largest_refused_ratio"] > 1
 
@@ -185,6 +187,19 @@ def test_the_reader_joins_pieces_to_the_floes(tmp_path):
         assert folder.area[there].sum() == pytest.approx(folder.area[:n].sum(), rel=1e-12)
         assert (np.isfinite(folder.speed(-1)) == there).all() and len(folder.thickness) == folder.n_floes
         assert len(folder.polygons(-1)) == folder.n_floes and np.isfinite(folder.least_contact_force(-1)).all()
+
+
+def test_a_report_counts_splits(tmp_path):
+    from bergtow.reporting.run import quality
+    from bergtow.result.run import Run
+    r = run(tmp_path / "weak", weak())
+    s = r.summary["splitting"]
+    with Run(r.dir) as folder:
+        (value, words), = [row[1:] for row in quality(folder) if row[0] == "splits"]
+    assert value == str(s["splits"]) and s["splits"] > 0
+    assert words.startswith(f"{s['near']} at a load, {s['far']} bent, {s['burst']} burst, in {s['steps']} steps; ")
+    with Run(run(tmp_path / "none", TOW).dir) as folder:
+        assert "splits" not in [row[0] for row in quality(folder)]
 
 
 def test_paraview_sees_the_pieces(tmp_path):
