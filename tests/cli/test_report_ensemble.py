@@ -344,11 +344,6 @@ variants:
     ice.rafting.kappa: 10  # Flato
   more:
     ice.rafting.kappa: 17
-  pieces:
-    ice.splitting.toughness: 150 kPa m^0.5
-  both:
-    ice.splitting.toughness: 50 kPa m^0.5
-    ice.crushing.pressure: 2 MPa
   parts:
     tow.line.breaking_load: 90 kN
     tow.speed: 0.2 m/s
@@ -361,11 +356,6 @@ variants:
     for said in ("For variant rafting; variant more: floes are rigid except that they slide over each other (raft) "
                  "above a load that grows with the square of their thickness, κ = 10 to 17. They do not break, bend or "
                  "crush.",
-                 "For variant pieces: floes are rigid except that they split along straight lines at a toughness of "
-                 "50000 Pa m^0.5 to 150000 Pa m^0.5. They do not bend, crush or raft. Nothing limits the force of a "
-                 "jam of pieces that are too small to split.",
-                 "For variant both: floes are rigid except that they split along straight lines at a toughness of "
-                 "50000 Pa m^0.5 to 150000 Pa m^0.5 and their edges crush at 2e+06 Pa. They do not bend or raft.",
                  "For variant parts: floes are rigid: they neither break, bend, crush nor raft, so nothing limits the "
                  "force of a jam.", "For variant rafting; variant more: no line parts: the case sets no breaking load.",
                  "The towing end of the line moves as prescribed: the vessel neither slows down nor stops."):
@@ -384,6 +374,23 @@ variants:
                                                   "source stated (variant more); default, assumed (variant parts)")
     assert values["tow.branch2.breaking_load"].value == "0 N (variant rafting; variant more); 90000 N (variant parts)"
     assert values["ice.size"].value == "0.7 m" and values["ice.seed"].value == "varied"
+
+
+@pytest.mark.parametrize("values, jams, said", [
+    ({}, True, "Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam, and here "
+     "they are dense enough to jam."),
+    ({"splitting.toughness": "150000 Pa m^0.5"}, False,
+     "Floes are rigid except that they split along straight lines at a toughness of 150000 Pa m^0.5. They do not bend, "
+     "crush or raft. Nothing limits the force of a jam of pieces that are too small to split."),
+    ({"splitting.toughness": "150000 Pa m^0.5", "crushing.pressure": "2000000 Pa", "rafting.kappa": "10"}, False,
+     "Floes are rigid except that they split along straight lines at a toughness of 150000 Pa m^0.5, and they slide over "
+     "each other (raft) above a load that grows with the square of their thickness, κ = 10, and their edges crush at "
+     "2000000 Pa. They do not bend.")])
+def test_limits_tell_how_floes_give_way(values, jams, said):
+    texts = {f"ice.{key}": value for key, value in values.items()}
+    rigid = not {"crushing.pressure", "rafting.kappa"} & set(values)
+    case = report_ensemble.statement.Case(rigid, jams, "speed", {}, np.nan, 0.0, texts)
+    assert said in report_method.limits([({"label": "the case", "values": {}, "units": {}}, case)])
 
 
 def test_the_value_that_tells_texts_apart_names_the_conditions():

@@ -175,7 +175,7 @@ def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
                    changed(dense, ice__crushing={"pressure": 1e5})):
         assert "upper bound" not in call("check", write_case(tmp_path, looser)).stdout
     splits = call("check", write_case(tmp_path, changed(dense, ice__splitting={"toughness": 150e3}))).stdout
-    assert words not in splits and words.replace("rigid floes", "floes that split, into pieces that are rigid") in splits
+    assert words.replace("rigid floes", "floes that split, into pieces that are rigid") in splits
     yields = call("check", write_case(tmp_path, changed(dense, ice__rafting={"kappa": 10}))).stdout
     assert "arches of floes POSSIBLE" in yields and "can carry arches of floes" in yields
 

@@ -93,7 +93,7 @@ def _ice(case, toughness, kappa, pressure):
             *["they slide over each other (raft) above a load that grows with the square of their thickness, κ = "
               f"{kappa}"] * rafts, *[f"their edges crush at {pressure}"] * crushes]
     *never, last = *["break"] * (not splits), "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)
-    said = (f"Floes are rigid except that {' and '.join(ways)}. They do not {', '.join(never)}"
+    said = (f"Floes are rigid except that {', and '.join(ways)}. They do not {', '.join(never)}"
             f"{' or ' * bool(never)}{last}.")
     return said if not case.rigid else \
         f"{said} Nothing limits the force of a jam of pieces that are too small to split{here}"
