@@ -265,8 +265,8 @@ static void print_step(const bt_case *input, const bt_check_ice *ice)
     printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", step.passed,
            step.pieces ? "pieces of the lead" : "floe sizes", step.size / step.speed, bt_check_verdict(step.floes));
     if (input->ice.splitting.toughness > 0)
-        printf("time step, splits    moves %.3g of the least width of a piece a step; from some 0.2 on (assumed) pieces "
-               "may overlap\n", dt * step.speed / input->ice.splitting.least_size);
+        printf("time step, splits    moves %.3g of the least width of a piece a step; from some 0.2 on (assumed) "
+               "pieces may overlap\n", dt * step.speed / input->ice.splitting.least_size);
 }
 
 static const char *bytes(double b, char out[32])

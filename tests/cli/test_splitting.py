@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, TOW, changed, run
+from harness import CASE, TOW, call, changed, run
 
 TOUGHNESS, STRENGTH = 150e3, 300e3
 DURATION = 1.0  # of a collision, s
@@ -200,6 +200,39 @@ def test_a_report_counts_splits(tmp_path):
     assert words.startswith(f"{s['near']} at a load, {s['far']} bent, {s['burst']} burst, in {s['steps']} steps; ")
     with Run(run(tmp_path / "none", TOW).dir) as folder:
         assert "splits" not in [row[0] for row in quality(folder)]
+
+
+def test_a_collision_names_its_floe_or_its_piece(tmp_path):
+    """By the rows of /floes, /bodies and /pieces, at a time at which it was there. Red: ids, among which those of
+    pieces come before those of walls."""
+    r = run(tmp_path, changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)]))
+    made = read(r.dir)
+    with h5py.File(r.dir / "result.h5") as f:
+        n, bodies = len(f["floes/area"]), len(f["bodies/names"])
+        t, struck = f["impacts/time"][()], f["impacts/floe"][()]
+        born = np.concatenate([np.zeros(n + bodies), np.repeat(f["splits/time"][()], 2)])
+    gone = np.full(len(born), np.inf)
+    gone[made["parent"] + bodies * (made["parent"] >= n)] = born[n + bodies::2]
+    assert (struck >= n + bodies).any() and (born[struck] <= t + 1e-9).all() and (t <= gone[struck] + 1e-9).all()
+
+
+def test_counts_are_of_the_floes_of_the_start(tmp_path):
+    """Not of the pieces. Red: a report that counts both."""
+    from bergtow.result import origins
+    from bergtow.result.run import Run
+    from bergtow.stats.design_value import ice_as_read
+    made = run(tmp_path / "made", changed(TOW, run__duration=1, ice__thickness=0.05))
+    assert call("export", made.dir, "-o", tmp_path / "map.geojson", "--time", "0").returncode == 0
+    case = weak()
+    case["ice"] = {"outlines": str(tmp_path / "map.geojson"), "crushing": {"pressure": 1e5},
+                   "splitting": case["ice"]["splitting"]}
+    with Run(run(tmp_path / "read", case).dir) as folder:
+        assert folder.n_pieces > 0 and folder.n_start == folder.summary["n_floes"]
+        rows = {value.key: value.value for value in origins.of_field(folder)}
+        size = np.sqrt(4 * folder.area[:folder.n_start] / np.pi)
+        assert rows["floes"] == str(folder.n_start)
+        assert rows["floe size"] == f"{size.mean():.3g} m, {size.min():.3g} to {size.max():.3g} m"
+        assert ice_as_read(folder)["ice.size"] == f"{size.mean():.3g} m"
 
 
 def test_paraview_sees_the_pieces(tmp_path):

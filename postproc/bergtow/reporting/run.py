@@ -206,8 +206,9 @@ def impacts(run):
              start_peak(run, "impacts.start_largest_quasi_static_load_n"))]
     big = i.get("largest")
     if isinstance(big, dict):
-        body = int(big["floe"]) - run.n_floes
-        struck = run.bodies[body].name if 0 <= body < len(run.bodies) else f"floe {big['floe']}"
+        body = int(big["floe"]) - run.n_start
+        struck = f"floe {big['floe']}" if body < 0 else \
+            run.bodies[body].name if body < len(run.bodies) else f"piece {body - len(run.bodies)}"
         rows.append((
             "largest peak",
             f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse "

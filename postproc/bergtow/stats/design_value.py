@@ -80,8 +80,8 @@ def ice_as_read(run):
     """{key: value} of a run whose ice is read from a file: the keys say nothing of it."""
     if source_of_ice(run.case) is None or not run.n_floes:
         return {}
-    size = np.sqrt(4 * run.area / np.pi).mean()
-    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness.mean():.3g} m"}
+    size = np.sqrt(4 * run.area[:run.n_start] / np.pi).mean()
+    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness[:run.n_start].mean():.3g} m"}
 
 
 def case_of(e, rows):
