@@ -216,6 +216,22 @@ def test_a_collision_names_its_floe_or_its_piece(tmp_path):
     assert (struck >= n + bodies).any() and (born[struck] <= t + 1e-9).all() and (t <= gone[struck] + 1e-9).all()
 
 
+def test_force_chains_go_through_pieces(tmp_path):
+    """Outlines of a dump are those of the frame of its step, and each contact lies on both of its bodies."""
+    from bergtow.plot import chains
+    from bergtow.result.run import Run
+    dump = tmp_path / "step.h5"
+    r = run(tmp_path, changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)]), "--dump-contacts", f"300:{dump}")
+    read_as = chains.read(dump)
+    with Run(r.dir) as folder:
+        c = chains.joined(folder, read_as)
+        np.testing.assert_allclose(c.pose[:folder.n_floes], folder.pose(-1), atol=1e-9)
+        at = c.pose[c.body, :2] + c.lever
+        assert folder.n_pieces > 0 and (c.body >= folder.n_start).any() and np.isfinite(at).all()
+        np.testing.assert_allclose(at[:, 0], at[:, 1], atol=0.05)
+        assert chains.draw(folder, read_as)
+
+
 def test_counts_are_of_the_floes_of_the_start(tmp_path):
     """Not of the pieces. Red: a report that counts both."""
     from bergtow.result import origins
