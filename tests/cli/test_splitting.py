@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, TOW, call, changed, run
+from harness import CASE, TOW, call, changed, run, write_case
 
 TOUGHNESS, STRENGTH = 150e3, 300e3
 DURATION = 1.0  # of a collision, s
@@ -249,6 +249,22 @@ def test_counts_are_of_the_floes_of_the_start(tmp_path):
         assert rows["floes"] == str(folder.n_start)
         assert rows["floe size"] == f"{size.mean():.3g} m, {size.min():.3g} to {size.max():.3g} m"
         assert ice_as_read(folder)["ice.size"] == f"{size.mean():.3g} m"
+
+
+def test_python_tells_floes_that_are_not_there(tmp_path):
+    import warnings
+
+    import bergtow
+    from bergtow.errors import BergtowError
+    with bergtow.Simulation(bergtow.Case(write_case(tmp_path, weak())), threads=1) as sim, warnings.catch_warnings():
+        warnings.simplefilter("error")  # NaN as a whole number
+        sim.step(sim.steps_left)
+        gone = np.isnan(sim.positions[:, 0])
+        assert gone.any() and (gone == (sim.motions == -1)).all() and (np.isnan(sim.thicknesses) == gone).all()
+        for change in (lambda id: sim.set_velocity(id, 0, 0), lambda id: sim.set_position(id, 1, 0, 0)):
+            for id in np.flatnonzero(gone)[[0, -1]]:
+                with pytest.raises(BergtowError, match=f"body {id}: is a floe that has split, or a piece"):
+                    change(id)
 
 
 def test_paraview_sees_the_pieces(tmp_path):
