@@ -384,8 +384,8 @@ variants:
      "crush or raft. Nothing limits the force of a jam of pieces that are too small to split."),
     ({"splitting.toughness": "150000 Pa m^0.5", "crushing.pressure": "2000000 Pa", "rafting.kappa": "10"}, False,
      "Floes are rigid except that they split along straight lines at a toughness of 150000 Pa m^0.5, and they slide "
-     "over each other (raft) above a load that grows with the square of their thickness, κ = 10, and their edges crush at "
-     "2000000 Pa. They do not bend.")])
+     "over each other (raft) above a load that grows with the square of their thickness, κ = 10, and their edges crush "
+     "at 2000000 Pa. They do not bend.")])
 def test_limits_tell_how_floes_give_way(values, jams, said):
     texts = {f"ice.{key}": value for key, value in values.items()}
     rigid = not {"crushing.pressure", "rafting.kappa"} & set(values)

@@ -221,7 +221,8 @@ def test_force_chains_go_through_pieces(tmp_path):
     from bergtow.plot import chains
     from bergtow.result.run import Run
     dump = tmp_path / "step.h5"
-    r = run(tmp_path, changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)]), "--dump-contacts", f"300:{dump}")
+    case = changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)])
+    r = run(tmp_path, case, "--dump-contacts", f"300:{dump}")
     read_as = chains.read(dump)
     with Run(r.dir) as folder:
         c = chains.joined(folder, read_as)
