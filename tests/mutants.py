@@ -850,7 +850,7 @@ MUTANTS = {
                               f"{KNOWN}a_split_takes_no_momentum_and_no_energy",
                               f"{KNOWN}the_speed_at_which_a_crushed_corner_splits_a_floe",
                               f"{KNOWN}a_small_floe_rafts_where_a_large_one_splits",
-                              "parallel/test_splitting_ranks.py::test_ranks_and_threads_split_alike"], [
+                              "parallel/test_splitting_ranks.py::test_ranks_and_threads_split_alike[2-1]"], [
         ("sharp = one && !is_raft_edge(world, cell, j) && (gives_way(world, BT_LAW_CRUSHING, contact) ||",
          "sharp = one && !is_raft_edge(world, cell, j) && (true ||", "rigid wedges"),
         (".vy = u.y + u.w * dx,", ".vy = u.y,", "pieces do not turn with their parent"),
