@@ -27,6 +27,8 @@ OBSERVE = ["unit/test_observe", "cli/test_balance.py", "cli/test_tow.py",
            "scenes:line_bridle_breaks,thrust,impacts_sine"]
 
 PLAN = "cli/test_route_planner.py::test_"
+WHOLE = "cli/test_splitting.py::test_"
+KNOWN = "cli/test_splitting_answers.py::test_"
 
 MUTANTS = {
     "src/force/laws.h": (DRAG, [
@@ -840,8 +842,14 @@ MUTANTS = {
         ("if (x->axis == y->axis && study->parameter[y->axis].name != y->text) continue;", "",
          "each value of a parameter has keys of its own"),
     ]),
-    "src/step/splitting.c": (["cli/test_splitting.py", "cli/test_splitting_answers.py",
-                               "parallel/test_splitting_ranks.py"], [
+    "src/step/splitting.c": ([f"{WHOLE}a_wedge_splits_a_free_square_at_its_load",
+                              f"{WHOLE}a_vertex_that_cannot_go_in_opens_nothing",
+                              f"{WHOLE}generations_and_reserve_are_limits_that_are_told",
+                              f"{KNOWN}a_split_keeps_momentum_and_angular_momentum",
+                              f"{KNOWN}a_split_takes_no_momentum_and_no_energy",
+                              f"{KNOWN}the_speed_at_which_a_crushed_corner_splits_a_floe",
+                              f"{KNOWN}a_small_floe_rafts_where_a_large_one_splits",
+                              "parallel/test_splitting_ranks.py::test_ranks_and_threads_split_alike[2-1]"], [
         ("sharp = one && !is_raft_edge(world, cell, j) && (gives_way(world, BT_LAW_CRUSHING, contact) ||",
          "sharp = one && !is_raft_edge(world, cell, j) && (true ||", "rigid wedges"),
         (".vy = u.y + u.w * dx,", ".vy = u.y,", "pieces do not turn with their parent"),

@@ -256,8 +256,9 @@ class Simulation:
 
     @property
     def motions(self) -> np.ndarray:
-        """[n] 0 moved by forces, 1 velocity prescribed, 2 at rest for ever"""
-        return self._read("motion").astype(int)
+        """[n] 0 moved by forces, 1 velocity prescribed, 2 at rest for ever, -1 not there: a floe that has split, or a
+        piece that no floe has become yet; all other numbers of it are NaN"""
+        return np.nan_to_num(self._read("motion"), nan=-1).astype(int)
 
     @property
     def drags(self) -> np.ndarray:

@@ -264,6 +264,9 @@ static void print_step(const bt_case *input, const bt_check_ice *ice)
     if (ice->count < 1) return;
     printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", step.passed,
            step.pieces ? "pieces of the lead" : "floe sizes", step.size / step.speed, bt_check_verdict(step.floes));
+    if (input->ice.splitting.toughness > 0)
+        printf("time step, splits    moves %.3g of the least width of a piece a step; from some 0.2 on (assumed) "
+               "pieces may overlap\n", dt * step.speed / input->ice.splitting.least_size);
 }
 
 static const char *bytes(double b, char out[32])
@@ -294,7 +297,7 @@ static void print_cost(const bt_case *input, const bt_comm *comm, const bt_check
            seconds, 1e6 * per_step);
     const double making = bt_cost_making(input, ice->made);
     if (making > 0) printf("; the making of ice %.2g s of it", making);
-    printf(")\n");
+    printf("%s)\n", input->ice.splitting.toughness > 0 ? "; without the time that splits and their pieces take" : "");
 }
 
 static const char *warned(size_t n, char out[64])

@@ -95,6 +95,7 @@ bt_arch bt_arch_of(const bt_case *input, double concentration, double floe_size)
         }
     }
     worst.rigid = !(input->ice.rafting_kappa > 0) && !(input->ice.crushing_pressure > 0);
+    worst.splits = input->ice.splitting.toughness > 0;
     worst.unbounded = worst.rigid && worst.beside && reaches(concentration, BT_BOUND_CONCENTRATION);
     return worst;
 }
@@ -123,8 +124,10 @@ void bt_arch_warn(const bt_arch *arch, bt_errors *warnings)
                       arch->gap);
     if (arch->unbounded)
         bt_warn(warnings, BT_WARN_LOAD_UNBOUNDED,
-                      "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "
+                      "ice.concentration: %.0f %% of %s: from some %.0f %% on (assumed) they lock, and their "
                       "load has no upper bound; read it as a property of this model, or let floes raft "
                       "(ice.rafting.kappa, 10 to 34) or crush (ice.crushing.pressure)",
-                      100 * arch->concentration, 100 * BT_BOUND_CONCENTRATION);
+                      100 * arch->concentration,
+                      arch->splits ? "floes that split, into pieces that are rigid" : "rigid floes",
+                      100 * BT_BOUND_CONCENTRATION);
 }

@@ -27,7 +27,7 @@
     ROW(OUTRUN, "outrun", "steps of_steps", "a body moved farther than the contact detection looks ahead")             \
     ROW(REBOUNDS_LOWERED, "rebounds_lowered", "steps of_steps", "rebounds that would have added energy were lowered")  \
     ROW(ENERGY_ADDED, "energy_added", "steps of_steps", "contacts added energy")                                       \
-    ROW(OVERLAP, "overlap", "overlap_m share_percent", "bodies overlap")                                               \
+    ROW(OVERLAP, "overlap", "overlap_m share_percent -", "bodies overlap")                                             \
     ROW(CRUSHED, "crushed", "depth_m share_percent", "floes were crushed deeper than the model holds")                 \
     ROW(END_INSIDE, "end_inside", "time_s from_s", "the towing end was within the hull")                               \
     ROW(STALLED, "stalled", "time_s of_s speed_percent", "the towed body stood still, held by the ice")                \
@@ -79,7 +79,7 @@
         "the domain is too narrow for its ice")                                                                        \
     ROW(ICE_STRIP, "ice_strip", "keys water_m", "the ice ends before the domain does, beside the tow")                 \
     ROW(ICE_GAP, "ice_gap", "water_m", "the ice does not fill the moving window")                                      \
-    ROW(LOAD_UNBOUNDED, "load_unbounded", "concentration_percent limit_percent",                                       \
+    ROW(LOAD_UNBOUNDED, "load_unbounded", "concentration_percent - limit_percent",                                     \
         "the load of dense ice of rigid floes has no upper bound")                                                     \
     ROW(PACKED_AT_START, "packed_at_start", "packed", "packed ice reaches the wall ahead from the start")              \
     ROW(PACKED, "packed", "time_s earliest_s packed end_s", "packed ice reaches the wall ahead")                       \

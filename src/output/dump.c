@@ -22,6 +22,7 @@
 #include "contact/pack.h"
 #include "solve/limit.h"
 #include "space/cells.h"
+#include "step/splitting.h"
 
 // --- the file --------------------------------------------------------------------------------------------------------
 
@@ -261,6 +262,15 @@ static void lever_of(double nx, double ny, double rn, double rt, double out[2])
     out[1] = rt * ny - rn * nx;
 }
 
+/// Of a body among those of the start and then all pieces of floes, whose ids come between those of the others.
+static int64_t row_of(const bt_world *world, bt_gid gid)
+{
+    const bt_splitting *splitting = world->splitting;
+    if (!splitting || gid < splitting->first) return gid;
+    return gid < splitting->first + splitting->reserve
+               ? world->bodies.n_global - splitting->reserve + gid - splitting->first : gid - splitting->reserve;
+}
+
 /// Where the rows and all bodies are; the arrays belong to the caller afterwards.
 static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
 {
@@ -268,9 +278,10 @@ static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
     int64_t *body = bt_alloc(2 * (size_t)n, sizeof *body);
     double *normal = bt_alloc(2 * (size_t)n, sizeof *normal), *lever = bt_alloc(4 * (size_t)n, sizeof *lever);
     double *pose = bt_alloc(3 * (size_t)bodies->n_global, sizeof *pose);
+    const bt_gid unborn = world->splitting ? world->splitting->reserve - 2 * world->splitting->n : 0;
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
-        body[2 * k] = p->gid_a, body[2 * k + 1] = p->gid_b;
+        body[2 * k] = row_of(world, p->gid_a), body[2 * k + 1] = row_of(world, p->gid_b);
         normal[2 * k] = p->nx, normal[2 * k + 1] = p->ny;
         lever_of(p->nx, p->ny, p->ran, p->rat, lever + 4 * k);
         lever_of(p->nx, p->ny, p->rbn, p->rbt, lever + 4 * k + 2);
@@ -279,14 +290,14 @@ static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
         const bt_idx i = bt_world_index(world, g);
         const double at[3] = {i < 0 ? NAN : bodies->pose[i].x, i < 0 ? NAN : bodies->pose[i].y,
                               i < 0 ? NAN : bodies->pose[i].yaw};
-        memcpy(pose + 3 * g, at, sizeof at);
+        memcpy(pose + 3 * row_of(world, g), at, sizeof at);
     }
     return (bt_fclib_places){.time = (double)world->step * world->par.dt,
                              .dt = world->par.dt,
                              .body = body,
                              .normal = normal,
                              .lever = lever,
-                             .n_bodies = (int64_t)bodies->n_global,
+                             .n_bodies = bodies->n_global - unborn,
                              .pose = pose};
 }
 

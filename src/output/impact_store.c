@@ -19,7 +19,8 @@ static const struct {
 } columns[] = {
 #define ROW(name_, member, whole_, units_, text) {name_, units_, text, offsetof(bt_impact, member), whole_}
     ROW("time", time, false, "s", "end of the step in which the collision began"),
-    ROW("floe", gid, true, "1", "id of the floe; from n_floes on one of /bodies, as a wall"),
+    ROW("floe", gid, true, "1",
+        "row of /floes; from n_floes on one of /bodies, as a wall; after these a row of /pieces"),
     ROW("x", x, false, "m", "where on the hull, in the frame of the towed body"),
     ROW("y", y, false, "m", "where on the hull, in the frame of the towed body"),
     ROW("panel", panel, true, "1", "panel of the hull"),
@@ -101,6 +102,19 @@ void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts 
     create_panels(store, &impacts->panels, input->output.panels);
 }
 
+void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int64_t n_bodies)
+{
+    store->roster = roster;
+    store->n_bodies = n_bodies;
+}
+
+/// Of a body in /floes, /bodies and /pieces, one after the other. Ids of pieces come between those of the others.
+static double row_of(const bt_impact_store *store, double gid)
+{
+    const bt_gid row = store->roster ? bt_roster_row(store->roster, (bt_gid)gid) : (bt_gid)gid;
+    return (double)(row >= 0 ? row : store->n_bodies + (bt_gid)gid - store->roster->n_free);
+}
+
 static void write_rows(bt_impact_store *store)
 {
     if (store->n_rows == 0) return;
@@ -124,6 +138,8 @@ void bt_impact_store_take_closed(bt_impact_store *store)
         store->rows = bt_realloc(store->rows, (size_t)store->cap_rows, sizeof *store->rows);
     }
     memcpy(store->rows + store->n_rows, store->from->closed, (size_t)n * sizeof *store->rows);
+    for (int64_t i = store->n_rows; i < store->n_rows + n; i++)
+        store->rows[i].gid = row_of(store, store->rows[i].gid);
     store->n_rows += n;
     if (store->n_rows >= CHUNK) write_rows(store);
 }

@@ -7,6 +7,7 @@
 #include "loads/impact.h"
 #include "base/h5read.h"
 #include "base/h5util.h"
+#include "output/gather.h"
 #include "output/impact_count.h"
 #include "loads/panel.h"
 #include "base/snapshot.h"
@@ -20,6 +21,8 @@ typedef struct bt_impact_store {
     hid_t column[BT_IMPACT_COLUMNS];  ///< [collisions] each
     bt_impact *rows;                  ///< [n_rows] not yet written
     int64_t n_rows, cap_rows, written;
+    const bt_roster *roster;          ///< where floes split; NULL: ids are rows
+    int64_t n_bodies;                 ///< rows of /floes and /bodies
     bt_panel_blocks blocks;
     // series of panel loads, if asked for
     hid_t force, normal;              ///< [samples][panels][2] N, [samples][panels] N; −1 = none
@@ -31,6 +34,8 @@ typedef struct bt_impact_store {
 
 /// Make the groups of the case. With output.panels the panel loads of every sample are in them.
 void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts *impacts, const bt_case *input);
+/// Floes split: collisions are with rows of /floes, /bodies and /pieces, n_bodies of the first two.
+void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int64_t n_bodies);
 /// Collisions that ended in the last step, and its panel loads; time: its end, s. no_load: they are no numbers, and
 /// count as none.
 void bt_impact_store_take(bt_impact_store *store, double time, bool no_load);

@@ -244,8 +244,8 @@ static void warn_of_splits(bt_summary *summary, const bt_run_totals *totals)
                 (long long)p->deferred, BT_SPLIT_ROUNDS);
     if (p->no_id > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_RESERVE,
-                "%lld floes could not split, as all ids for %lld pieces were used; raise ice.splitting.reserve",
-                (long long)p->no_id, (long long)totals->splitting->reserve);
+                "%lld floes could not split after %lld splits, for which there were ids; raise ice.splitting.reserve",
+                (long long)p->no_id, (long long)totals->splitting->reserve / 2);
     if (p->unconverged > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_UNCONVERGED,
                 "%lld of %lld steps did not converge, and no floe split in them; raise solver.max_sweeps or lower "
@@ -258,9 +258,9 @@ static void warn_of_bodies(bt_summary *summary, const bt_history *history, const
 {
     if (!(history->max_overlap <= OVERLAP_LIMIT * totals->mean_size))
         bt_warn(&summary->warnings, BT_WARN_OVERLAP,
-                "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
-                "solver.position_sweeps",
-                history->max_overlap, 100 * history->max_overlap / totals->mean_size);
+                "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise %s",
+                history->max_overlap, 100 * history->max_overlap / totals->mean_size,
+                totals->splitting ? "ice.splitting.least_size" : "solver.position_sweeps");
     for (int law = 0; law < BT_LAWS; law++) {
         if (bt_laws[law]->warn)
             bt_laws[law]->warn(history->laws + bt_law_first_total(law), totals->mean_size, &summary->warnings);

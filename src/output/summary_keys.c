@@ -364,7 +364,7 @@ static const bt_json_key rows[] = {
     OF_IMPACTS("impacts.largest.effective_mass_kg", largest.mass, "kg",
         "effective mass of the two bodies along the normal"),
     OF_IMPACTS("impacts.largest.time_s", largest.time, "s", "end of the step in which it began"),
-    COUNT("impacts.largest.floe", largest_floe, "1", "id of the floe"),
+    COUNT("impacts.largest.floe", largest_floe, "1", "the floe, as in /impacts/floe"),
     COUNT("impacts.largest.panel", largest_panel, "1", "panel of the hull"),
     OF_IMPACTS("impacts.largest.x_m", largest.x, "m", "place on the hull, x of the body frame"),
     OF_IMPACTS("impacts.largest.y_m", largest.y, "m", "place on the hull, y of the body frame"),

@@ -24,6 +24,11 @@ static bool may_change(const bt_world *world, bt_gid gid, const double x[3], bt_
         bt_errors_add(err, "body %lld: there is none; ids are 0 to %lld", id, (long long)bodies->n_global - 1);
         return false;
     }
+    if (bodies->gone[gid]) {
+        bt_errors_add(err, "body %lld: is a floe that has split, or a piece that is not there yet; change another body",
+                      id);
+        return false;
+    }
     const bt_idx i = bodies->index_of[gid];
     double led = i >= 0 && bodies->motion[i] != BT_DYNAMIC;
     bt_domain_maxima(world, &led, 1);

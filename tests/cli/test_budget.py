@@ -408,6 +408,19 @@ def test_a_study_end_to_end(small):
     assert "of another case, ice.size is 77 m there" in numerics["refused"] and numerics["refused"] in said
 
 
+@pytest.mark.parametrize("keys, words", [
+    ({"sampling": "grid"}, "is no Latin hypercube"), ({"fields": "common"}, "has common fields"),
+    ({"samples": 7}, "has 7 samples, too few for a budget; take 8 or more")])
+def test_a_study_without_a_budget_is_refused_before_its_members_run(tmp_path, keys, words):
+    write_case(tmp_path, BASE, "base.yml")
+    study = STUDY | keys
+    if "sampling" in keys:
+        study = {"base": "base.yml", "parameters": {"ice.friction": [0.1, 0.5]}}
+    write_case(tmp_path, study, "study.yml")
+    done = script("budget", "study.yml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 3 and words in done.stderr and not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_what_is_refused(small, tmp_path):
     folder, _ = small

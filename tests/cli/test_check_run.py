@@ -2,6 +2,7 @@
 """What `run` refuses, `check` refuses: the same message, the same exit code. What `run` goes through with a doubt,
 `check` calls valid with a warning."""
 import json
+import re
 import os
 import random
 
@@ -402,5 +403,9 @@ def test_what_splits_the_mean_floe(tmp_path):
         {"key": f"ice.splitting.{key}", "value": n, "least": low, "most": high}
         for key, n, low, high in (("toughness", 0.15, 50, 250), ("strength", 0.3, 200, 500))]
     assert odd(("toughness", "150"), case=changed(MAP, domain={"length": 2000, "width": 1000})) == []
-    assert "mean floe, as a square, splits under" in call("check", tmp_path / "case.yml", "--set",
-                                                          "ice.splitting.toughness=150 kPa√m").stdout
+    text = call("check", write_case(tmp_path, MAP), "--set", "ice.splitting.toughness=150 kPa√m").stdout
+    assert "mean floe, as a square, splits under" in text and "without the time that splits" in text
+    speed = float(re.search(r"reference speed +(\S+) m/s", text)[1])
+    assert f"moves {MAP['run']['dt'] * speed / 3:.3g} of the least width of a piece a step" in text
+    text = call("check", write_case(tmp_path, MAP)).stdout
+    assert "least width of a piece" not in text and "without the time that splits" not in text

@@ -221,14 +221,14 @@ def test_the_real_corner_of_a_floe_in_parts(tmp_path):
 
 
 def test_a_wall_that_is_struck_is_no_floe():
-    """Ids from the number of floes on are those of bodies."""
+    """Rows from the number of floes on are those of bodies, then of pieces."""
     def said(struck):
         largest = dict.fromkeys(("peak_n", "mean_n", "duration_s", "impulse_ns", "approach_m_s", "time_s"), 1.0)
         impacts = {"collisions": 3, "collisions_whole_run": 3, "conversion": "", "largest": largest | {"floe": struck}}
-        run = SimpleNamespace(summary={"impacts": impacts}, number=lambda key: 1.0, n_floes=7,
+        run = SimpleNamespace(summary={"impacts": impacts}, number=lambda key: 1.0, n_start=7,
                               bodies=[SimpleNamespace(name="berg"), SimpleNamespace(name="wall_y1")])
         return dict(report_run.impacts(run)["rows"])["largest peak"]
-    assert ", floe 6 at" in said(6) and ", wall_y1 at" in said(8)
+    assert ", floe 6 at" in said(6) and ", wall_y1 at" in said(8) and ", piece 3 at" in said(12)
 
 
 def test_none_tells_nothing_and_changes_nothing(line, tmp_path):

@@ -301,6 +301,25 @@ def test_no_signal_handler_is_installed():
         assert caught() == before
 
 
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("end, code", [("pass", 0), ("raise BergtowError('no', 3)", 3)])
+def test_a_signal_while_python_ends_leaves_the_exit_code(number, end, code):
+    """Python gives up its handlers before the objects of modules."""
+    done = python(f"""
+import os, signal
+from bergtow.cli import command
+from bergtow.errors import BergtowError
+class Late:
+    def __del__(self, kill=os.kill, me=os.getpid(), number=signal.{number}):
+        kill(me, number)
+late = Late()
+def main():
+    {end}
+command.guarded("late", main)
+""")
+    assert done.returncode == code and "Traceback" not in done.stderr
+
+
 def test_a_program_is_told_that_memory_has_run_out():
     said = python("""
 import bergtow, ctypes, os

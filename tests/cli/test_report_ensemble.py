@@ -376,6 +376,23 @@ variants:
     assert values["ice.size"].value == "0.7 m" and values["ice.seed"].value == "varied"
 
 
+@pytest.mark.parametrize("values, jams, said", [
+    ({}, True, "Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam, and "
+     "here they are dense enough to jam."),
+    ({"splitting.toughness": "150000 Pa m^0.5"}, False,
+     "Floes are rigid except that they split along straight lines at a toughness of 150000 Pa m^0.5. They do not bend, "
+     "crush or raft. Nothing limits the force of a jam of pieces that are too small to split."),
+    ({"splitting.toughness": "150000 Pa m^0.5", "crushing.pressure": "2000000 Pa", "rafting.kappa": "10"}, False,
+     "Floes are rigid except that they split along straight lines at a toughness of 150000 Pa m^0.5, and they slide "
+     "over each other (raft) above a load that grows with the square of their thickness, κ = 10, and their edges crush "
+     "at 2000000 Pa. They do not bend.")])
+def test_limits_tell_how_floes_give_way(values, jams, said):
+    texts = {f"ice.{key}": value for key, value in values.items()}
+    rigid = not {"crushing.pressure", "rafting.kappa"} & set(values)
+    case = report_ensemble.statement.Case(rigid, jams, "speed", {}, np.nan, 0.0, texts)
+    assert said in report_method.limits([({"label": "the case", "values": {}, "units": {}}, case)])
+
+
 def test_the_value_that_tells_texts_apart_names_the_conditions():
     def condition(a, b):
         return {"label": f"{a}, {b}", "values": {"ice.concentration": a, "variant": b},

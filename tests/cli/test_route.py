@@ -396,8 +396,10 @@ def test_a_place_gives_degrees_and_a_gpx(tmp_path):
 
 
 def test_a_new_look_leaves_the_way_so_far(tmp_path):
-    """The tow up to a look is that of the looks before, to the bit. Red: the way that is decided moves."""
-    write_case(tmp_path, BASIN)
+    """The tow up to a look is that of the looks before, to the bit; a look sees the pieces of floes that have split.
+    Red: the way that is decided moves; floes that are no longer there."""
+    write_case(tmp_path, changed(BASIN, ice__crushing={"pressure": 1e5}, ice__splitting={
+        "toughness": 100.0, "strength": 200.0, "least_size": 0.1}))
     done = called("route", tmp_path / "case.yml", "--to", "8.5,0.3", "--routes", "1", "--members", "1", "--replan",
                   "12 s", "-o", tmp_path / "out")
     assert done.returncode == DONE, done.stderr
@@ -408,6 +410,7 @@ def test_a_new_look_leaves_the_way_so_far(tmp_path):
     for name in ("look-1", "look-2", "tow-horizon"):
         with Run(tmp_path / "out/route" / name / "f001") as r:
             series.append(np.column_stack([r["body_x"], r["body_y"], r["ice_resistance"], r["kinetic_energy"]]))
+            assert r.n_pieces > 0
     for early, late in zip(series, series[1:]):
         assert np.array_equal(early, late[:len(early)])
     assert all(t["arrived"] for t in found["horizon"]["tows"].values())

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, TOW, changed, run
+from harness import CASE, TOW, call, changed, run, write_case
 
 TOUGHNESS, STRENGTH = 150e3, 300e3
 DURATION = 1.0  # of a collision, s
@@ -146,7 +146,9 @@ def test_generations_and_reserve_are_limits_that_are_told(tmp_path):
     few = run(tmp_path / "few", weak(reserve=3))
     s = few.summary["splitting"]
     assert s["splits"] == 3 and s["refused_reserve"] > 0
-    assert "split_reserve" in [w["code"] for w in few.summary["warnings"]]
+    warned = {w["code"]: w for w in few.summary["warnings"]}
+    assert warned["split_reserve"]["values"]["reserve"] == 3  # as the key has it, and not ids of pieces
+    assert "after 3 splits" in warned["split_reserve"]["text"]
     small = run(tmp_path / "small", weak(least_size=0.6)).summary["splitting"]
     assert small["refused_size"] > 0 and small["largest_refused_ratio"] > 1
 
@@ -185,6 +187,85 @@ def test_the_reader_joins_pieces_to_the_floes(tmp_path):
         assert folder.area[there].sum() == pytest.approx(folder.area[:n].sum(), rel=1e-12)
         assert (np.isfinite(folder.speed(-1)) == there).all() and len(folder.thickness) == folder.n_floes
         assert len(folder.polygons(-1)) == folder.n_floes and np.isfinite(folder.least_contact_force(-1)).all()
+
+
+def test_a_report_counts_splits(tmp_path):
+    from bergtow.reporting.run import quality
+    from bergtow.result.run import Run
+    r = run(tmp_path / "weak", weak())
+    s = r.summary["splitting"]
+    with Run(r.dir) as folder:
+        (value, words), = [row[1:] for row in quality(folder) if row[0] == "splits"]
+    assert value == str(s["splits"]) and s["splits"] > 0
+    assert words.startswith(f"{s['near']} at a load, {s['far']} bent, {s['burst']} burst, in {s['steps']} steps; ")
+    with Run(run(tmp_path / "none", TOW).dir) as folder:
+        assert "splits" not in [row[0] for row in quality(folder)]
+
+
+def test_a_collision_names_its_floe_or_its_piece(tmp_path):
+    """By the rows of /floes, /bodies and /pieces, at a time at which it was there. Red: ids, among which those of
+    pieces come before those of walls."""
+    r = run(tmp_path, changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)]))
+    made = read(r.dir)
+    with h5py.File(r.dir / "result.h5") as f:
+        n, bodies = len(f["floes/area"]), len(f["bodies/names"])
+        t, struck = f["impacts/time"][()], f["impacts/floe"][()]
+        born = np.concatenate([np.zeros(n + bodies), np.repeat(f["splits/time"][()], 2)])
+    gone = np.full(len(born), np.inf)
+    gone[made["parent"] + bodies * (made["parent"] >= n)] = born[n + bodies::2]
+    assert (struck >= n + bodies).any() and (born[struck] <= t + 1e-9).all() and (t <= gone[struck] + 1e-9).all()
+
+
+def test_force_chains_go_through_pieces(tmp_path):
+    """Outlines of a dump are those of the frame of its step, and each contact lies on both of its bodies."""
+    from bergtow.plot import chains
+    from bergtow.result.run import Run
+    dump = tmp_path / "step.h5"
+    case = changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)])
+    r = run(tmp_path, case, "--dump-contacts", f"300:{dump}")
+    read_as = chains.read(dump)
+    with Run(r.dir) as folder:
+        c = chains.joined(folder, read_as)
+        np.testing.assert_allclose(c.pose[:folder.n_floes], folder.pose(-1), atol=1e-9)
+        at = c.pose[c.body, :2] + c.lever
+        assert folder.n_pieces > 0 and (c.body >= folder.n_start).any() and np.isfinite(at).all()
+        np.testing.assert_allclose(at[:, 0], at[:, 1], atol=0.05)
+        assert chains.draw(folder, read_as)
+
+
+def test_counts_are_of_the_floes_of_the_start(tmp_path):
+    """Not of the pieces. Red: a report that counts both."""
+    from bergtow.result import origins
+    from bergtow.result.run import Run
+    from bergtow.stats.design_value import ice_as_read
+    made = run(tmp_path / "made", changed(TOW, run__duration=1, ice__thickness=0.05))
+    assert call("export", made.dir, "-o", tmp_path / "map.geojson", "--time", "0").returncode == 0
+    case = weak()
+    case["ice"] = {"outlines": str(tmp_path / "map.geojson"), "crushing": {"pressure": 1e5},
+                   "splitting": case["ice"]["splitting"]}
+    with Run(run(tmp_path / "read", case).dir) as folder:
+        assert folder.n_pieces > 0 and folder.n_start == folder.summary["n_floes"]
+        rows = {value.key: value.value for value in origins.of_field(folder)}
+        size = np.sqrt(4 * folder.area[:folder.n_start] / np.pi)
+        assert rows["floes"] == str(folder.n_start)
+        assert rows["floe size"] == f"{size.mean():.3g} m, {size.min():.3g} to {size.max():.3g} m"
+        assert ice_as_read(folder)["ice.size"] == f"{size.mean():.3g} m"
+
+
+def test_python_tells_floes_that_are_not_there(tmp_path):
+    import warnings
+
+    import bergtow
+    from bergtow.errors import BergtowError
+    with bergtow.Simulation(bergtow.Case(write_case(tmp_path, weak())), threads=1) as sim, warnings.catch_warnings():
+        warnings.simplefilter("error")  # NaN as a whole number
+        sim.step(sim.steps_left)
+        gone = np.isnan(sim.positions[:, 0])
+        assert gone.any() and (gone == (sim.motions == -1)).all() and (np.isnan(sim.thicknesses) == gone).all()
+        for change in (lambda id: sim.set_velocity(id, 0, 0), lambda id: sim.set_position(id, 1, 0, 0)):
+            for id in np.flatnonzero(gone)[[0, -1]]:
+                with pytest.raises(BergtowError, match=f"body {id}: is a floe that has split, or a piece"):
+                    change(id)
 
 
 def test_paraview_sees_the_pieces(tmp_path):

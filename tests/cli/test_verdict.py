@@ -174,6 +174,11 @@ def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
     for looser in (changed(dense, ice__concentration=0.7), changed(dense, ice__rafting={"kappa": 10}),
                    changed(dense, ice__crushing={"pressure": 1e5})):
         assert "upper bound" not in call("check", write_case(tmp_path, looser)).stdout
+    splits = call("check", write_case(tmp_path, changed(dense, ice__splitting={"toughness": 150e3}))).stdout
+    assert words.replace("rigid floes", "floes that split, into pieces that are rigid") in splits
+    found = json.loads(call("check", write_case(tmp_path, dense), "--json").stdout)["warnings"]
+    values, = [w["values"] for w in found if w["code"] == "load_unbounded"]
+    assert values == {"concentration_percent": pytest.approx(80), "limit_percent": 75}
     yields = call("check", write_case(tmp_path, changed(dense, ice__rafting={"kappa": 10}))).stdout
     assert "arches of floes POSSIBLE" in yields and "can carry arches of floes" in yields
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from bergtow import progress
+from bergtow._interrupts import STOPS
 from bergtow.cli import lacking
 from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
 
@@ -48,7 +49,8 @@ class _Stream:
 
 def guarded(name, main):
     """Run main() and exit with the code of its outcome. SIGTERM and SIGHUP act as Ctrl-C, so that the runs that main()
-    has started end with checkpoints; nohup keeps its effect. name: in front of messages."""
+    has started end with checkpoints; nohup keeps its effect. Once the outcome is known they do nothing: Python would
+    die of them while it ends. name: in front of messages."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)
@@ -58,8 +60,12 @@ def guarded(name, main):
     sys.stdout, sys.stderr = _Stream(sys.stdout), _Stream(sys.stderr)
     code = 0
     try:
-        with progress.told(name):
-            main()
+        try:
+            with progress.told(name):
+                main()
+        finally:
+            for number in STOPS:
+                signal.signal(number, signal.SIG_IGN)
     except BergtowError as error:
         code = _say(name, error, error.status)
     except ModuleNotFoundError as error:

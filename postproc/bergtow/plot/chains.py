@@ -5,7 +5,7 @@ The contacts come from `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`. A
 over the contact point to that of the other, or ends at the contact point on a large body or a wall. Force = normal
 impulse / time step, the points of one pair of floes together.
 """
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bergtow import arguments, writing
@@ -90,7 +90,8 @@ def outlines(run, c):
     for k, b in enumerate(run.bodies):
         if b.towed:
             pose[run.n_floes + k, :2] = run.wrap(pose[run.n_floes + k:run.n_floes + k + 1, :2])[0]
-    floes = [place(run.vertices[a:b], p) for a, b, p in zip(run.offsets[:-1], run.offsets[1:], pose)]
+    floes = [place(run.vertices[a:b], p) for a, b, p in zip(run.offsets[:-1], run.offsets[1:], pose)
+             if np.isfinite(p[0])]
     bodies = [place(b.vertices, p) for b, p in zip(run.bodies, pose[run.n_floes:])]
     return floes, bodies
 
@@ -122,11 +123,23 @@ def view(run, lines, bodies, whole):
     return low[0], high[0], low[1], high[1]
 
 
+def joined(run, c):
+    """The same with the pieces of floes behind the floes, as a run has them, NaN where they are not there yet; a dump
+    has them behind the bodies. Errors: RunError."""
+    n, bodies = run.n_start, len(run.bodies)
+    pieces = len(c.pose) - n - bodies
+    if not 0 <= pieces <= run.n_pieces:
+        raise RunError(run.path, f"has {n + bodies} bodies and {run.n_pieces} pieces of floes, the contacts are of "
+                       f"{len(c.pose)}", "give the file that this run dumped")
+    row = np.concatenate([np.arange(n), run.n_floes + np.arange(bodies), n + np.arange(pieces)])
+    pose = np.full((run.n_floes + bodies, 3), np.nan)
+    pose[row] = c.pose
+    return replace(c, body=row[c.body], pose=pose)
+
+
 def draw(run, c, whole=False):
     """The figure."""
-    if len(c.pose) != run.n_floes + len(run.bodies):
-        raise RunError(run.path, f"has {run.n_floes + len(run.bodies)} bodies, the contacts are of {len(c.pose)}",
-                       "give the file that this run dumped")
+    c = joined(run, c)
     lines, force = segments(run, c)
     floes, bodies = outlines(run, c)
     turn = (lambda p: np.asarray(p)[..., ::-1]) if run.geographic else np.asarray

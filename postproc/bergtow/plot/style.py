@@ -108,10 +108,10 @@ def conditions(run):
     if run.n_floes and np.isfinite(concentration):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
-        words.append(f"{run.n_floes - run.n_pieces} floes")
+        words.append(f"{run.n_start} floes")
         # floes of their own thickness
         if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):
-            words.append(f"{np.mean(run.thickness):.3g} m thick")
+            words.append(f"{np.mean(run.thickness[:run.n_start]):.3g} m thick")
         elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")
     mode, speed, made = run.case.get("tow.mode", ""), run.value("tow.speed"), run.speed_made_good

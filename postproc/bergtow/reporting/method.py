@@ -15,7 +15,7 @@ from bergtow.text import capability as capability_text
 from bergtow.text import loads as loads_text
 from bergtow.text.ensemble import counted
 
-KAPPA, PRESSURE = "ice.rafting.kappa", "ice.crushing.pressure"
+KEYS = "ice.splitting.toughness", "ice.rafting.kappa", "ice.crushing.pressure"
 
 
 def _span(values, text=lambda v: f"{v:.3g}"):
@@ -83,16 +83,20 @@ def _span_of(cases, key):
     return _span([v for v in values if v > 0] or [0.0], lambda v: values.get(v, "0"))
 
 
-def _ice(case, kappa, pressure):
-    """What floes do; kappa, pressure: of all cases, so that those of another value are no other sentence."""
-    if case.rigid:
-        return ("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
-                + (", and here they are dense enough to jam." if case.jams else "."))
-    rafts, crushes = (case_value(case.texts, key, 0.0) > 0 for key in (KAPPA, PRESSURE))
-    ways = [*["they slide over each other (raft) above a load that grows with the square of their thickness, κ = "
+def _ice(case, toughness, kappa, pressure):
+    """What floes do; toughness, kappa, pressure: of all cases, so that those of another value are no other sentence."""
+    splits, rafts, crushes = (case_value(case.texts, key, 0.0) > 0 for key in KEYS)
+    here = ", and here they are dense enough to jam." if case.jams else "."
+    if case.rigid and not splits:
+        return f"Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam{here}"
+    ways = [*[f"they split along straight lines at a toughness of {toughness}"] * splits,
+            *["they slide over each other (raft) above a load that grows with the square of their thickness, κ = "
               f"{kappa}"] * rafts, *[f"their edges crush at {pressure}"] * crushes]
-    never = ["break", "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)]
-    return f"Floes are rigid except that {' and '.join(ways)}. They do not {', '.join(never[:-1])} or {never[-1]}."
+    *never, last = *["break"] * (not splits), "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)
+    said = (f"Floes are rigid except that {', and '.join(ways)}. They do not {', '.join(never)}"
+            f"{' or ' * bool(never)}{last}.")
+    return said if not case.rigid else \
+        f"{said} Nothing limits the force of a jam of pieces that are too small to split{here}"
 
 
 def _pack(case):
@@ -129,8 +133,8 @@ def limits(cases, vessel=False):
     def of_each(say):
         for text, where in loads_text.shared([(c, say(case)) for c, case in cases]):
             yield f"For {where}: {text[0].lower()}{text[1:]}" if where else text
-    kappa, pressure = (_span_of(cases, key) for key in (KAPPA, PRESSURE))
-    out += of_each(lambda case: _ice(case, kappa, pressure))
+    values = [_span_of(cases, key) for key in KEYS]
+    out += of_each(lambda case: _ice(case, *values))
     out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
                "there are no waves.")
     for say in (_pack, _end, _line, *[_vessel] * (not vessel)):

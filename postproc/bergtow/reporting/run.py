@@ -22,8 +22,8 @@ import numpy as np
 KEY_VALUES = {
     "Ice": [
         "ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law",
-        "ice.density", "ice.friction", "ice.restitution", "ice.crushing.pressure", "ice.rafting.kappa", "ice.field",
-        "ice.outlines", "ice.seed", "lead.mode"
+        "ice.density", "ice.friction", "ice.restitution", "ice.crushing.pressure", "ice.rafting.kappa",
+        "ice.splitting.toughness", "ice.field", "ice.outlines", "ice.seed", "lead.mode"
     ],
     "Towed body": [
         "body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass",
@@ -206,8 +206,9 @@ def impacts(run):
              start_peak(run, "impacts.start_largest_quasi_static_load_n"))]
     big = i.get("largest")
     if isinstance(big, dict):
-        body = int(big["floe"]) - run.n_floes
-        struck = run.bodies[body].name if 0 <= body < len(run.bodies) else f"floe {big['floe']}"
+        body = int(big["floe"]) - run.n_start
+        struck = f"floe {big['floe']}" if body < 0 else \
+            run.bodies[body].name if body < len(run.bodies) else f"piece {body - len(run.bodies)}"
         rows.append((
             "largest peak",
             f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse "
@@ -262,6 +263,15 @@ def quality(run):
             f"{style.short(n('raft_edge_work_j'))} J, "
             f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction "
             f"{style.short(n('raft_friction_work_j'))} J"
+        ))
+    if run.summary.get("splitting"):
+        at, bent, burst, steps, small, old = (n(f"splitting.{name}") for name in (
+            "near", "far", "burst", "steps", "refused_size", "refused_generation"))
+        rows.append((
+            "splits", f"{n('splitting.splits'):.0f}",
+            f"{at:.0f} at a load, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks of "
+            f"{style.short(n('splitting.crack_length_m'))} m; kept whole by their size {small:.0f}, by their "
+            f"generation {old:.0f}"
         ))
     if n("stalled_s", 0):
         rows.append(("body stood still", f"{style.short(n('stalled_s'))} s", "while the tow asked for motion"))

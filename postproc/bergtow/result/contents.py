@@ -20,7 +20,8 @@ def options(p):
 
 def perform(a):
     with Run(a.run) as run:
-        print(f"{run.path}: {run.n_floes} floes, {len(run.bodies)} bodies, {len(run['time'])} samples, "
+        pieces = f"{run.n_pieces} pieces of them, " if run.n_pieces else ""
+        print(f"{run.path}: {run.n_start} floes, {pieces}{len(run.bodies)} bodies, {len(run['time'])} samples, "
               f"{run.n_frames} frames")
         for name, item in entries(run.summary):
             print(f"  {name:40} {item}")

@@ -58,11 +58,16 @@ class Frames:
         which it is not there: before it was a piece, or after it has split."""
         return len(self._file["pieces/area"]) if "pieces" in self._file else 0
 
+    @property
+    def n_start(self):
+        """Floes that were there from the start: the first so many of the floes."""
+        return self.n_floes - self.n_pieces
+
     @cached_property
     def splits(self):
         """Floes that split: dict of columns [S], "time" s, "parent", "generation", "mode", "ratio", "thickness" m, and
         "crack" [S, 4] m, x and y of its ends; empty where floes do not split. Split k made the floes
-        n_floes - n_pieces + 2 k and the one after it."""
+        n_start + 2 k and the one after it."""
         return {name: self._read(f"splits/{name}") for name in self._file.get("splits", ())}
 
     @property
@@ -150,7 +155,7 @@ class Frames:
 
     def _of_floes(self, name, frame, others=0):
         """[N, ...] of the floes in a frame; others: bodies that follow the floes in the file."""
-        own = self.n_floes - self.n_pieces
+        own = self.n_start
         data = self._frame(name, frame, own + others)[:own]
         if not self.n_pieces:
             return data
@@ -190,7 +195,7 @@ class Frames:
 
     def body_speed(self, frame):
         """[B] m/s, speed of each body."""
-        own = self.n_floes - self.n_pieces  # pieces are not in this data set
+        own = self.n_start  # pieces are not in this data set
         return self._frame("speed", frame, own + len(self.bodies))[own:]
 
     def wrap(self, xy, centre=None):

@@ -91,7 +91,8 @@ def short_key(key):
     """Last part of a case key, in words: ice.friction is "ice friction", ice.concentration "concentration"."""
     section, _, name = key.rpartition(".")
     plain = name.replace("_", " ")
-    return plain if name in ("concentration", "thickness") or section in ("", "run") else f"{section} {plain}"
+    return plain if name in ("concentration", "thickness") or section in ("", "run") else \
+        f"{section.replace('.', ' ')} {plain}"
 
 
 @dataclass(frozen=True)

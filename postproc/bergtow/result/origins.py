@@ -144,7 +144,7 @@ def not_used(run, case):
     found = {key: f"not used: no effect {why}" for key, why in _library.unused(run.resolved_text).items()}
     ice = source_of_ice(case)
     asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant" or bool(
-        np.any(np.isclose(run.thickness, run.value("ice.thickness"), rtol=1e-12, atol=0))))
+        np.any(np.isclose(run.thickness[:run.n_start], run.value("ice.thickness"), rtol=1e-12, atol=0))))
     if ice and not asked:
         found |= dict.fromkeys(THICKNESS, f"not used: the ice is read by {ice}, with its thickness")
     return found
@@ -163,12 +163,12 @@ def of_field(run):
     if ice is None or not run.n_floes:
         return []
     said = f"counted in the ice that {ice} read"
-    rows = (("floes", str(run.n_floes),
+    rows = (("floes", str(run.n_start),
              "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
                                   "area fraction of ice in the ice region at the start, before a lead"),
-            ("floe size", spread(np.sqrt(4 * run.area / np.pi),
+            ("floe size", spread(np.sqrt(4 * run.area[:run.n_start] / np.pi),
                                  "m"), "diameter of the circle of a floe's area: mean and range"),
-            ("floe thickness", spread(run.thickness, "m"), "mean and range"))
+            ("floe thickness", spread(run.thickness[:run.n_start], "m"), "mean and range"))
     return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
 
 

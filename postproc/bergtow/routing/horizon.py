@@ -119,8 +119,10 @@ class Horizon:
             frame = run.frame_at(time - self.w["age"])
             moved = np.array(s.drift) * (time - run.frame_times[frame])
             outlines = run.polygons(frame)
-            ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in s.moving],
-                                      thickness=run.thickness[s.moving])
+            some = np.append(s.moving, np.arange(run.n_start, run.n_floes))
+            some = some[np.isfinite(run.pose(frame)[some, 0])]  # what has split is not there, its pieces are
+            ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in some],
+                                      thickness=run.thickness[some])
             body = np.array([run["body_x"][-1], run["body_y"][-1]])
             broken = sum(e["kind"] == "line_broken" for e in run.events)
             if (tows.to_goal(body[None], self.goal)[0] <= tows.ARRIVED * s.hull.width

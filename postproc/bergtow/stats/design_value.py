@@ -16,7 +16,7 @@ from bergtow.errors import RunError
 from bergtow.result.members import short_key
 from bergtow.result.origins import source_of_ice
 from bergtow.result.origins import short as in_short
-from bergtow.result.run import Run
+from bergtow.result.run import Run, case_value
 from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import load as stat_load
@@ -80,8 +80,8 @@ def ice_as_read(run):
     """{key: value} of a run whose ice is read from a file: the keys say nothing of it."""
     if source_of_ice(run.case) is None or not run.n_floes:
         return {}
-    size = np.sqrt(4 * run.area / np.pi).mean()
-    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness.mean():.3g} m"}
+    size = np.sqrt(4 * run.area[:run.n_start] / np.pi).mean()
+    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness[:run.n_start].mean():.3g} m"}
 
 
 def case_of(e, rows):
@@ -142,8 +142,10 @@ def _of_the_case(e, rows, case, tow):
     if case is None:
         out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
     elif case.jams:
-        out.append(("rigid floes so dense that they jam: nothing in the model limits the force of a jam, so "
-                    "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
+        splits = case_value(case.texts, "ice.splitting.toughness", 0.0) > 0
+        out.append((f"{'pieces of floes' if splits else 'rigid floes'} so dense that they jam: nothing in the model "
+                    "limits the force of a jam, so the value has no upper bound; set ice.crushing.pressure or "
+                    "ice.rafting.kappa",
                     f"{100 * np.nanmax(_numbers(e, 'concentration', rows), initial=0.0):.0f} %"))
     if case is not None and case.mode == "speed":
         out.append(("the speed is prescribed: neither vessel nor line yields", ""))

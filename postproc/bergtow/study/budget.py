@@ -21,6 +21,7 @@ from bergtow.stats import loads
 from bergtow.stats import load as stat_load
 from bergtow.stats import variance as stat_budget
 from bergtow.study import analysis
+from bergtow.study.case_file import contents, is_study
 from bergtow.study.runs import run_members
 from bergtow.table import hours_text
 
@@ -125,16 +126,19 @@ def without_intervals(found):
     return {k: (np.nan, np.nan) if k.endswith("_95") else without_intervals(v) for k, v in found.items()}
 
 
+def refuse(file, latin, common):
+    """Errors: RunError where a study has no budget, however many of its members are run."""
+    if not latin:
+        raise RunError(file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study", CASE)
+    if common:
+        raise RunError(file, "has common fields, whose scatter is in all conditions alike", "set fields: own", CASE)
+
+
 def of_ensemble(e, of=OF[0], computed=None):
     """The budget of a number of an ensemble. The numerical error, numerics(), is known for the mean ice resistance
     alone: in per cent of it, which does not apply to a number that includes drag or inertia. If members of the sample
     failed, or have no such number, the missing values are unknown, and there are no intervals. Errors: RunError."""
-    if "sampling: latin-hypercube" not in e.study:
-        raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study",
-                       CASE)
-    if "fields: common" in e.study:
-        raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own",
-                       CASE)
+    refuse(e.file, "sampling: latin-hypercube" in e.study, "fields: common" in e.study)
     meaning, done, values = numbers(e, of)
     if (without := e.without_bound(np.arange(e.n))) and not of.startswith(BOUNDED):
         raise RunError(e.file, f"has no budget of {of}: {without}", "let ice give way (ice.rafting.kappa, "
@@ -191,9 +195,15 @@ def options(p):
 def perform(a):
     folder = a.output or Path("out") / a.study.stem
     analysis.begin("budget", a.study, "study", folder, a.force)
+    if a.study.is_file() and is_study(a.study):  # the program refuses a case, and reads a pipe
+        keys = contents(a.study)
+        refuse(a.study, keys.get("sampling") == "latin-hypercube", keys.get("fields") == "common")
+        if isinstance(n := keys.get("samples"), int) and n < stat_budget.LEAST:
+            raise RunError(a.study, f"has {n} samples, too few for a budget", f"take {stat_budget.LEAST} or more", CASE)
+    converge = read_converge(a.converge, folder)
     sys.stderr.write(run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)[1])
     e = Members(folder)
-    found = of_all(e, a.of or those_there(e), read_converge(a.converge, folder))
+    found = of_all(e, a.of or those_there(e), converge)
     analysis.keep("budget", found, folder, a.force)
     if found["failed"]:
         raise RunError(folder, f"{len(found['failed'])} of {e.n} members failed ({listed(list(found['failed']))}): the "
