@@ -176,7 +176,7 @@ static void apply_all(const bt_batch *batches, bt_idx n, bt_vel *v)
     for (bt_idx k = 0; k < n; k++) apply(&batches[k], v);
 }
 
-void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work.batch, cell->work.n_batches, v); }
+void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work->batch, cell->work->n_batches, v); }
 
 /// As the update of one contact in project.c: its points one after the other.
 BT_INLINE vec project(bt_batch *batch, bt_vel *d)
@@ -316,7 +316,7 @@ typedef void all_batches(bt_batch *batches, bt_idx n, bt_vel *v, visit *o);
 
 static void visit_cell(bt_cell *cell, bt_vel *v, all_batches *pass, visit *o, bt_totals *totals)
 {
-    const bt_idx n = cell->work.n_batches;
+    const bt_idx n = cell->work->n_batches;
     moved few[BT_FEW / BT_LANES];
     bt_idx few_due[2 * BT_FEW / BT_LANES];
     const bool many = n > BT_FEW / BT_LANES;
@@ -324,25 +324,25 @@ static void visit_cell(bt_cell *cell, bt_vel *v, all_batches *pass, visit *o, bt
     o->due = many ? bt_alloc(2 * (size_t)n, sizeof *o->due) : few_due;
     o->again = o->due + n;
     o->rests = bt_batch_rests(cell);
-    pass(cell->work.batch, n, v, o);
+    pass(cell->work->batch, n, v, o);
     if (many) free(o->y), free(o->due);
     totals->most = bt_max(totals->most, o->most);
-    cell->work.updates += o->done;
+    cell->updates += o->done;
     bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)o->done);
     if (o->sweep->moves) bt_rounds_moved(o->sweep, o->moved, o->against, totals);
 }
 
 void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals)
 {
-    if (!cell->work.packed) bt_batch_pack(cell, inv, NULL);
+    if (!cell->work->packed) bt_batch_pack(cell, inv, NULL);
     visit o = {.sweep = sweep, .times = times > 1 ? times : 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
-    visit_cell(cell, v, cell->laws.limits ? go_through_bounded : go_through_rigid, &o, totals);
+    visit_cell(cell, v, cell->laws->limits ? go_through_bounded : go_through_rigid, &o, totals);
 }
 
 void bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *sweep,
                       bt_totals *totals)
 {
-    if (!cell->work.packed) bt_batch_pack(cell, inv, &slop);
+    if (!cell->work->packed) bt_batch_pack(cell, inv, &slop);
     visit o = {.sweep = sweep, .times = 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
     visit_cell(cell, d, go_through_projection, &o, totals);
 }

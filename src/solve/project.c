@@ -44,8 +44,8 @@ static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double l
     const double slip = world->par.dt * fabs(bt_tangent_velocity(contact, va, vb));
     const double error = turn * (0.5 * turn * (bodies->radius[contact->a] + bodies->radius[contact->b]) + slip);
     if (!(bt_max(gap, -world->par.slop) - error < -least)) return false;
-    if (!cell->laws.limits) return true;
-    const bt_limit *limit = &cell->laws.limits[j];
+    if (!cell->laws->limits) return true;
+    const bt_limit *limit = &cell->laws->limits[j];
     for (int law = 0; law < BT_ALL_LAWS; law++)
         if (limit->record[law] >= 0) return false;
     return limit->grown[0] == 0 && limit->grown[1] == 0;
@@ -77,7 +77,7 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
             }
             gaps->gap[i] += world->par.dt * bt_normal_velocity(contact, i, &world->bodies.vel[contact->a],
                                                                &world->bodies.vel[contact->b]);
-            if (cell->laws.limits) gaps->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
+            if (cell->laws->limits) gaps->gap[i] += cell->laws->limits[j].grown[i]; // what has given way in this step
             totals->most = bt_max(totals->most, -gaps->gap[i]);
         }
         if (!world->par.plain_sweeps && turns(world, cell, j, LEFT * world->par.slop))
@@ -129,7 +129,7 @@ static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, c
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];
         const bt_gaps *gaps = &cell->gaps[j];
-        const bt_in_place *in_place = &cell->work.in_place[j];
+        const bt_in_place *in_place = &cell->work->in_place[j];
         double worst = 0;
         bool on = problem->plain;
         for (int i = 0; i < contact->n; i++) {
@@ -143,7 +143,7 @@ static bt_found residual_in_place(bt_cell *cell, double slop, const bt_vel *d, c
         found.most = bt_max(found.most, worst);
         found.bad += worst > BT_NEAR * problem->tolerance;
         found.rows += contact->n;
-        if (on) cell->work.list[cell->work.n_list++] = j;
+        if (on) cell->work->list[cell->n_listed++] = j;
     }
     return found;
 }
@@ -167,29 +167,29 @@ static void project_cell(bt_world *world, bt_idx k, const void *context, bt_tota
 {
     const bt_sweep *sweep = context;
     bt_cell *cell = &world->cells->cell[k];
-    if (cell->work.n_list == 0) return;
+    if (cell->n_listed == 0) return;
     if (in_batches(cell, sweep->problem->plain)) {
         bt_batch_project(cell, world->par.slop, world->solver->shift, world->bodies.inv, sweep, totals);
         return;
     }
     bt_moved moved;
     if (sweep->moves) bt_moved_begin(&moved, cell);
-    for (bt_idx j = 0; sweep->moves && j < cell->work.n_list; j++) {
-        bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
+    for (bt_idx j = 0; sweep->moves && j < cell->n_listed; j++) {
+        bt_in_place *in_place = &cell->work->in_place[cell->work->list[j]];
         bt_rounds_move(sweep, in_place->multiplier, in_place->before, moved.y[j], 2);
     }
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx u = cell->work.list[j];
-        bt_in_place *in_place = &cell->work.in_place[u];
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_idx u = cell->work->list[j];
+        bt_in_place *in_place = &cell->work->in_place[u];
         totals->most = bt_max(totals->most, bt_project_contact(&cell->contacts[u], &in_place->mass, &cell->gaps[u],
                                                                in_place->multiplier, world->par.slop,
                                                                world->solver->shift, world->bodies.inv));
     }
-    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->work.n_list);
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->n_listed);
     if (!sweep->moves) return;
     double against = 0;
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_in_place *in_place = &cell->work->in_place[cell->work->list[j]];
         for (int i = 0; i < 2; i++)
             against += bt_rounds_against(in_place->mass.w[i], in_place->multiplier[i], in_place->before[i],
                                          moved.y[j][i]);

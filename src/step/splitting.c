@@ -135,7 +135,7 @@ typedef struct {
 /// Is contact j the edge of floes that have rafted (contact/raft.h)?
 static bool is_raft_edge(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
-    return bt_law_on(&world->par, BT_LAW_RAFTING) && cell->laws.limits[j].record[BT_LAW_RAFTING] >= 0;
+    return bt_law_on(&world->par, BT_LAW_RAFTING) && cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0;
 }
 
 /// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer end: that
@@ -284,8 +284,8 @@ static void add_cell(bt_world *world, const bt_cell *cell, pass what, load_list 
         if (list_a) add_side(world, cell, j, &p, &c, false, to);
         if (list_b) add_side(world, cell, j, &p, &c, true, to);
     }
-    for (bt_idx k = 0; k < cell->laws.n_memory; k++) {
-        const bt_memory *memory = &cell->laws.memory[k];
+    for (bt_idx k = 0; k < cell->laws->n_memory; k++) {
+        const bt_memory *memory = &cell->laws->memory[k];
         if (memory->law != BT_LAW_RAFTING) continue;
         for (int side = 0; side < 2; side++) {
             const bt_idx i = bt_world_index(world, side ? memory->b : memory->a);
