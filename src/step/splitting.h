@@ -112,8 +112,8 @@ bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t 
 /// ∫r²dA of floe i about its centroid, m⁴: of a piece, what was left for it.
 double bt_splitting_polar(const bt_world *world, bt_idx i);
 
-/// Collective. Splits from..n of the history: pieces in the place of their parents, all velocities those at the start of
-/// the step.
+/// Collective. Splits from..n of the history: pieces in the place of their parents, all velocities those at the start
+/// of the step.
 void bt_splitting_put(bt_world *world, int64_t from);
 
 /// Collective. After the solve. True: floes were cut, their pieces are new bodies, all velocities are those at the

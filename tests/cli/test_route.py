@@ -535,7 +535,8 @@ LAND = {"type": "Polygon", "coordinates": [[[7, -1], [9.5, -1], [9.5, 1], [7, 1]
 
 
 def local(geometry):
-    return {"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": _library.limit("map_local_crs")}},
+    return {"type": "FeatureCollection",
+            "crs": {"type": "name", "properties": {"name": _library.limit("map_local_crs")}},
             "features": [{"type": "Feature", "properties": {}, "geometry": geometry}]}
 
 
