@@ -171,9 +171,9 @@ void bt_domain_note(bt_world *world)
         if (!cell->own) continue;
         const bool last = k == cells->n - 1;
         domain->work[last ? large : bt_division_place(world, cell->x, cell->y)] +=
-            cell->n_contacts * CONTACT_STEP + (double)cell->work.updates * CONTACT_SWEEP + cell->search.n_pairs * PAIR +
+            cell->n_contacts * CONTACT_STEP + (double)cell->updates * CONTACT_SWEEP + cell->search.n_pairs * PAIR +
             (cell->end - cell->first) * (last || bt_cells_moves(cells, k) ? BODY : BT_WORK_AT_REST);
-        cell->work.updates = 0;
+        cell->updates = 0;
     }
     domain->drift += world->par.dt *
                      ((world->par.period_x > 0 ? fabs(world->par.water_u) : 0) +

@@ -5,7 +5,7 @@
 #define BERGTOW_DOMAIN_H
 
 #include "bergtow/comm.h"
-#include "space/cells.h"
+#include "space/exchange.h"
 #include "bergtow/world.h"
 #include "space/exchange.h"
 #include "space/phases.h"
@@ -78,8 +78,10 @@ typedef void bt_take_cell(bt_cells *cells, int32_t x, int32_t y, double value);
 /// Collective. Send a value [n cells] of the cells of this rank to the ranks that hold cells beside them, and take
 /// theirs.
 void bt_domain_tell_cells(bt_world *world, const double *value, bt_take_cell *take);
+/// Set a bit for every body [n bodies] that the contacts of a cell touch.
+typedef void bt_touch(const bt_cell *cell, uint8_t bit, uint8_t *touched);
 /// Collective. After the detection: which bodies the contacts of this step touch.
-void bt_domain_select(bt_world *world);
+void bt_domain_select(bt_world *world, bt_touch *touch);
 /// Floes here that have a contact with a large movable body of another rank.
 void bt_domain_beside_large(bt_world *world, void (*mark)(bt_world *world, bt_idx body));
 /// Floes here that have a contact of this step on another rank.

@@ -234,7 +234,7 @@ void bt_domain_tell_cells(bt_world *world, const double *value, bt_take_cell *ta
     }
 }
 
-void bt_domain_select(bt_world *world)
+void bt_domain_select(bt_world *world, bt_touch *touch)
 {
     bt_domain *domain = world->domain;
     if (!domain) return;
@@ -243,11 +243,7 @@ void bt_domain_select(bt_world *world)
     if (world->bodies.n > 0) memset(domain->touched, 0, (size_t)world->bodies.n);
     for (bt_idx i = 0; i < cells->n_order; i++) {
         const bt_cell *cell = &cells->cell[cells->order[i]];
-        if (!cell->border) continue;
-        for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            domain->touched[cell->contacts[j].a] |= (uint8_t)(1 << cell->phase);
-            domain->touched[cell->contacts[j].b] |= (uint8_t)(1 << cell->phase);
-        }
+        if (cell->border) touch(cell, (uint8_t)(1 << cell->phase), domain->touched);
     }
     for (int k = 0; k < domain->n_links; k++) {
         bt_link *link = &domain->link[k];

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The layers of the program: who calls and includes whom, held against the order below.
 
-    tests/layers.py             upward edges, circles, doubled type names, stray public includes; exit code 1 if any
+    tests/layers.py             upward edges and types, circles, doubled type names, stray public includes; exit code 1
+                                if any
     tests/layers.py --picture   the picture in docs/architecture.md, from the objects and sources as they are
     tests/layers.py --write     puts that picture into docs/architecture.md
 
@@ -135,6 +136,19 @@ def doubled_types(files):
             if len({n for n, _ in places}) > 1]
 
 
+def named_above(files):
+    """Types of a higher layer in a lower one, but for `struct bt_type *`: a slot that only the owner looks into."""
+    layer = {}
+    texts = {name: re.sub(r"//.*", "", (ROOT / name).read_text()) for name in files if layer_of(name) in LAYERS}
+    for name, text in texts.items():
+        for _, tag, typedef in re.findall(r"\b(struct|union) (bt_\w+) \{|^\} (bt_\w+);", text, re.MULTILINE):
+            layer[tag or typedef] = ORDER.index(layer_of(name))
+    return [f"{name} names {t}, a type of the higher layer {ORDER[layer[t]]}, other than as a struct pointer"
+            for name, text in texts.items()
+            for t in sorted(set(re.findall(r"\bbt_\w+", re.sub(r"\bstruct bt_\w+(?= \*|;)", "", text))))
+            if layer.get(t, 0) > ORDER.index(layer_of(name))]
+
+
 def strays(edges):
     """Public headers that include a header of the inside."""
     return [f"{a} is public and includes {b}" for a in sorted(edges) if a.startswith("include/")
@@ -188,7 +202,7 @@ def main():
     if "--write" in sys.argv:
         page.write_text(f"{before}{MARKS[0]}\n{shown}\n{MARKS[1]}{after}")
         return 0
-    bad = upward(called) + upward(included) + doubled_types(files) + strays(included)
+    bad = upward(called) + upward(included) + doubled_types(files) + named_above(files) + strays(included)
     bad += ["files call each other in a circle: " + ", ".join(ring) for ring in circles(called)]
     bad += ["headers include each other in a circle: " + ", ".join(ring) for ring in circles(included)]
     if not rest or old.strip() != shown:

@@ -1,75 +1,23 @@
 // SPDX-License-Identifier: MIT
-// What `bergtow check` says of a case beside its own numbers: defaults in use, warnings before a run, all of it as
-// JSON.
+// What the check of a case and that of a study share: refusals, warnings, and the ice that a run would begin with.
+//
+// Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full
+// scale) and much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
 
-#include "bergtow/comm.h"
-#include "bergtow/world.h"
 #include "app/cmd_check.h"
-#include "base/elementary.h"
-#include "base/json.h"
-#include "base/units.h"
+#include "bergtow/comm.h"
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/constraints.h"
 #include "case/case_tow.h"
 #include "case/cost.h"
 #include "case/ice_bounds.h"
-#include "case/schema.h"
 #include "case/warning.h"
 #include "estimate/packing.h"
 #include "output/summary.h"
 #include "run/setup.h"
 #include "split/law.h"
-
-// --- defaults --------------------------------------------------------------------------------------------------------
-
-// Values that a case leaves to the program, and that follow from the rest of it: `check` says what they became.
-
-enum { FIRST = 21, MOST = 118 }; // columns of a line
-
-/// Is the value of this row one that follows, that has an effect, and that nobody changed?
-static bool is_followed(const bt_case *input, const bt_key *key, double *value)
-{
-    if (key->type != BT_KEY_REAL || !key->preset || key->preset[0] != '=') return false;
-    *value = bt_value_number(key, input);
-    return isfinite(*value) && !bt_case_why_unused(input, key->name) && !bt_case_changed(input, key->name);
-}
-
-void bt_check_print_defaults(const bt_case *input)
-{
-    int column = 0;
-    for (int i = 0; i < bt_n_case_keys; i++) {
-        const bt_key *key = &bt_case_keys[i];
-        double value;
-        char text[160];
-        if (!is_followed(input, key, &value)) continue;
-        const char *unit = bt_units_symbol(key->unit);
-        if (fabs(value) < 1e-12) value = 0; // rounding
-        const int n = snprintf(text, sizeof text, "%s %.4g%s%s", key->name, value, *unit ? " " : "", unit);
-        const bool wraps = column > 0 && column + 2 + n > MOST;
-        if (column == 0) column = printf("%-*s%s", FIRST, "by default", text);
-        else if (wraps) column = printf(",\n%*s%s", FIRST, "", text) - 2;
-        else column += printf(", %s", text);
-    }
-    if (column > 0) printf("\n");
-}
-
-static void check_write_defaults(bt_json *json, const bt_case *input)
-{
-    bt_json_open(json, "by_default", '{');
-    for (int i = 0; i < bt_n_case_keys; i++) {
-        double value;
-        if (is_followed(input, &bt_case_keys[i], &value)) bt_json_number(json, bt_case_keys[i].name, value);
-    }
-    bt_json_close(json, '}');
-}
-
-// --- ready to run ----------------------------------------------------------------------------------------------------
-
-// What the check of a case and that of a study share: refusals, warnings and the ice that a run would begin with.
 
 static bt_check_ice ice_of_case(const bt_case *input)
 {
@@ -218,81 +166,4 @@ void bt_check_warn(const bt_case *input, const bt_field *field, const bt_check_i
     if (ice->count < 1) return;
     bt_ice_warn(input, ice->size, ice->thickness, warnings);
     bt_ice_warn_slow(input, ice->size, warnings);
-}
-
-// --- JSON ------------------------------------------------------------------------------------------------------------
-
-// The numbers of `bergtow check` as JSON, for scripts.
-
-static void write_domain(bt_json *json, const bt_case *input, const bt_check_ice *ice)
-{
-    const bt_arch arch = bt_arch_of(input, ice->concentration, ice->count < 1 ? 0 : ice->size);
-    bt_json_open(json, "domain", '{');
-    bt_json_number(json, "length_m", input->domain.length);
-    bt_json_number(json, "width_m", input->domain.width);
-    bt_json_string(json, "across", arch.key);
-    bt_json_string(json, "sides", arch.sides);
-    bt_json_number(json, "body_widths", arch.bodies);
-    bt_json_number(json, "body_widths_needed", arch.needed);
-    bt_json_bool(json, "load_unbounded", arch.unbounded);
-    bt_json_close(json, '}');
-}
-
-static void write_ice(bt_json *json, const bt_case *input, const bt_check_ice *ice)
-{
-    const bool splits = ice->count >= 1 && input->ice.splitting.toughness > 0;
-    const bt_check_split split = splits ? bt_check_split_of(input, ice) : (bt_check_split){NAN, NAN};
-    bt_json_open(json, "ice", '{');
-    bt_json_number(json, "floes", round(ice->count));
-    bt_json_number(json, "concentration", ice->concentration);
-    bt_json_number(json, "mean_size_m", ice->count < 1 ? NAN : ice->size);
-    bt_json_number(json, "mean_thickness_m", ice->count < 1 ? NAN : ice->thickness);
-    bt_json_number(json, "split_three_point_n", split.three_point);
-    bt_json_number(json, "split_opening_n", split.opening);
-    bt_json_close(json, '}');
-}
-
-static void write_run(bt_json *json, const bt_case *input, const bt_check_ice *ice)
-{
-    const bt_check_step step = bt_check_step_of(input, ice);
-    bt_json_open(json, "run", '{');
-    bt_json_number(json, "duration_s", input->run.duration);
-    bt_json_number(json, "dt_s", input->run.dt);
-    bt_json_int(json, "n_steps", bt_case_steps(input));
-    bt_json_number(json, "tow_distance_m", input->tow.mode == BT_TOW_NONE
-                   ? 0 : bt_case_tow_distance(input, input->run.duration));
-    bt_json_bool(json, "dt_resolves_collisions", step.contact);
-    bt_json_bool(json, "dt_resolves_floes", ice->count < 1 || step.floes);
-    bt_json_close(json, '}');
-}
-
-static void write_cost(bt_json *json, const bt_case *input, const bt_comm *comm, const bt_check_ice *run)
-{
-    const bt_cost_disk disk = bt_cost_disk_of(input, run->count, run->corners, comm->size);
-    bt_json_open(json, "cost", '{');
-    bt_json_number(json, "memory_b", bt_cost_memory(input, run->count, run->parts, comm->size, comm->ranks_here));
-    bt_json_number(json, "frames", bt_cost_frames(input));
-    bt_json_number(json, "disk_b", bt_cost_left(&disk));
-    bt_json_number(json, "disk_while_running_b", disk.most);
-    bt_json_number(json, "core_time_s", bt_check_seconds(input, run));
-    bt_json_number(json, "making_of_ice_s", bt_cost_making(input, run->made));
-    bt_json_close(json, '}');
-}
-
-void bt_check_print_json(const char *path, const bt_case *input, const bt_comm *comm, const bt_check_ice *ice,
-                         const bt_check_ice *run, const bt_errors *warnings)
-{
-    bt_json json = {0};
-    bt_json_open(&json, NULL, '{');
-    bt_json_string(&json, "case", path);
-    bt_json_string(&json, "title", input->run.title);
-    bt_warnings_json(&json, "warnings", warnings);
-    write_domain(&json, input, ice);
-    write_ice(&json, input, ice);
-    write_run(&json, input, run);
-    check_write_defaults(&json, input);
-    write_cost(&json, input, comm, run);
-    bt_json_close(&json, '}');
-    fputs(json.text, stdout);
-    bt_json_free(&json);
 }

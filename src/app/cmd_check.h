@@ -15,7 +15,7 @@ typedef struct bt_check_ice {
     double made;         ///< floes that are made
 } bt_check_ice;
 
-/// The time step against the rule in cmd_check.c.
+/// The time step against the rule in check.c.
 typedef struct bt_check_step {
     double longest;      ///< of a collision, s
     double speed;        ///< of the contacts: the reference speed, or the planned one through the ice if that is more
@@ -42,14 +42,21 @@ bt_check_split bt_check_split_of(const bt_case *input, const bt_check_ice *ice);
 /// Rough estimate of a run, s of one core.
 double bt_check_seconds(const bt_case *input, const bt_check_ice *n);
 
-/// Values that nobody gave and that follow from others, in lines, and as the object `by_default` (SI).
-void bt_check_print_defaults(const bt_case *input);
-struct bt_json;
+/// A case that is ready to run.
+typedef struct bt_checked {
+    const char *path;
+    const bt_case *input;
+    const bt_field *field;
+    const struct bt_comm *comm;
+    const bt_check_ice *ice, *run; ///< before the lead is opened, and as the run has it
+    const bt_lead_stats *lead;
+    const bt_errors *warnings;
+} bt_checked;
 
-/// Print the case's numbers as one JSON object: `case`, `title`, `warnings` ({code, text, values}), `domain`, `ice`
-/// (before the lead is opened), `run`, `by_default`, `cost`; units in the names, null for what does not apply.
-void bt_check_print_json(const char *path, const bt_case *input, const struct bt_comm *comm, const bt_check_ice *ice,
-                         const bt_check_ice *run, const bt_errors *warnings);
+/// Print its numbers in lines, or as one JSON object: `case`, `title`, `warnings` ({code, text, values}), and an object
+/// for each group; units in the names, null or absent where a number does not apply. `by_default`: values that nobody
+/// gave and that follow from others (SI).
+void bt_check_print(const bt_checked *c, bool as_json);
 
 /// Check a study and the case of the first member of each condition; print what follows when all are valid, on so many
 /// ranks. Errors: BT_ERR_CASE, BT_ERR_IO.

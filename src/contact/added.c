@@ -50,17 +50,17 @@ static bt_law_contact contact_of(const bt_world *world, int law, const bt_cell *
 {
     const bt_contact *contact = &cell->contacts[j];
     bt_law_contact x = {.w = world, .a = contact->a, .b = contact->b, .own = own_of(&world->par, law), .n = contact->n};
-    const bool *closes = cell->laws.limits[j].closes;
+    const bool *closes = cell->laws->limits[j].closes;
     for (int i = 0; i < contact->n; i++) x.gap[i] = cell->gaps[j].gap[i], x.closes[i] = closes[i];
     // ran = ra × n, which changes along the tangent by the distance
     if (closes[0] && closes[1]) x.length = fabs(contact->ran[1] - contact->ran[0]);
-    if (record >= 0) memcpy(x.value, cell->laws.memory[record].value, sizeof x.value);
+    if (record >= 0) memcpy(x.value, cell->laws->memory[record].value, sizeof x.value);
     return x;
 }
 
 void bt_added_bound(const bt_world *world, int law, bt_cell *cell, bt_idx j, const bt_pair *pair)
 {
-    bt_limit *limit = &cell->laws.limits[j];
+    bt_limit *limit = &cell->laws->limits[j];
     const bt_memory names = bt_law_names(world, pair, law);
     limit->record[law] = (int32_t)bt_law_find(cell, &names);
     const bt_law_contact contact = contact_of(world, law, cell, j, limit->record[law]);
@@ -93,7 +93,7 @@ void bt_added_remember(const bt_world *world, int law, bt_cell *cell, bt_idx j, 
     const bt_contact_law *of = added[law - BT_LAWS];
     const bt_contact *contact = &cell->contacts[j];
     if (!of->remember || contact->n == 0 || !bt_added_applies(world, law, contact->a, contact->b)) return;
-    const bt_limit *limit = &cell->laws.limits[j];
+    const bt_limit *limit = &cell->laws->limits[j];
     bt_law_contact x = contact_of(world, law, cell, j, limit->record[law]);
     for (int i = 0; i < x.n; i++) {
         x.load[i] = contact->ln[i] / world->par.dt;

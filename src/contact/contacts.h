@@ -17,7 +17,7 @@
 
 #include "bergtow/world.h"
 #include "body/bodies.h"
-#include "space/cells.h"
+#include "contact/cell_contacts.h"
 
 /// One contact point. Both arms end in the same point of space, between the two surfaces, so that equal and opposite
 /// impulses conserve angular momentum exactly. Two points of a manifold lie on a line along the tangent.

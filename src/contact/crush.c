@@ -116,19 +116,19 @@ static int by_bodies(const void *p, const void *q)
 /// deeper under another name.
 static void inherit(const bt_cell *cell, const bt_memory *names, const bt_manifold *manifold, bt_limit *limit)
 {
-    if (cell->laws.n_memory == 0) return;
-    const bt_memory *any = bsearch(names, cell->laws.memory, (size_t)cell->laws.n_memory, sizeof *names, by_bodies);
+    if (cell->laws->n_memory == 0) return;
+    const bt_memory *any = bsearch(names, cell->laws->memory, (size_t)cell->laws->n_memory, sizeof *names, by_bodies);
     if (!any) return;
     const bt_memory *end = any + 1, *own = NULL;
-    while (any > cell->laws.memory && by_bodies(any - 1, names) == 0) any--;
-    while (end < cell->laws.memory + cell->laws.n_memory && by_bodies(end, names) == 0) end++;
+    while (any > cell->laws->memory && by_bodies(any - 1, names) == 0) any--;
+    while (end < cell->laws->memory + cell->laws->n_memory && by_bodies(end, names) == 0) end++;
     double deepest = 0;
     for (const bt_memory *memory = any; memory < end; memory++) {
         if (memory->law != BT_LAW_CRUSHING) continue;
         deepest = bt_max(deepest, depth_of(memory));
         if (bt_memory_by_names(memory, names) == 0) own = memory;
     }
-    if (own) limit->record[BT_LAW_CRUSHING] = (int32_t)(own - cell->laws.memory);
+    if (own) limit->record[BT_LAW_CRUSHING] = (int32_t)(own - cell->laws->memory);
     for (int i = 0; i < manifold->n_points; i++) {
         limit->rise->depth[i] = bt_min(deepest, bt_max(0, -manifold->p[i].gap));
         for (int j = 0; own && j < own->n_points; j++)
@@ -247,7 +247,7 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     const bt_bodies *bodies = &world->bodies;
     const bt_contact *contact = &cell->contacts[j];
     bt_gaps *gaps = &cell->gaps[j];
-    bt_limit *limit = &cell->laws.limits[j];
+    bt_limit *limit = &cell->laws->limits[j];
     const double h = thickness_of(bodies, manifold->a, manifold->b), dt = world->par.dt,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, slop = world->par.slop;
@@ -310,7 +310,7 @@ static bool gives_way(const bt_contact *contact, const bt_limit *limit, int i)
 
 static void give_way(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *number)
 {
-    cell->laws.limits[j].rise->depth[i] += cell->laws.limits[j].grown[i];
+    cell->laws->limits[j].rise->depth[i] += cell->laws->limits[j].grown[i];
     bt_sum_add(&number[CRUSHED_WORK], -bt_contacts_normal_work(world, &cell->contacts[j], i));
     bt_sum_add(&number[CRUSHING], 1);
 }
@@ -330,7 +330,7 @@ static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 {
     (void)number;
     const bt_contact *contact = &cell->contacts[j];
-    const bt_limit *limit = &cell->laws.limits[j];
+    const bt_limit *limit = &cell->laws->limits[j];
     const bt_idx at = limit->record[BT_LAW_CRUSHING];
     if (limit->record[BT_LAW_RAFTING] >= 0) return;
     double deepest = 0;
@@ -342,8 +342,8 @@ static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
     for (int i = 0; i < contact->n; i++)
         if (limit->rise->depth[i] > 0 || cell->gaps[j].gap[i] <= 0)
             keep_depth(&memory, feature[i], limit->rise->depth[i], false);
-    for (int i = 0; at >= 0 && i < cell->laws.memory[at].n_points; i++) {
-        const bt_memory *before = &cell->laws.memory[at];
+    for (int i = 0; at >= 0 && i < cell->laws->memory[at].n_points; i++) {
+        const bt_memory *before = &cell->laws->memory[at];
         if (before->value[i] > 0) keep_depth(&memory, before->feature[i], before->value[i], true);
     }
     for (int i = 0; i < contact->n; i++) keep_depth(&memory, feature[i], limit->rise->depth[i], false);

@@ -270,7 +270,7 @@ static void replace(const bt_world *world, bt_cell *cell, bt_pack_scratch *scrat
             const bt_idx at = bt_law_find(cell, &names);
             if (at < 0) continue;
             bt_manifold edge, *sheets = bt_pack_next(scratch, scratch->pair[k]);
-            if (bt_laws[law]->contact(world, pair, &cell->laws.memory[at], &edge, sheets)) {
+            if (bt_laws[law]->contact(world, pair, &cell->laws->memory[at], &edge, sheets)) {
                 scratch->man[k] = edge;
                 scratch->n++;
             } else {
@@ -287,7 +287,7 @@ static void narrow_phase(bt_world *world, bt_idx k, const void *scratch, bt_tota
     const bt_bodies *bodies = &world->bodies;
     thread_scratch *s = &(*(thread_scratch *const *)scratch)[omp_get_thread_num()];
     bt_cell *cell = &world->cells->cell[k];
-    if (cell->laws.n_memory > 0) bt_laws_prune(world, cell);
+    if (cell->laws->n_memory > 0) bt_laws_prune(world, cell);
     bt_pairs_update(world, k, cell, cell->margin, &s->pairs);
     bt_pack_begin(&s->pack, 2 * (size_t)cell->search.n_pairs); // a pair may have a second contact (replace)
     bool several = false; // polygons of one outline
@@ -315,7 +315,7 @@ static void narrow_phase(bt_world *world, bt_idx k, const void *scratch, bt_tota
                   bt_shore_holds(world, pair->b);
     }
     if (several) merge(world, cell, &s->pack);
-    if (cell->laws.n_memory > 0) replace(world, cell, &s->pack);
+    if (cell->laws->n_memory > 0) replace(world, cell, &s->pack);
     bt_pack_contacts(world, k, &s->pack);
 }
 
@@ -349,6 +349,14 @@ static void find_awake(bt_world *world)
     }
     bt_domain_moved_elsewhere(world, wake_body);
     bt_cells_sort_busy(cells);
+}
+
+static void mark_touched(const bt_cell *cell, uint8_t bit, uint8_t *touched)
+{
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        touched[cell->contacts[j].a] |= bit;
+        touched[cell->contacts[j].b] |= bit;
+    }
 }
 
 void bt_contacts_detect(bt_world *world, bool again)
@@ -387,7 +395,7 @@ void bt_contacts_detect(bt_world *world, bool again)
     const double t0 = bt_clock();
     bt_phases_order(world);
     world->stats.phases.colour += bt_clock() - t0;
-    bt_domain_select(world);
+    bt_domain_select(world, mark_touched);
     find_awake(world);
     bt_cells_leave(cells);
 }

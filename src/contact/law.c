@@ -66,33 +66,33 @@ bool bt_laws_rise(const bt_params *par)
 void bt_laws_prune(const bt_world *world, bt_cell *cell)
 {
     bt_idx kept = 0;
-    for (bt_idx k = 0; k < cell->laws.n_memory; k++) {
-        bt_memory *memory = &cell->laws.memory[k];
+    for (bt_idx k = 0; k < cell->laws->n_memory; k++) {
+        bt_memory *memory = &cell->laws->memory[k];
         if (memory->law < BT_LAWS ? bt_laws[memory->law]->keeps(world, memory) : bt_law_near(world, memory))
-            cell->laws.memory[kept++] = *memory;
+            cell->laws->memory[kept++] = *memory;
     }
-    cell->laws.n_memory = kept;
+    cell->laws->n_memory = kept;
 }
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
 void bt_laws_reserve(bt_cell *cell)
 {
-    if (cell->n_contacts <= cell->laws.cap_limits) return;
-    cell->laws.cap_limits = bt_cells_room(cell->n_contacts);
-    free(cell->laws.limits);
-    free(cell->laws.rises);
-    cell->laws.limits = bt_alloc_unset((size_t)cell->laws.cap_limits, sizeof *cell->laws.limits);
-    cell->laws.rises = cell->laws.rising ? bt_alloc_unset((size_t)cell->laws.cap_limits, sizeof *cell->laws.rises)
+    if (cell->n_contacts <= cell->laws->cap_limits) return;
+    cell->laws->cap_limits = bt_cells_room(cell->n_contacts);
+    free(cell->laws->limits);
+    free(cell->laws->rises);
+    cell->laws->limits = bt_alloc_unset((size_t)cell->laws->cap_limits, sizeof *cell->laws->limits);
+    cell->laws->rises = cell->laws->rising ? bt_alloc_unset((size_t)cell->laws->cap_limits, sizeof *cell->laws->rises)
                                          : NULL;
 }
 
 void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
-    bt_limit *limit = &cell->laws.limits[j];
+    bt_limit *limit = &cell->laws->limits[j];
     *limit = (bt_limit){
         .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY},
-        .rise = cell->laws.rises ? &cell->laws.rises[j] : NULL};
+        .rise = cell->laws->rises ? &cell->laws->rises[j] : NULL};
     if (limit->rise) *limit->rise = (bt_rise){0};
     for (int law = 0; law < BT_ALL_LAWS; law++) limit->record[law] = -1;
     if (manifold->n_points > 0 && world->par.added_laws > 0)
@@ -136,7 +136,7 @@ static void grow_contact(bt_world *world, bt_cell *cell, bt_idx j, bt_totals *to
 {
     const bt_contact *contact = &cell->contacts[j];
     const bt_vel *v = world->bodies.vel;
-    bt_limit *limit = &cell->laws.limits[j];
+    bt_limit *limit = &cell->laws->limits[j];
     for (int i = 0; i < contact->n; i++) {
         const double approach = -(bt_normal_velocity(contact, i, &v[contact->a], &v[contact->b]) + limit->place[i]);
         if (!(approach > 0)) continue;
@@ -152,7 +152,7 @@ static void grow_cell(bt_world *world, bt_idx k, const void *context, bt_totals 
 {
     (void)context;
     bt_cell *cell = &world->cells->cell[k];
-    const bt_idx before = cell->laws.n_memory;
+    const bt_idx before = cell->laws->n_memory;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         grow_contact(world, cell, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
@@ -160,8 +160,8 @@ static void grow_cell(bt_world *world, bt_idx k, const void *context, bt_totals 
         for (int law = BT_LAWS; law < BT_ALL_LAWS; law++)
             if (bt_law_on(&world->par, law)) bt_added_remember(world, law, cell, j, totals);
     }
-    if (cell->laws.n_memory > before)
-        qsort(cell->laws.memory, (size_t)cell->laws.n_memory, sizeof *cell->laws.memory, bt_memory_by_names);
+    if (cell->laws->n_memory > before)
+        qsort(cell->laws->memory, (size_t)cell->laws->n_memory, sizeof *cell->laws->memory, bt_memory_by_names);
 }
 
 /// All records of this rank, also of pairs that have come to rest against each other and have no contacts.
@@ -169,8 +169,8 @@ static void count_records(const bt_world *world, double most[BT_LAWS], bt_totals
 {
     const bt_cells *ts = world->cells;
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].laws.n_memory; i++) {
-            const bt_memory *memory = &ts->cell[k].laws.memory[i];
+        for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].laws->n_memory; i++) {
+            const bt_memory *memory = &ts->cell[k].laws->memory[i];
             if (memory->law >= BT_LAWS) {
                 bt_added_count(world, memory, totals);
                 continue;

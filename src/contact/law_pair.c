@@ -21,15 +21,15 @@ bool bt_law_near(const bt_world *world, const bt_memory *memory)
 
 bt_idx bt_law_find(const bt_cell *cell, const bt_memory *names)
 {
-    if (cell->laws.n_memory == 0) return -1;
-    const bt_memory *memory = bsearch(names, cell->laws.memory, (size_t)cell->laws.n_memory, sizeof *names,
+    if (cell->laws->n_memory == 0) return -1;
+    const bt_memory *memory = bsearch(names, cell->laws->memory, (size_t)cell->laws->n_memory, sizeof *names,
                                       bt_memory_by_names);
-    return memory ? (bt_idx)(memory - cell->laws.memory) : -1;
+    return memory ? (bt_idx)(memory - cell->laws->memory) : -1;
 }
 
 void bt_law_put(bt_cell *cell, bt_idx at, const bt_memory *memory)
 {
-    if (at >= 0) cell->laws.memory[at] = *memory;
+    if (at >= 0) cell->laws->memory[at] = *memory;
     else bt_cells_remember(cell, memory);
 }
 

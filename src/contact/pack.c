@@ -188,8 +188,8 @@ void bt_pack_set_row(const bt_world *world, bt_cell *cell, bt_idx j, bt_row_stat
     gaps->row = state;
     if (state == BT_ROW_RELEASED) contact->ln[0] = contact->ln[1] = contact->lt = 0;
     bt_pack_bias(world, contact, gaps, 1);
-    if (cell->laws.limits)
-        for (int i = 0; i < contact->n; i++) cell->laws.limits[j].place[i] = place_of(world, gaps, i);
+    if (cell->laws->limits)
+        for (int i = 0; i < contact->n; i++) cell->laws->limits[j].place[i] = place_of(world, gaps, i);
 }
 
 /// State of the row of contact j, made from the manifold; held: what it takes over.
@@ -201,8 +201,8 @@ static bt_row_state row_state(const bt_world *world, const bt_cell *cell, bt_idx
     if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
     for (int i = 0; i < manifold->n_points; i++)
         if (manifold->p[i].gap <= world->par.slop || cell->gaps[j].gap[i] <= world->par.slop) return BT_ROW_STAYS;
-    for (int law = 0; cell->laws.limits && law < BT_ALL_LAWS; law++)
-        if (cell->laws.limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
+    for (int law = 0; cell->laws->limits && law < BT_ALL_LAWS; law++)
+        if (cell->laws->limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
     return BT_ROW_OPEN;
 }
 
@@ -236,7 +236,7 @@ void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch)
     bt_cells_make_room(cell, scratch->n * sizeof *cell->contacts);
     if (scratch->n == 0) return;
     const bool bounded = bt_laws_on(&world->par);
-    cell->laws.rising = bt_laws_rise(&world->par);
+    cell->laws->rising = bt_laws_rise(&world->par);
     if (bounded) bt_laws_reserve(cell);
     bt_idx next[MAX_COLOURS + 2] = {0};
     if (cell->phase < BT_COLOURS) colour_contacts(world, cell, scratch, next);

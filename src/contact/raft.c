@@ -228,12 +228,12 @@ static void bound_sheets(const bt_world *world, bt_cell *cell, bt_idx j, bt_idx 
                          const bt_memory *memory)
 {
     bt_contact *contact = &cell->contacts[j];
-    bt_limit *l = &cell->laws.limits[j];
+    bt_limit *l = &cell->laws->limits[j];
     const double pressure = own_of(world)[BT_RAFT_SHEET] * thinner(&world->bodies, contact->a, contact->b);
     l->flat[0] = bt_pair_friction(&world->bodies, contact->a, contact->b) * pressure * memory->value[1] * world->par.dt;
     double load = 0;
     if (edge >= 0) {
-        const bt_limit *e = &cell->laws.limits[edge];
+        const bt_limit *e = &cell->laws->limits[edge];
         load = (e->flat[0] + e->flat[1]) * reached(world, &cell->contacts[edge], cell->gaps[edge].gap[0]);
     }
     l->ends[0] = load * manifold->nx, l->ends[1] = load * manifold->ny;
@@ -242,12 +242,12 @@ static void bound_sheets(const bt_world *world, bt_cell *cell, bt_idx j, bt_idx 
 
 static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
-    bt_limit *limit = &cell->laws.limits[j];
+    bt_limit *limit = &cell->laws->limits[j];
     const bt_memory names = bt_law_names(world, pair, BT_LAW_RAFTING);
     const bt_idx at = bt_law_find(cell, &names);
     limit->record[BT_LAW_RAFTING] = (int32_t)at;
     if (manifold->n_points == 0) {
-        bound_sheets(world, cell, j, pair->contact, manifold, &cell->laws.memory[at]);
+        bound_sheets(world, cell, j, pair->contact, manifold, &cell->laws->memory[at]);
         return;
     }
     const double h = thinner(&world->bodies, manifold->a, manifold->b),
@@ -287,11 +287,11 @@ static bt_contact ends_of(const bt_contact *sheets, const bt_limit *limit)
 static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 {
     const bt_contact *contact = &cell->contacts[j];
-    const bt_limit *limit = &cell->laws.limits[j];
+    const bt_limit *limit = &cell->laws->limits[j];
     const bt_idx at = limit->record[BT_LAW_RAFTING];
     if (contact->n == 0) {
-        cell->laws.memory[at].value[2] = contact->ln[0];
-        cell->laws.memory[at].value[3] = contact->lt;
+        cell->laws->memory[at].value[2] = contact->ln[0];
+        cell->laws->memory[at].value[3] = contact->lt;
         const bt_contact ends = ends_of(contact, limit);
         const double of_ends = -bt_contacts_work(world, &ends);
         bt_sum_add(&number[EDGE_WORK], of_ends);

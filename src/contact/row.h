@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#include "space/cells.h"
+#include "contact/cell_contacts.h"
 
 static inline double bt_normal_velocity(const bt_contact *contact, int i, const bt_vel *va, const bt_vel *vb)
 {

@@ -4,7 +4,7 @@
 #ifndef BERGTOW_COLLISION_H
 #define BERGTOW_COLLISION_H
 
-#include "space/cells.h"
+#include "contact/cell_contacts.h"
 
 typedef struct bt_collision {
     double impulse;   ///< λ_c, N s

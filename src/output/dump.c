@@ -196,7 +196,7 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
 static row sheets_of(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
-    const bt_limit *limit = &cell->laws.limits[j];
+    const bt_limit *limit = &cell->laws->limits[j];
     return (row){.gid_a = world->bodies.gid[contact->a],
                  .gid_b = world->bodies.gid[contact->b],
                  .point = 2,
@@ -246,8 +246,8 @@ static row *rows_of(const bt_world *world, int *n)
                                      .ln = contact->ln[i],
                                      .lt = total > 0 ? contact->lt * (contact->ln[i] / total) : 0,
                                      .disc = NAN,
-                                     .bound = ts->cell[k].laws.limits
-                                                  ? bt_limit_bound(&ts->cell[k].laws.limits[j], contact, i,
+                                     .bound = ts->cell[k].laws->limits
+                                                  ? bt_limit_bound(&ts->cell[k].laws->limits[j], contact, i,
                                                                    world->bodies.vel)
                                                   : INFINITY};
         }

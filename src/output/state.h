@@ -10,7 +10,7 @@
 #include "base/snapshot.h"
 #include "field/lead.h"
 #include "output/stall.h"
-#include "space/cells.h"
+#include "contact/cell_contacts.h"
 
 /// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:
 /// BT_ERR_NUMERIC (bodies lost).

@@ -162,8 +162,8 @@ static void look_at(const bt_world *world, bt_idx k, const range *limits, bt_tot
     const bt_bodies *bodies = &world->bodies;
     const bt_cell *cell = &world->cells->cell[k];
     if (!cell->own) return;
-    for (bt_idx i = 0; i < cell->laws.n_memory; i++) {
-        const bt_memory *memory = &cell->laws.memory[i];
+    for (bt_idx i = 0; i < cell->laws->n_memory; i++) {
+        const bt_memory *memory = &cell->laws->memory[i];
         if (!isfinite(memory->value[0] + memory->value[1] + memory->value[2] + memory->value[3]))
             totals->most = bt_max(totals->most, (double)memory->a);
     }

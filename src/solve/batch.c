@@ -14,12 +14,12 @@ enum { OPEN = 8 }; // batches that wait for more contacts, when a cell is packed
 
 static bt_batch_bounds *bounds_of(const bt_cell *cell)
 {
-    return (bt_batch_bounds *)(cell->work.batch + cell->work.n_batches);
+    return (bt_batch_bounds *)(cell->work->batch + cell->work->n_batches);
 }
 
 static size_t batch_bytes(const bt_cell *cell)
 {
-    return sizeof(bt_batch) + (cell->laws.limits ? sizeof(bt_batch_bounds) : 0);
+    return sizeof(bt_batch) + (cell->laws->limits ? sizeof(bt_batch_bounds) : 0);
 }
 
 /// Bytes of what n batches rest: whole records.
@@ -30,17 +30,17 @@ static size_t rest_bytes(bt_idx n)
 
 bt_rest *bt_batch_rests(const bt_cell *cell)
 {
-    return (bt_rest *)((char *)cell->work.batch + (size_t)cell->work.n_batches * batch_bytes(cell));
+    return (bt_rest *)((char *)cell->work->batch + (size_t)cell->work->n_batches * batch_bytes(cell));
 }
 
 bt_contact *bt_batch_others(const bt_cell *cell)
 {
-    return (bt_contact *)((char *)bt_batch_rests(cell) + rest_bytes(cell->work.n_batches));
+    return (bt_contact *)((char *)bt_batch_rests(cell) + rest_bytes(cell->work->n_batches));
 }
 
 bool bt_batch_is_for(const bt_cell *cell)
 {
-    return !(cell->laws.limits && cell->laws.rising) && cell->phase != BT_COLOURS;
+    return !(cell->laws->limits && cell->laws->rising) && cell->phase != BT_COLOURS;
 }
 
 size_t bt_batch_bytes(const bt_cell *cell)
@@ -54,14 +54,14 @@ size_t bt_batch_bytes(const bt_cell *cell)
 
 void bt_batch_begin(bt_cell *cell)
 {
-    cell->work.packed = false;
-    cell->work.batch = NULL;
-    cell->work.n_batches = cell->work.n_last = 0;
+    cell->work->packed = false;
+    cell->work->batch = NULL;
+    cell->work->n_batches = cell->work->n_last = 0;
 }
 
 static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *contact)
 {
-    return !cell->laws.limits ? BT_BATCH_RIGID : contact->n > 0 ? BT_BATCH_BOUNDED : BT_BATCH_SHEETS;
+    return !cell->laws->limits ? BT_BATCH_RIGID : contact->n > 0 ? BT_BATCH_BOUNDED : BT_BATCH_SHEETS;
 }
 
 typedef bt_idx held_bodies __attribute__((vector_size(2 * BT_LANES * sizeof(bt_idx))));
@@ -86,7 +86,7 @@ typedef struct {
 
 static void begin_packing(packing *pack, const bt_cell *cell)
 {
-    const size_t n = (size_t)cell->n_contacts, n_list = (size_t)cell->work.n_list;
+    const size_t n = (size_t)cell->n_contacts, n_list = (size_t)cell->n_listed;
     const bool few = n <= BT_FEW;
     pack->place = n_list > BT_FEW ? bt_alloc_unset(n_list, sizeof *pack->place) : pack->few_places;
     pack->of = few ? pack->few_unknowns : bt_realloc(NULL, n, sizeof *pack->of);
@@ -119,8 +119,8 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
 {
     bt_idx open[OPEN], n_batches = 0;
     int n_open = 0;
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx i = cell->work.list[j];
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_idx i = cell->work->list[j];
         const bt_contact *contact = &contacts[i];
         const bt_batch_kind kind = kind_of(cell, contact);
         const bt_idx a = inv[contact->a].m > 0 ? contact->a : FIXED, b = inv[contact->b].m > 0 ? contact->b : FIXED;
@@ -144,13 +144,13 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
 /// What the last list hands on to the next one. A contact that was not in it has not been moved since.
 static void take_unknowns(const bt_cell *cell, packing *pack)
 {
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx i = cell->work.list[j];
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_idx i = cell->work->list[j];
         const bt_contact *contact = &pack->u[i];
         pack->of[i] = (bt_unknowns){.before = {contact->ln[0], contact->ln[1], contact->lt}};
         pack->listed[i] = true;
     }
-    for (bt_idx k = 0; k < cell->work.n_last; k++) pack->of[cell->work.last[k].contact] = cell->work.last[k];
+    for (bt_idx k = 0; k < cell->work->n_last; k++) pack->of[cell->work->last[k].contact] = cell->work->last[k];
 }
 
 /// Masses of sheets one by one: they have a root.
@@ -219,16 +219,16 @@ static void put_aside(const bt_cell *cell,
 BT_FOR_EACH_CPU
 static void put_all(bt_cell *cell, const packing *pack, const bt_inv *inv)
 {
-    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        bt_batch *batch = &cell->work.batch[k];
-        put(batch, pack->u, cell->laws.limits, &pack->place[k], pack->of, inv);
-        if (!cell->laws.limits) continue;
+    for (bt_idx k = 0; k < cell->work->n_batches; k++) {
+        bt_batch *batch = &cell->work->batch[k];
+        put(batch, pack->u, cell->laws->limits, &pack->place[k], pack->of, inv);
+        if (!cell->laws->limits) continue;
         bt_batch_bounds *at = &bounds_of(cell)[k];
         *at = (bt_batch_bounds){0};
         for (int l = 0; l < batch->n; l++)
-            for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws.limits[batch->contact[l]].flat[c];
+            for (int c = 0; c < 2; c++) at->of[c][l] = cell->laws->limits[batch->contact[l]].flat[c];
     }
-    memset(bt_batch_rests(cell), 0, (size_t)cell->work.n_batches * sizeof(bt_rest));
+    memset(bt_batch_rests(cell), 0, (size_t)cell->work->n_batches * sizeof(bt_rest));
     bt_contact *other = bt_batch_others(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
         if (!pack->listed[i]) copy_records(other++, &pack->u[i], 1);
@@ -241,12 +241,12 @@ void bt_batch_pack(bt_cell *cell, const bt_inv *inv)
     put_aside(cell, pack.u);
     take_unknowns(cell, &pack);
     const bt_idx n_batches = deal(cell, pack.u, inv, pack.place);
-    const size_t n_others = (size_t)(cell->n_contacts - cell->work.n_list);
+    const size_t n_others = (size_t)(cell->n_contacts - cell->n_listed);
     bt_cells_make_room(cell, (size_t)n_batches * batch_bytes(cell) + rest_bytes(n_batches) +
                                  n_others * sizeof(bt_contact));
-    cell->work.n_batches = n_batches;
-    cell->work.batch = (bt_batch *)cell->contacts;
-    cell->work.packed = true;
+    cell->work->n_batches = n_batches;
+    cell->work->batch = (bt_batch *)cell->contacts;
+    cell->work->packed = true;
     put_all(cell, &pack, inv);
     end_packing(&pack);
 }
@@ -292,8 +292,8 @@ BT_FOR_EACH_CPU
 static bt_idx take_all(const bt_cell *cell, packing *pack)
 {
     bt_unknowns *of = pack->of;
-    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
-        const bt_batch *batch = &cell->work.batch[k];
+    for (bt_idx k = 0; k < cell->work->n_batches; k++) {
+        const bt_batch *batch = &cell->work->batch[k];
         take_records(batch, pack->u);
         take_out(batch, of);
         of += batch->n;
@@ -311,16 +311,16 @@ static void put_back(bt_cell *cell,
 
 void bt_batch_unpack(bt_cell *cell)
 {
-    if (!cell->work.packed) return;
+    if (!cell->work->packed) return;
     packing pack;
     begin_packing(&pack, cell);
     const bt_idx n_last = take_all(cell, &pack);
     const size_t bytes = (size_t)cell->n_contacts * sizeof *pack.u, more = (size_t)n_last * sizeof *pack.of;
     bt_cells_make_room(cell, bytes + more);
     bt_batch_begin(cell);
-    cell->work.last = (bt_unknowns *)((char *)cell->contacts + bytes);
-    cell->work.n_last = n_last;
+    cell->work->last = (bt_unknowns *)((char *)cell->contacts + bytes);
+    cell->work->n_last = n_last;
     put_back(cell, pack.u);
-    memcpy(cell->work.last, pack.of, more);
+    memcpy(cell->work->last, pack.of, more);
     end_packing(&pack);
 }

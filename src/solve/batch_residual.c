@@ -144,7 +144,7 @@ BT_INLINE void look_at_records(look *o, const bt_cell *cell, bool bounded, const
                                const bt_idx index[BT_LANES], int n, uint8_t *mark)
 {
     const bt_limit *limit[BT_LANES];
-    for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws.limits[index[l]];
+    for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws->limits[index[l]];
     const four f = four_from(contact, o->v, o->inv);
     const seen s = bounded ? look_at(o, &f, limit, n) : look_at(o, &f, NULL, n);
     for (int l = 0; l < n; l++) {
@@ -178,7 +178,7 @@ BT_INLINE void look_at_batch(look *o, const bt_cell *cell, bool bounded, const b
 {
     const bt_limit *limit[BT_LANES];
     const bool sheets = bounded && batch->kind == BT_BATCH_SHEETS;
-    for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws.limits[batch->contact[l]];
+    for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws->limits[batch->contact[l]];
     seen s;
     if (!sheets) {
         const four f = four_of(batch, o->v);
@@ -200,8 +200,8 @@ BT_INLINE void look_at_batch(look *o, const bt_cell *cell, bool bounded, const b
 /// Marks what the last sweep has moved.
 static void mark_moved(const bt_cell *cell, uint8_t *mark)
 {
-    for (bt_idx k = 0; k < cell->work.n_last; k++) {
-        const bt_unknowns *last = &cell->work.last[k];
+    for (bt_idx k = 0; k < cell->work->n_last; k++) {
+        const bt_unknowns *last = &cell->work->last[k];
         const bt_contact *contact = &cell->contacts[last->contact];
         if (contact->ln[0] != last->before[0] || contact->ln[1] != last->before[1] || contact->lt != last->before[2])
             mark[last->contact] = LISTED;
@@ -216,7 +216,7 @@ BT_INLINE void look_at_rest(look *o, const bt_cell *cell, bool bounded, const bt
     int n = 0;
     for (bt_idx i = 0; i <= cell->n_contacts; i++) {
         const bool ends = i == cell->n_contacts;
-        if (!ends && cell->work.packed && mark[i] != UNSEEN) continue;
+        if (!ends && cell->work->packed && mark[i] != UNSEEN) continue;
         if (!ends) contact[n] = records++, index[n++] = i;
         if (n == 0 || !(ends || n == BT_LANES)) continue;
         for (int l = n; l < BT_LANES; l++) contact[l] = contact[n - 1], index[l] = index[n - 1];
@@ -227,9 +227,9 @@ BT_INLINE void look_at_rest(look *o, const bt_cell *cell, bool bounded, const bt
 
 BT_INLINE void look_at_all(look *o, const bt_cell *cell, bool bounded, uint8_t *mark)
 {
-    const bool packed = cell->work.packed;
-    for (bt_idx k = 0; packed && k < cell->work.n_batches; k++)
-        look_at_batch(o, cell, bounded, &cell->work.batch[k], mark);
+    const bool packed = cell->work->packed;
+    for (bt_idx k = 0; packed && k < cell->work->n_batches; k++)
+        look_at_batch(o, cell, bounded, &cell->work->batch[k], mark);
     look_at_rest(o, cell, bounded, packed ? bt_batch_others(cell) : cell->contacts, mark);
     o->found.most = bt_max(o->found.most, bt_largest_lane(o->most));
     o->found.bad += sum_of(o->bad);
@@ -246,21 +246,21 @@ static void look_at_bounded(look *o, const bt_cell *cell, uint8_t *mark) { look_
 static void list_marked(bt_cell *cell, const uint8_t *mark)
 {
     bt_idx listed = 0, in_batches = 0;
-    bool same = cell->work.packed;
-    for (bt_idx k = 0; same && k < cell->work.n_batches; k++) in_batches += cell->work.batch[k].n;
+    bool same = cell->work->packed;
+    for (bt_idx k = 0; same && k < cell->work->n_batches; k++) in_batches += cell->work->batch[k].n;
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         listed += mark[i] == LISTED;
         same = same && mark[i] != LEAVES;
     }
     if (same && listed == in_batches) {
-        cell->work.n_list = listed;
+        cell->n_listed = listed;
         return;
     }
     bt_batch_unpack(cell);
     bt_rounds_list(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        cell->work.list[cell->work.n_list] = i;
-        cell->work.n_list += mark[i] == LISTED;
+        cell->work->list[cell->n_listed] = i;
+        cell->n_listed += mark[i] == LISTED;
     }
 }
 
@@ -269,9 +269,9 @@ bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, co
     const size_t n = (size_t)cell->n_contacts;
     uint8_t few[BT_FEW], *mark = n <= BT_FEW ? few : bt_realloc(NULL, n, sizeof *mark);
     if (n > 0) memset(mark, UNSEEN, n);
-    if (!cell->work.packed) mark_moved(cell, mark);
+    if (!cell->work->packed) mark_moved(cell, mark);
     look o = {.problem = problem, .v = v, .inv = inv};
-    (cell->laws.limits ? look_at_bounded : look_at_rigid)(&o, cell, mark);
+    (cell->laws->limits ? look_at_bounded : look_at_rigid)(&o, cell, mark);
     list_marked(cell, mark);
     if (mark != few) free(mark);
     return o.found;

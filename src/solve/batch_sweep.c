@@ -176,7 +176,7 @@ static void apply_all(const bt_batch *batches, bt_idx n, bt_vel *v)
     for (bt_idx k = 0; k < n; k++) apply(&batches[k], v);
 }
 
-void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work.batch, cell->work.n_batches, v); }
+void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work->batch, cell->work->n_batches, v); }
 
 /// Unknowns of a batch after their move: of one visit to a cell.
 typedef struct {
@@ -281,9 +281,9 @@ static void go_through_bounded(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
 
 void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals)
 {
-    if (!cell->work.packed) bt_batch_pack(cell, inv);
+    if (!cell->work->packed) bt_batch_pack(cell, inv);
     visit o = {.sweep = sweep, .times = times > 1 ? times : 1, .calm = BT_ENOUGH * sweep->problem->tolerance};
-    const bt_idx n = cell->work.n_batches;
+    const bt_idx n = cell->work->n_batches;
     moved few[BT_FEW / BT_LANES];
     bt_idx few_due[2 * BT_FEW / BT_LANES];
     const bool many = n > BT_FEW / BT_LANES;
@@ -291,10 +291,10 @@ void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep 
     o.due = many ? bt_alloc(2 * (size_t)n, sizeof *o.due) : few_due;
     o.again = o.due + n;
     o.rests = bt_batch_rests(cell);
-    (cell->laws.limits ? go_through_bounded : go_through_rigid)(cell->work.batch, n, v, &o);
+    (cell->laws->limits ? go_through_bounded : go_through_rigid)(cell->work->batch, n, v, &o);
     if (many) free(o.y), free(o.due);
     totals->most = bt_max(totals->most, o.most);
-    cell->work.updates += o.done;
+    cell->updates += o.done;
     bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)o.done);
     if (sweep->moves) bt_rounds_moved(sweep, o.moved, o.against, totals);
 }

@@ -110,7 +110,7 @@ static bool is_hard(const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
     if (contact->n == 0 || contact->ln[0] + contact->ln[1] == 0) return false;
-    const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[j] : NULL;
+    const bt_limit *limit = cell->laws->limits ? &cell->laws->limits[j] : NULL;
     return !limit || !(isfinite(limit->most[0]) || (contact->n > 1 && isfinite(limit->most[1])));
 }
 

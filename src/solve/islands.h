@@ -10,7 +10,7 @@
 
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
-#include "space/cells.h"
+#include "contact/cell_contacts.h"
 
 typedef struct bt_islands {
     bt_idx *root;  ///< [n bodies] union-find of the movable bodies that touch

@@ -46,8 +46,8 @@ static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double l
     const double slip = world->par.dt * fabs(bt_tangent_velocity(contact, va, vb));
     const double error = turn * (0.5 * turn * (bodies->radius[contact->a] + bodies->radius[contact->b]) + slip);
     if (!(bt_max(gap, -world->par.slop) - error < -least)) return false;
-    if (!cell->laws.limits) return true;
-    const bt_limit *limit = &cell->laws.limits[j];
+    if (!cell->laws->limits) return true;
+    const bt_limit *limit = &cell->laws->limits[j];
     for (int law = 0; law < BT_ALL_LAWS; law++)
         if (limit->record[law] >= 0) return false;
     return limit->grown[0] == 0 && limit->grown[1] == 0;
@@ -67,7 +67,7 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
             }
             gaps->gap[i] += world->par.dt * bt_normal_velocity(contact, i, &world->bodies.vel[contact->a],
                                                                &world->bodies.vel[contact->b]);
-            if (cell->laws.limits) gaps->gap[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
+            if (cell->laws->limits) gaps->gap[i] += cell->laws->limits[j].grown[i]; // what has given way in this step
             totals->most = bt_max(totals->most, -gaps->gap[i]);
         }
         if (!world->par.plain_sweeps && turns(world, cell, j, LEFT * world->par.slop))
@@ -120,11 +120,11 @@ static void put_rows(bt_world *world, bt_idx k, const void *again, bt_totals *to
         n += row->n > 0;
     }
     world->solver->aside[k] =
-        (bt_aside){cell->contacts, cell->contact_bytes, cell->n_contacts, cell->laws.limits};
+        (bt_aside){cell->contacts, cell->contact_bytes, cell->n_contacts, cell->laws->limits};
     cell->contacts = rows;
     cell->contact_bytes = (size_t)cell->n_contacts * sizeof *rows;
     cell->n_contacts = n;
-    cell->laws.limits = NULL;
+    cell->laws->limits = NULL;
     bt_solver_begin_cell(world, cell);
     if (world->par.plain_sweeps) bt_rounds_in_place(cell, world->bodies.inv);
 }
@@ -139,7 +139,7 @@ static void put_back(bt_world *world)
         cell->contacts = aside->contacts;
         cell->contact_bytes = aside->bytes;
         cell->n_contacts = aside->n;
-        cell->laws.limits = aside->limits;
+        cell->laws->limits = aside->limits;
         bt_batch_begin(cell);
     }
     free(world->solver->aside);
@@ -160,13 +160,13 @@ static void sweep_plain(bt_world *world, bt_idx k, const void *context, bt_total
 {
     (void)context;
     bt_cell *cell = &world->cells->cell[k];
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx i = cell->work.list[j];
-        totals->most = bt_max(totals->most, bt_project_contact(&cell->contacts[i], &cell->work.in_place[i].mass,
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_idx i = cell->work->list[j];
+        totals->most = bt_max(totals->most, bt_project_contact(&cell->contacts[i], &cell->work->in_place[i].mass,
                                                                world->par.slop, world->solver->shift,
                                                                world->bodies.inv));
     }
-    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->work.n_list);
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], cell->n_listed);
 }
 
 static void solve_apart(bt_world *world)

@@ -40,18 +40,39 @@ void bt_rounds_scale(bt_problem *problem, const bt_cells *t)
 
 // --- residual passes -------------------------------------------------------------------------------------------------
 
+void bt_rounds_rest(bt_solver *solver)
+{
+    for (bt_idx k = 0; k < solver->n_work; k++) {
+        free(solver->work[k].list);
+        solver->work[k].list = NULL;
+        solver->work[k].cap_list = solver->work[k].n_last = 0;
+    }
+}
+
+void bt_rounds_begin(bt_world *world)
+{
+    bt_cells *cells = world->cells;
+    bt_solver *solver = world->solver;
+    if (cells->cell[0].work) return;
+    bt_rounds_rest(solver);
+    free(solver->work);
+    solver->work = bt_alloc((size_t)cells->n, sizeof *solver->work);
+    solver->n_work = cells->n;
+    for (bt_idx k = 0; k < cells->n; k++) cells->cell[k].work = &solver->work[k];
+}
+
 void bt_rounds_list(bt_cell *cell)
 {
-    cell->work.n_list = 0;
-    if (cell->n_contacts <= cell->work.cap_list) return;
-    cell->work.cap_list = bt_cells_room(cell->n_contacts);
-    free(cell->work.list);
-    cell->work.list = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.list);
+    cell->n_listed = 0;
+    if (cell->n_contacts <= cell->work->cap_list) return;
+    cell->work->cap_list = bt_cells_room(cell->n_contacts);
+    free(cell->work->list);
+    cell->work->list = bt_alloc((size_t)cell->work->cap_list, sizeof *cell->work->list);
 }
 
 void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
 {
-    bt_work_list *work = &cell->work;
+    bt_work_list *work = cell->work;
     work->in_place = bt_cells_after_contacts(cell, (size_t)cell->n_contacts * sizeof *work->in_place);
     for (bt_idx i = 0; i < cell->n_contacts; i++)
         work->in_place[i] = (bt_in_place){.mass = bt_mass_of(&cell->contacts[i], inv)};
@@ -59,17 +80,15 @@ void bt_rounds_in_place(bt_cell *cell, const bt_inv *inv)
 
 void bt_rounds_found(bt_cell *cell, const bt_found *found)
 {
-    bt_work_list *work = &cell->work;
-    work->found.most = found->most, work->found.squares = found->squares, work->found.rows = found->rows,
-    work->found.bad = found->bad;
-    work->found.listed = work->n_list;
+    cell->work->found = *found;
+    cell->work->found_listed = cell->n_listed;
 }
 
 /// The bodies of the cell of body i may be moved.
 static void mark_cell_of(bt_world *world, bt_idx i)
 {
     const int32_t *at = world->bodies.cell[i];
-    if (!world->bodies.large[i]) world->cells->cell[bt_cells_at(world->cells, at[0], at[1])].work.swept = true;
+    if (!world->bodies.large[i]) world->cells->cell[bt_cells_at(world->cells, at[0], at[1])].swept = true;
 }
 
 /// Bodies of the block of cell (x, y) may be moved.
@@ -77,7 +96,7 @@ static void mark_block(bt_cells *cells, int32_t x, int32_t y, double listed)
 {
     for (int j = 0; listed > 0 && j < 4; j++) {
         const bt_idx k = bt_cells_at(cells, x + (j & 1), y + (j >> 1));
-        if (k >= 0) cells->cell[k].work.swept = true;
+        if (k >= 0) cells->cell[k].swept = true;
     }
 }
 
@@ -97,8 +116,8 @@ static void spread(bt_world *world, double (*value_of)(const bt_cell *cell), bt_
     free(value);
 }
 
-static double has_list(const bt_cell *cell) { return cell->work.n_list > 0; }
-static double is_bad(const bt_cell *cell) { return cell->work.found.bad > 0; }
+static double has_list(const bt_cell *cell) { return cell->n_listed > 0; }
+static double is_bad(const bt_cell *cell) { return cell->work->found.bad > 0; }
 
 /// Collective. Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside
 /// a large body always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last
@@ -111,11 +130,11 @@ static void mark_swept(bt_world *world)
     for (bt_idx j = 0; j < cells->n_busy; j++) {
         const bt_idx k = cells->busy[j];
         if (k == last) continue;
-        cells->cell[k].work.still = !cells->cell[k].work.swept;
-        cells->cell[k].work.swept = false;
+        cells->cell[k].work->still = !cells->cell[k].swept;
+        cells->cell[k].swept = false;
     }
     spread(world, has_list, mark_block);
-    cells->cell[last].work.swept = large->own;
+    cells->cell[last].swept = large->own;
     for (bt_idx j = 0; large->own && j < large->n_contacts; j++) {
         mark_cell_of(world, large->contacts[j].a);
         mark_cell_of(world, large->contacts[j].b);
@@ -123,7 +142,7 @@ static void mark_swept(bt_world *world)
     bt_domain_beside_large(world, mark_cell_of);
     cells->n_swept = 0;
     for (bt_idx j = 0; j < cells->n_busy; j++)
-        if (cells->cell[cells->busy[j]].work.swept) cells->swept[cells->n_swept++] = cells->busy[j];
+        if (cells->cell[cells->busy[j]].swept) cells->swept[cells->n_swept++] = cells->busy[j];
 }
 
 static void lists_are_new(bt_world *world)
@@ -145,7 +164,7 @@ static bool is_touched(const bt_cells *cells, bt_idx k)
     bool any = cell->phase == BT_COLOURS;
     for (int j = 0; j < 4 && !any; j++) { // a cell without bodies may be there on some ranks only
         const bt_cell *o = block[j] >= 0 ? &cells->cell[block[j]] : NULL;
-        any = o && o->end > o->first && o->work.swept;
+        any = o && o->end > o->first && o->swept;
     }
     return any;
 }
@@ -157,15 +176,15 @@ static void residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_
     bt_cell *cell = &world->cells->cell[k];
     const bool looks = o->everywhere || is_touched(world->cells, k);
     if (looks) problem->residual(world, k, problem, totals);
-    else cell->work.n_list = cell->work.found.listed;
-    totals->most = bt_max(totals->most, cell->work.found.most);
+    else cell->n_listed = cell->work->found_listed;
+    totals->most = bt_max(totals->most, cell->work->found.most);
     bt_sum_add(&totals->sum[BT_RESIDUAL_SQUARES],
-               bt_min(cell->work.found.squares * problem->per_square, problem->most_squares));
-    bt_sum_add(&totals->sum[BT_RESIDUAL_ROWS], (double)cell->work.found.rows);
+               bt_min(cell->work->found.squares * problem->per_square, problem->most_squares));
+    bt_sum_add(&totals->sum[BT_RESIDUAL_ROWS], (double)cell->work->found.rows);
     bt_sum_add(&totals->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
     bt_sum_add(&totals->sum[BT_RESIDUAL_CHECKS], looks ? cell->n_contacts : 0);
-    bt_sum_add(&totals->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
-    bt_sum_add(&totals->sum[BT_RESIDUAL_BAD], (double)cell->work.found.bad);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_LISTED], cell->n_listed);
+    bt_sum_add(&totals->sum[BT_RESIDUAL_BAD], (double)cell->work->found.bad);
 }
 
 void bt_rounds_residual(bt_world *world, const bt_problem *problem, bt_since since, bt_work *work)
@@ -193,7 +212,7 @@ static void keep_beside(bt_cells *cells, int32_t x, int32_t y, double bad)
     for (int32_t dy = -1; bad > 0 && dy <= 1; dy++)
         for (int32_t dx = -1; dx <= 1; dx++) {
             const bt_idx k = bt_cells_at(cells, x + dx, y + dy);
-            if (k >= 0) cells->cell[k].work.kept = true;
+            if (k >= 0) cells->cell[k].work->kept = true;
         }
 }
 
@@ -203,10 +222,10 @@ static void keep_near_bad(bt_world *world)
 {
     bt_cells *cells = world->cells;
     for (bt_idx i = 0; i < cells->n_order; i++)
-        cells->cell[cells->order[i]].work.kept = cells->order[i] == cells->n - 1;
+        cells->cell[cells->order[i]].work->kept = cells->order[i] == cells->n - 1;
     spread(world, is_bad, keep_beside);
     for (bt_idx i = 0; i < cells->n_order; i++)
-        if (!cells->cell[cells->order[i]].work.kept) cells->cell[cells->order[i]].work.n_list = 0;
+        if (!cells->cell[cells->order[i]].work->kept) cells->cell[cells->order[i]].n_listed = 0;
     lists_are_new(world);
 }
 
@@ -242,8 +261,8 @@ static void move_bodies(bt_world *world, bt_idx k, const void *context, bt_total
     (void)totals;
     const body_move *m = context;
     bt_cell *cell = &world->cells->cell[k];
-    const double beta = cell->work.still ? 0 : m->beta;
-    cell->work.still = false;
+    const double beta = cell->work->still ? 0 : m->beta;
+    cell->work->still = false;
     move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 

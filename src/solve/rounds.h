@@ -144,6 +144,38 @@ typedef struct bt_in_place {
     double before[3];     ///< unknowns before the last sweep
 } bt_in_place;
 
+/// What a residual pass finds in a cell.
+typedef struct bt_found {
+    double most, squares;
+    int64_t rows, bad;    ///< bad: contacts far from the tolerance
+} bt_found;
+
+/// The contacts of a cell that are swept: cell->n_listed of them.
+typedef struct bt_work_list {
+    bt_idx *list;                   ///< [n_listed] ascending
+    double (*best)[3];              ///< [n_contacts] of the best residual pass, while they are kept; otherwise NULL
+    bt_idx cap_list;
+    bt_in_place *in_place;          ///< [n_contacts] where they are swept in place, after them; otherwise unset
+    /// The listed contacts are in batches (solve/batch.h), and the cell has no contacts but those. In the memory of the
+    /// contacts: [n_batches], and after them the records of the contacts that are not listed
+    bool packed;
+    struct bt_batch *batch;
+    bt_idx n_batches;
+    /// [n_last] otherwise: what the contacts that were listed last hand on to the next list, after the contacts
+    struct bt_unknowns *last;
+    bt_idx n_last;
+    bt_found found;                 ///< by the last residual pass that looked at the cell
+    bt_idx found_listed;            ///< and how many it listed
+    bool kept;                      ///< swept in a round over a part of the field
+    bool still;                     ///< they could not in the round before: nothing of theirs moves on
+} bt_work_list;
+
+/// The work lists of the cells, after new labels: all empty.
+void bt_rounds_begin(bt_world *world);
+
+/// Forget what the next step takes anew.
+void bt_rounds_rest(struct bt_solver *solver);
+
 /// An empty list for a cell with room for all its contacts: what a residual pass calls before it lists.
 void bt_rounds_list(bt_cell *cell);
 
@@ -163,12 +195,6 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work);
 /// Memory for a displacement of every body of this rank (bt_solver.shift), whose values are not set.
 void bt_rounds_make_shift(bt_world *world);
 
-/// What a residual pass finds in a cell.
-typedef struct bt_found {
-    double most, squares;
-    int64_t rows, bad;    ///< bad: contacts far from the tolerance
-} bt_found;
-
 /// What a residual pass has found in a cell, into its work list.
 void bt_rounds_found(bt_cell *cell, const bt_found *found);
 
@@ -181,7 +207,7 @@ typedef struct bt_moved {
 
 static inline void bt_moved_begin(bt_moved *moved, const bt_cell *cell)
 {
-    moved->y = cell->work.n_list > BT_MOVED_FEW ? bt_alloc((size_t)cell->work.n_list, sizeof *moved->y) : moved->few;
+    moved->y = cell->n_listed > BT_MOVED_FEW ? bt_alloc((size_t)cell->n_listed, sizeof *moved->y) : moved->few;
 }
 
 /// Into the totals of the sweep: how many contacts of the cell were moved, and what they turned against it, J.
@@ -194,7 +220,7 @@ static inline void bt_rounds_moved(const bt_sweep *sweep, int64_t n, double agai
 static inline void bt_moved_end(bt_moved *moved, const bt_cell *cell, const bt_sweep *sweep, double against,
                                 bt_totals *totals)
 {
-    bt_rounds_moved(sweep, sweep->beta > 0 ? cell->work.n_list : 0, against, totals);
+    bt_rounds_moved(sweep, sweep->beta > 0 ? cell->n_listed : 0, against, totals);
     if (moved->y != moved->few) free(moved->y);
 }
 

@@ -97,6 +97,7 @@ bt_solver *bt_solver_create(void)
 
 static void give_back(bt_solver *solver)
 {
+    bt_rounds_rest(solver);
     free(solver->before);
     free(solver->shift);
     solver->before = solver->shift = NULL;
@@ -108,6 +109,7 @@ void bt_solver_free(bt_solver *solver)
     if (!solver) return;
     bt_islands_free(solver->islands);
     give_back(solver);
+    free(solver->work);
     free(solver);
 }
 
@@ -138,12 +140,12 @@ void bt_solver_begin_cell(bt_world *world, bt_cell *cell)
     if (in_place) bt_rounds_in_place(cell, world->bodies.inv);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         bt_contact *contact = &cell->contacts[i];
-        for (int j = 0; cell->laws.limits && j < contact->n; j++)
-            contact->ln[j] = bt_min(contact->ln[j], cell->laws.limits[i].most[j]);
+        for (int j = 0; cell->laws->limits && j < contact->n; j++)
+            contact->ln[j] = bt_min(contact->ln[j], cell->laws->limits[i].most[j]);
         if (contact->n > 0) contact->lt = bt_clamp(contact->lt, contact->mu * (contact->ln[0] + contact->ln[1]));
-        else bt_onto_sheets(&cell->laws.limits[i], &contact->ln[0], &contact->lt);
+        else bt_onto_sheets(&cell->laws->limits[i], &contact->ln[0], &contact->lt);
         if (!in_place) continue;
-        double *x = cell->work.in_place[i].before;
+        double *x = cell->work->in_place[i].before;
         x[0] = contact->ln[0], x[1] = contact->ln[1], x[2] = contact->lt;
     }
 }
@@ -156,8 +158,8 @@ static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_to
     const bt_inv *inv = world->bodies.inv;
     if (warm) bt_solver_begin_cell(world, cell);
     if (world->par.plain_sweeps) bt_batch_unpack(cell); // contact by contact: keeps the bits of fields
-    if (cell->work.packed) bt_batch_apply(cell, v);
-    for (bt_idx i = 0; !cell->work.packed && i < cell->n_contacts; i++) {
+    if (cell->work->packed) bt_batch_apply(cell, v);
+    for (bt_idx i = 0; !cell->work->packed && i < cell->n_contacts; i++) {
         const bt_contact *contact = &cell->contacts[i];
         const double total = contact->ln[0] + contact->ln[1];
         if (total == 0 && contact->lt == 0) continue;
@@ -187,14 +189,14 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
     bt_rounds_list(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         const bt_contact *contact = &cell->contacts[i];
-        const bt_mass *m = &cell->work.in_place[i].mass;
-        const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
+        const bt_mass *m = &cell->work->in_place[i].mass;
+        const bt_limit *limit = cell->laws->limits ? &cell->laws->limits[i] : NULL;
         const double r = limit ? bt_contact_residual(contact, m, limit, v, problem->tolerance, &found.squares)
                                : bt_contact_residual(contact, m, NULL, v, problem->tolerance, &found.squares);
         found.most = bt_max(found.most, r);
         found.bad += r > near;
         found.rows += contact->n + 1 + (contact->n == 0);
-        const double *x = cell->work.in_place[i].before;
+        const double *x = cell->work->in_place[i].before;
         // or did before the last sweep
         bool on =
             problem->plain || contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || x[0] != contact->ln[0] ||
@@ -202,7 +204,7 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
         if (limit && contact->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < contact->n; c++)
             on = !(bt_normal_velocity(contact, c, &v[contact->a], &v[contact->b]) + contact->bias[c] >= 0);
-        if (on) cell->work.list[cell->work.n_list++] = i;
+        if (on) cell->work->list[cell->n_listed++] = i;
     }
     return found;
 }
@@ -255,8 +257,8 @@ static void settle(bt_world *world) { form_velocities(world, false); }
 /// Memory is read in the order of the contacts, but with gaps too wide for the hardware to foresee.
 static inline void fetch_ahead(const bt_cell *cell, bt_idx j)
 {
-    if (j >= cell->work.n_list) return;
-    const char *line = (const char *)&cell->contacts[cell->work.list[j]];
+    if (j >= cell->n_listed) return;
+    const char *line = (const char *)&cell->contacts[cell->work->list[j]];
     for (size_t k = 0; k < sizeof(bt_contact); k += 64) __builtin_prefetch(line + k);
 }
 
@@ -265,20 +267,20 @@ static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
 {
     enum { AHEAD = 3 };
     double most = 0;
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_idx i = cell->work.list[j];
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_idx i = cell->work->list[j];
         fetch_ahead(cell, j + AHEAD);
-        const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
-        most = bt_max(most, bt_update_contact(&cell->contacts[i], &cell->work.in_place[i].mass, limit, v, inv));
+        const bt_limit *limit = cell->laws->limits ? &cell->laws->limits[i] : NULL;
+        most = bt_max(most, bt_update_contact(&cell->contacts[i], &cell->work->in_place[i].mass, limit, v, inv));
     }
     return most;
 }
 
 static void move_contacts(const bt_sweep *sweep, bt_cell *cell, double (*y)[3])
 {
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        bt_contact *contact = &cell->contacts[cell->work.list[j]];
-        double *x = cell->work.in_place[cell->work.list[j]].before;
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        bt_contact *contact = &cell->contacts[cell->work->list[j]];
+        double *x = cell->work->in_place[cell->work->list[j]].before;
         bt_rounds_move(sweep, contact->ln, x, y[j], 2);
         bt_rounds_move(sweep, &contact->lt, x + 2, y[j] + 2, 1);
     }
@@ -287,9 +289,9 @@ static void move_contacts(const bt_sweep *sweep, bt_cell *cell, double (*y)[3])
 static double contacts_against(const bt_cell *cell, double (*y)[3])
 {
     double sum = 0;
-    for (bt_idx j = 0; j < cell->work.n_list; j++) {
-        const bt_contact *contact = &cell->contacts[cell->work.list[j]];
-        const bt_in_place *in_place = &cell->work.in_place[cell->work.list[j]];
+    for (bt_idx j = 0; j < cell->n_listed; j++) {
+        const bt_contact *contact = &cell->contacts[cell->work->list[j]];
+        const bt_in_place *in_place = &cell->work->in_place[cell->work->list[j]];
         const bt_mass *m = &in_place->mass;
         const double *x = in_place->before;
         sum += bt_rounds_against(m->w[0], contact->ln[0], x[0], y[j][0]) +
@@ -305,7 +307,7 @@ void bt_solver_sweep_cell(bt_world *world, bt_idx k, const void *context, bt_tot
     bt_cell *cell = &world->cells->cell[k];
     bt_tow *line = k == world->cells->n - 1 ? sweep->problem->line : NULL;
     bt_vel *v = sweep->problem->vel, *towed = line ? &v[bt_world_towed(world)] : NULL;
-    if (cell->work.n_list == 0 && !line) return;
+    if (cell->n_listed == 0 && !line) return;
     if (bt_batch_is_for(cell)) {
         bt_batch_sweep(cell, v, world->bodies.inv, sweep, world->par.inner_sweeps, totals);
         return;
@@ -327,8 +329,8 @@ void bt_solver_sweep_cell(bt_world *world, bt_idx k, const void *context, bt_tot
         if (line) most = bt_max(most, bt_tow_update(line, towed, world->bodies.inv[bt_world_towed(world)]));
         if (times == 0) totals->most = bt_max(totals->most, most);
     }
-    cell->work.updates += times * cell->work.n_list;
-    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)(times * cell->work.n_list));
+    cell->updates += times * cell->n_listed;
+    bt_sum_add(&totals->sum[BT_SWEEP_UPDATES], (double)(times * cell->n_listed));
     if (!sweep->moves) return;
     double against = contacts_against(cell, moved.y);
     for (int c = 0; line && c < line->n_branches; c++)
@@ -344,15 +346,15 @@ static void keep_impulses(bt_world *world, bt_idx k, const void *context, bt_tot
     bt_cell *cell = &world->cells->cell[k];
     bt_tow *line = line_of(world, k);
     if (what == BT_FORGET) {
-        free(cell->work.best);
-        cell->work.best = NULL;
+        free(cell->work->best);
+        cell->work->best = NULL;
         return;
     }
     bt_batch_unpack(cell);
-    if (!cell->work.best) cell->work.best = bt_alloc((size_t)cell->n_contacts + 1, sizeof *cell->work.best);
+    if (!cell->work->best) cell->work->best = bt_alloc((size_t)cell->n_contacts + 1, sizeof *cell->work->best);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         bt_contact *contact = &cell->contacts[i];
-        double *x = cell->work.best[i];
+        double *x = cell->work->best[i];
         if (what == BT_PUT_BACK) contact->ln[0] = x[0], contact->ln[1] = x[1], contact->lt = x[2];
         else x[0] = contact->ln[0], x[1] = contact->ln[1], x[2] = contact->lt;
     }
@@ -405,7 +407,7 @@ static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_
     bt_solver_begin_cell(world, cell);
     bt_solver_residual_of_cell(world, k, context, totals);
     const bool same = bt_contacts_load(cell) == cell->load;
-    totals->most = bt_max(totals->most, same ? cell->work.found.most : INFINITY);
+    totals->most = bt_max(totals->most, same ? cell->work->found.most : INFINITY);
     bt_sum_add(&totals->sum[0], cell->n_contacts);
 }
 
@@ -464,6 +466,7 @@ static void solve(bt_world *world)
 
 void bt_solver_solve(bt_world *world, bool extends)
 {
+    bt_rounds_begin(world);
     bt_solver *solver = world->solver;
     solver->extends = extends && !solver->rebounds && !world->par.plain_sweeps;
     bt_step_stats *st = &world->stats;

@@ -11,7 +11,7 @@
 //
 // Data flow of a step. contacts (bt_cell.contacts, with the impulses of the last step) and vel_free -> vel ->
 //   residual pass -> lists -> sweeps -> vel, contacts:
-//   residual reads all contacts and vel; writes bt_cell.work.list (contacts that bear load or close), the residual, and
+//   residual reads all contacts and vel; writes bt_work_list.list (contacts that bear load or close), the residual, and
 //   what is bad;
 //   sweep    goes over the lists only, inner_sweeps times a cell before the next has its turn: its data are then in the
 //            first-level cache, and between ranks nothing need be exchanged. The listed contacts are packed for it,
@@ -62,6 +62,8 @@ bool bt_restitution_begin(bt_world *world);
 bool bt_restitution_lower(bt_world *world);
 
 typedef struct bt_solver {
+    struct bt_work_list *work;   ///< [n_work] of the cells (solve/rounds.h)
+    bt_idx n_work;
     bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/solve/rounds.h)
     bt_idx cap_before;
     double line_before[BT_MAX_BRANCHES]; ///< impulses of the line before the last sweep, N s

@@ -44,84 +44,16 @@ bool bt_margin_holds(const bt_world *world, double margin, double s)
 
 bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 
-static void free_work(bt_work_list *work)
-{
-    free(work->list);
-    work->list = NULL;
-    work->in_place = NULL;
-    work->n_list = work->cap_list = work->n_last = 0;
-}
-
-void bt_cells_make_room(bt_cell *cell, size_t bytes)
-{
-    if (bytes <= cell->contact_bytes) return;
-    free(cell->contacts);
-    cell->contact_bytes = bytes + bytes / 32;
-    cell->contacts = bt_alloc_unset(cell->contact_bytes, 1);
-}
-
-/// The contacts into memory of their own.
-static void move_contacts(bt_cell *cell, size_t bytes)
-{
-    bt_contact *contacts = bt_alloc_unset(bytes, 1);
-    if (cell->n_contacts > 0) memcpy(contacts, cell->contacts, (size_t)cell->n_contacts * sizeof *contacts);
-    free(cell->contacts);
-    cell->contacts = contacts;
-    cell->contact_bytes = bytes;
-}
-
-void *bt_cells_after_contacts(bt_cell *cell, size_t bytes)
-{
-    const size_t own = (size_t)cell->n_contacts * sizeof *cell->contacts;
-    if (own + bytes > cell->contact_bytes) move_contacts(cell, own + bytes + (own + bytes) / 32);
-    return (char *)cell->contacts + own;
-}
-
-/// Only the contacts stay.
-static void rest(bt_cell *cell)
-{
-    assert(!cell->work.packed);
-    free_work(&cell->work);
-    const size_t bytes = (size_t)cell->n_contacts * sizeof *cell->contacts;
-    if (cell->contact_bytes - cell->contact_bytes / 8 > bytes) move_contacts(cell, bytes);
-}
-
-void bt_cells_rest(bt_cells *cells)
-{
-    for (bt_idx k = 0; k < cells->n; k++) rest(&cells->cell[k]);
-}
-
-void bt_cells_idle(bt_cell *cell)
+void bt_cells_forget_pairs(bt_cell *cell)
 {
     free(cell->search.pairs);
     free(cell->search.near);
-    free(cell->contacts);
-    free(cell->gaps);
-    free(cell->laws.limits);
-    free(cell->laws.rises);
-    free_work(&cell->work);
     cell->search = (bt_pair_search){0};
-    cell->contacts = NULL;
-    cell->gaps = NULL;
-    cell->laws.limits = NULL;
-    cell->laws.rises = NULL;
-    cell->contact_bytes = 0;
-    cell->n_contacts = cell->cap_contacts = cell->laws.cap_limits = 0;
-    cell->n_points = 0;
-    cell->overlap = 0;
-}
-
-static void free_cell(bt_cell *cell)
-{
-    bt_cells_idle(cell);
-    free(cell->laws.memory);
-    *cell = (bt_cell){0};
 }
 
 void bt_cells_free(bt_cells *cells)
 {
     if (!cells) return;
-    for (bt_idx k = 0; k < cells->n; k++) free_cell(&cells->cell[k]);
     void *arrays[] = {cells->at,   cells->speed,   cells->bound, cells->moved, cells->asleep, cells->awake,
                       cells->busy, cells->is_busy, cells->order, cells->turn,  cells->share,  cells->swept,
                       cells->cell, cells};
@@ -184,7 +116,7 @@ void bt_cells_leave(bt_cells *cells)
             cells->busy[kept++] = k;
         } else {
             cells->is_busy[k] = 0;
-            cells->cell[k].work.swept = false; // as a residual pass would have it: nothing here moved on
+            cells->cell[k].swept = false; // as a residual pass would have it: nothing here moved on
         }
     }
     cells->n_busy = kept;
@@ -228,8 +160,7 @@ static int32_t coordinate(double x, double x0, double side, int32_t wrap)
     return isfinite(c) ? (int32_t)bt_max(-1e9, bt_min(1e9, c)) : 0;
 }
 
-/// Choose the cells for the poses of now and margins up to twice the present one.
-static void choose(bt_world *world, double margin)
+static void choose_cells(bt_world *world, double margin)
 {
     bt_cells *cells = world->cells;
     const bt_bodies *bodies = &world->bodies;
@@ -283,8 +214,9 @@ static void choose(bt_world *world, double margin)
 /// Only a pose that is not a number lies outside the box of the floes.
 static int32_t within(int32_t c, int32_t low, int32_t n) { return c < low ? low : c >= low + n ? low + n - 1 : c; }
 
-static void label(bt_world *world)
+void bt_cells_choose(bt_world *world, double margin)
 {
+    choose_cells(world, margin);
     const bt_cells *cells = world->cells;
     bt_bodies *bodies = &world->bodies;
     for (bt_idx i = 0; i < bodies->n; i++) {
@@ -381,9 +313,11 @@ static bt_cell *new_cell(bt_cells *cells, int32_t x, int32_t y)
 }
 
 /// A cell for every place of the box that this rank owns or whose bodies it holds; the last one for the large bodies.
-static void make_cells(bt_world *world)
+void bt_cells_make(bt_world *world)
 {
     bt_cells *cells = world->cells;
+    assert(cells->n == 0);
+    sort_bodies(world);
     const bt_bodies *bodies = &world->bodies;
     const int64_t n_at = (int64_t)cells->n_x * cells->n_y;
     if (n_at > cells->cap_at) {
@@ -435,58 +369,6 @@ static void make_cells(bt_world *world)
     bt_cells_wake_all(cells);
 }
 
-// --- what the contacts were ------------------------------------------------------------------------------------------
-
-int bt_memory_by_names(const void *p, const void *q)
-{
-    const bt_memory *a = p, *b = q;
-    if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    if (a->b != b->b) return a->b < b->b ? -1 : 1;
-    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
-    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
-    return a->law - b->law;
-}
-
-void bt_cells_remember(bt_cell *cell, const bt_memory *memory)
-{
-    if (cell->laws.n_memory == cell->laws.cap_memory) {
-        cell->laws.cap_memory = cell->laws.cap_memory ? 2 * cell->laws.cap_memory : 8;
-        cell->laws.memory = bt_realloc(cell->laws.memory, (size_t)cell->laws.cap_memory, sizeof *cell->laws.memory);
-    }
-    cell->laws.memory[cell->laws.n_memory++] = *memory;
-}
-
-static bt_memory memory_of(const bt_gid *gid, const bt_cell *cell, const bt_pair *pair)
-{
-    const bt_contact *contact = &cell->contacts[pair->contact];
-    const bt_gaps *gaps = &cell->gaps[pair->contact];
-    return (bt_memory){.a = gid[pair->a], .b = gid[pair->b], .part = {pair->part[0], pair->part[1]},
-                       .n_points = contact->n,
-                      .feature = {gaps->feature[0], gaps->feature[1]},
-                      .value = {contact->ln[0], contact->ln[1], contact->lt}};
-}
-
-bt_memory *bt_cells_take_memory(const bt_world *world, int64_t *n)
-{
-    const bt_cells *cells = world->cells;
-    int64_t cap = 0;
-    for (bt_idx k = 0; k < cells->n; k++) {
-        for (bt_idx i = 0; cells->cell[k].own && i < cells->cell[k].search.n_pairs; i++)
-            cap += cells->cell[k].search.pairs[i].contact >= 0;
-        if (cells->cell[k].own) cap += cells->cell[k].laws.n_memory;
-    }
-    bt_memory *memory = bt_alloc((size_t)cap, sizeof *memory);
-    *n = 0;
-    for (bt_idx k = 0; k < cells->n; k++) {
-        const bt_cell *cell = &cells->cell[k];
-        for (bt_idx i = 0; cell->own && i < cell->laws.n_memory; i++) memory[(*n)++] = cell->laws.memory[i];
-        for (bt_idx i = 0; cell->own && i < cell->search.n_pairs; i++)
-            if (cell->search.pairs[i].contact >= 0)
-                memory[(*n)++] = memory_of(world->bodies.gid, cell, &cell->search.pairs[i]);
-    }
-    return memory;
-}
-
 bt_idx bt_cells_of_pair(const bt_world *world, bt_idx a, bt_idx b)
 {
     const bt_cells *cells = world->cells;
@@ -500,40 +382,6 @@ bt_idx bt_cells_of_pair(const bt_world *world, bt_idx a, bt_idx b)
     return bt_cells_at(cells, at[0], at[1]);
 }
 
-/// A pair that was in contact into the list of a cell that has had no detection yet.
-static void put_pair(bt_cell *cell, bt_idx a, bt_idx b, const bt_memory *memory)
-{
-    bt_pair_search *search = &cell->search;
-    if (search->n_pairs == search->cap_pairs) {
-        cell->cap_contacts = search->cap_pairs = search->cap_pairs ? 2 * search->cap_pairs : 16;
-        search->pairs = bt_realloc(search->pairs, (size_t)search->cap_pairs, sizeof *search->pairs);
-        // not aligned: no room here
-        cell->contacts = bt_realloc(cell->contacts, (size_t)search->cap_pairs, sizeof *cell->contacts);
-        cell->gaps = bt_realloc(cell->gaps, (size_t)search->cap_pairs, sizeof *cell->gaps);
-    }
-    const bt_idx at = search->n_pairs++;
-    search->pairs[at] = (bt_pair){.a = a, .b = b, .contact = at, .part = {memory->part[0], memory->part[1]},
-                                  .axes = BT_NO_AXES};
-    cell->contacts[at] = (bt_contact){.n = memory->n_points, .ln = {memory->value[0], memory->value[1]},
-                                      .lt = memory->value[2]};
-    cell->gaps[at] = (bt_gaps){.feature = {memory->feature[0], memory->feature[1]}};
-}
-
-/// Put memory, in any order, into empty cells.
-static void put_memory(bt_world *world, bt_memory *memory, int64_t n)
-{
-    bt_cells *cells = world->cells;
-    if (n > 0) qsort(memory, (size_t)n, sizeof *memory, bt_memory_by_names);
-    for (int64_t k = 0; k < n; k++) {
-        const bt_idx a = bt_world_index(world, memory[k].a), b = bt_world_index(world, memory[k].b);
-        // a floe that has shot so far away from a large body that its rank does not hold it any more
-        if (a < 0 || b < 0) continue;
-        bt_cell *cell = &cells->cell[bt_cells_of_pair(world, a, b)];
-        if (memory[k].law != 0) bt_cells_remember(cell, &memory[k]);
-        else put_pair(cell, a, b, &memory[k]);
-    }
-}
-
 static bool adjacent(int32_t p, int32_t q, int32_t n)
 {
     const int32_t d = p < q ? q - p : p - q;
@@ -543,93 +391,4 @@ static bool adjacent(int32_t p, int32_t q, int32_t n)
 bool bt_cells_adjacent(const bt_cells *cells, const int32_t p[2], const int32_t q[2])
 {
     return adjacent(p[0], q[0], cells->wrap_x) && adjacent(p[1], q[1], cells->wrap_y);
-}
-
-/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the
-/// margin they had (the last solution may be one that did not converge). No cell has both in its block, and no rank may
-/// hold both.
-static void drop_parted(const bt_world *world, bt_memory *memory, int64_t *n)
-{
-    const bt_bodies *bodies = &world->bodies;
-    int64_t kept = 0;
-    for (int64_t k = 0; k < *n; k++) {
-        const bt_idx i = bt_world_index(world, memory[k].a), j = bt_world_index(world, memory[k].b);
-        const bool one_large = bodies->large[i] || bodies->large[j];
-        if (one_large || bt_cells_adjacent(world->cells, bodies->cell[i], bodies->cell[j])) memory[kept++] = memory[k];
-    }
-    *n = kept;
-}
-
-/// Bodies to their ranks and places under the labels they have, and cells around them with this memory, which is
-/// released.
-static void place(bt_world *world, bt_memory *memory, int64_t n)
-{
-    bt_cells *cells = world->cells;
-    for (bt_idx k = 0; k < cells->n; k++) free_cell(&cells->cell[k]);
-    cells->n = 0;
-    if (world->exchange) memory = world->exchange->migrate(world, memory, &n);
-    sort_bodies(world);
-    make_cells(world);
-    put_memory(world, memory, n);
-    if (world->exchange) world->exchange->connect(world);
-    free(memory);
-    cells->labelled = true;
-}
-
-/// New cells and labels, for this memory, which is released.
-static void renew(bt_world *world, double margin, bt_memory *memory, int64_t n)
-{
-    choose(world, margin);
-    label(world);
-    world->cells->n_labellings++;
-    drop_parted(world, memory, &n);
-    place(world, memory, n);
-    world->cells->relabel = false;
-}
-
-static void relabel(bt_world *world, double margin)
-{
-    int64_t n;
-    bt_memory *memory = bt_cells_take_memory(world, &n);
-    renew(world, margin, memory, n);
-}
-
-/// New owners of the cells there are.
-static void hand_on(bt_world *world)
-{
-    int64_t n;
-    bt_memory *memory = bt_cells_take_memory(world, &n);
-    place(world, memory, n);
-    world->cells->relabel = false;
-}
-
-void bt_cells_change(bt_world *world, bt_bodies_change *change, const void *context)
-{
-    int64_t n;
-    bt_memory *memory = bt_cells_take_memory(world, &n);
-    memory = change(world, memory, &n, context);
-    renew(world, world->par.slop, memory, n);
-}
-
-void bt_cells_restore(bt_world *world, bt_memory *memory, int64_t n) { place(world, memory, n); }
-
-void bt_cells_begin(bt_world *world)
-{
-    bt_cells *cells = world->cells;
-    if (!cells->labelled || cells->relabel) {
-        // it has a place of its own, whatever its size
-        if (world->towed >= 0) world->bodies.large[bt_world_towed(world)] = 1;
-        relabel(world, world->par.slop);
-    } else if (world->exchange && world->exchange->due(world)) {
-        hand_on(world);
-    }
-    cells->still = world->par.water_u == 0 && world->par.water_v == 0;
-    if (!cells->still) bt_cells_wake_all(cells);
-}
-
-bool bt_cells_update(bt_world *world, double margin)
-{
-    if (margin <= world->cells->margin_max) return false;
-    relabel(world, margin);
-    return true;
 }

@@ -84,41 +84,6 @@ typedef struct bt_pair {
 } bt_pair;
 _Static_assert(sizeof(bt_pair) == 40, "a floe in dense ice has four, and each is kept from step to step");
 
-/// One manifold, in two cache lines: what batches are packed from (solve/batch.h), four contacts at a time, each a line
-/// of four numbers after the other; in the last cell and under rising bounds a sweep reads it itself, and writes the
-/// second line. Its two points are on a line along the tangent, so both have the same tangential row. Its effective
-/// masses follow from the arms and the bodies (contact/row.h): they are formed where they are used, which takes less
-/// time than reading them would, and are not kept but where sweeps need them again and again.
-typedef struct bt_contact {
-    double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
-    double rat, rbt;       ///< ra×t, rb×t, m
-    double ran[2], rbn[2]; ///< ra×n, rb×n of each point, m
-    double bias[2];        ///< b of the normals, m/s
-    double mu;
-    bt_idx a, b;
-    double ln[2], lt;      ///< impulse on b, N s
-    int32_t n;             ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
-    bt_idx pair;           ///< its pair in the cell
-} bt_contact;
-_Static_assert(sizeof(bt_contact) == 128, "two cache lines; four lines of four numbers (solve/rows.h)");
-
-/// What the sweep does not see of it.
-typedef struct bt_gaps {
-    double gap[2];         ///< m; from the position projection on those that U2 leaves at the end of the step
-    uint32_t feature[2];   ///< of the points
-    int32_t row;           ///< bt_row_state (contact/pack.h)
-} bt_gaps;
-
-/// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).
-typedef struct bt_memory {
-    bt_gid a, b;
-    uint16_t part[2];    ///< as in bt_pair
-    int32_t n_points;
-    uint32_t feature[2]; ///< of the points
-    double value[4];     ///< rigid: impulses as in bt_contact (ln, lt), N s; of other laws: see there
-    uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
-} bt_memory;
-
 /// What a cell keeps of the search for pairs, over many steps (pairs.c).
 typedef struct bt_pair_search {
     bt_pair *pairs;                 ///< [n_pairs] sorted by (gid a, gid b, parts)
@@ -133,42 +98,6 @@ typedef struct bt_pair_search {
     double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
 } bt_pair_search;
 
-/// What contact laws bound and remember in a cell (contact/law.h).
-typedef struct bt_law_state {
-    struct bt_limit *limits;        ///< [n_contacts] bounds of the contacts; NULL where contacts are rigid
-    struct bt_rise *rises;          ///< [n_contacts] their rising parts; NULL where no law has one
-    /// [n_memory] what laws remember of pairs of this cell, sorted by bt_memory_by_names
-    bt_memory *memory;
-    bt_idx cap_limits, n_memory, cap_memory;
-    bool rising;                    ///< some bounds have a rising part
-} bt_law_state;
-
-/// The contacts of a cell that are swept (solve/rounds.h).
-typedef struct bt_work_list {
-    bt_idx *list;                   ///< [n_list] ascending
-    double (*best)[3];              ///< [n_contacts] of the best residual pass, while they are kept; otherwise NULL
-    bt_idx n_list, cap_list;
-    /// [n_contacts] of a cell whose contacts are swept where they are, after them (solve/rounds.h); otherwise unset
-    struct bt_in_place *in_place;
-    /// The listed contacts are in batches (solve/batch.h), and the cell has no contacts but those. In the memory of the
-    /// contacts: [n_batches], and after them the records of the contacts that are not listed
-    bool packed;
-    struct bt_batch *batch;
-    bt_idx n_batches;
-    /// [n_last] otherwise: what the contacts that were listed last hand on to the next list, after the contacts
-    struct bt_unknowns *last;
-    bt_idx n_last;
-    int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
-    struct {
-        double most, squares;
-        int64_t rows, bad;
-        bt_idx listed;
-    } found;                        ///< by the last residual pass that looked at the cell (solve/rounds.h)
-    bool kept;                      ///< swept in a round over a part of the field
-    bool still;                     ///< they could not in the round before: nothing of theirs moves on
-    bool swept;                     ///< listed contacts, here or on another rank, may move its bodies
-} bt_work_list;
-
 typedef struct bt_cell {
     int32_t x, y;                   ///< coordinates
     bt_idx first, end;              ///< its bodies in storage
@@ -181,17 +110,19 @@ typedef struct bt_cell {
     uint64_t load;                  ///< bt_contacts_load of the contacts before, where a step was detected again
     double margin;                  ///< m, of this step's detection
     bt_pair_search search;
-    // contacts of this step
-    /// [n_contacts]. After new labels there are none until the next detection: then [n_pairs], with what it takes over,
-    /// which is n, the impulses and the features. Not while they are packed (work)
-    bt_contact *contacts;
-    size_t contact_bytes;           ///< there is room for
-    bt_gaps *gaps;                  ///< of the contacts
-    bt_idx n_contacts, cap_contacts;
+    bt_idx n_contacts;              ///< of this step
+    bt_idx n_listed;                ///< of these the next sweep works on
+    bool swept;                     ///< sweeps over them, here or on another rank, may move its bodies
+    int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
     int64_t n_points;
     double overlap;                 ///< deepest, m; what has given way does not count
-    bt_law_state laws;
-    bt_work_list work;
+    // What layers above keep of the cell: theirs to make, to read and to free; NULL in a new cell.
+    struct bt_contact *contacts;    ///< contact/cell_contacts.h
+    struct bt_gaps *gaps;
+    size_t contact_bytes;
+    bt_idx cap_contacts;
+    struct bt_law_state *laws;
+    struct bt_work_list *work;      ///< solve/rounds.h
 } bt_cell;
 
 /// What a cell waits for in a pass, and what waits for it (src/space/phases.h).
@@ -267,19 +198,15 @@ typedef struct bt_cells {
 } bt_cells;
 
 bt_cells *bt_cells_create(void);
+/// No cell is left (bt_cells_empty).
 void bt_cells_free(bt_cells *cells);
 
-/// Collective. At the start of a step: renew labels, storage and cells if some floe has left its cell too far.
-void bt_cells_begin(bt_world *world);
-
-/// Collective. The same if the cells are too small for this margin, m. True when renewed: every index of a body has
-/// changed.
-bool bt_cells_update(bt_world *world, double margin);
-
-/// What is done to the bodies that this rank holds, and to its memory of contacts [*n], which it takes and returns.
-typedef bt_memory *bt_bodies_change(bt_world *world, bt_memory *memory, int64_t *n, const void *context);
-/// Collective. New labels, storage and cells after bodies have been put in the place of others. Indices change.
-void bt_cells_change(bt_world *world, bt_bodies_change *change, const void *context);
+/// Choose cells for the present poses and for margins up to twice this one, m, and label the floes with them. The cells
+/// that exist stay as they are until bt_cells_make.
+void bt_cells_choose(bt_world *world, double margin);
+/// Storage in the order of the labels, and new cells around the bodies that this rank holds, where none is left.
+/// Every index of a body changes.
+void bt_cells_make(bt_world *world);
 
 /// Cell k, or every cell, is looked at from now on.
 void bt_cells_wake(bt_cells *cells, bt_idx k);
@@ -289,17 +216,8 @@ void bt_cells_sort_busy(bt_cells *cells);
 /// Leave out of the list what is at rest, idle, and not moved by contacts.
 void bt_cells_leave(bt_cells *cells);
 
-/// Room for so many bytes where the contacts are; what was there is lost when there was less.
-void bt_cells_make_room(bt_cell *cell, size_t bytes);
-
-/// Room for so many bytes after the contacts, which stay but may be moved; returns where it begins.
-void *bt_cells_after_contacts(bt_cell *cell, size_t bytes);
-
-/// Give back what sweeps take anew in the next step.
-void bt_cells_rest(bt_cells *cells);
-
-/// Take from a cell whose bodies rest what a step needs for its contacts; what contact laws remember stays.
-void bt_cells_idle(bt_cell *cell);
+/// The next search for pairs of a cell begins anew.
+void bt_cells_forget_pairs(bt_cell *cell);
 
 /// How far the centroid of body i stands outside its cell, m.
 double bt_cells_outside(const bt_world *world, bt_idx i);
@@ -330,19 +248,6 @@ static inline bt_idx bt_cells_at(const bt_cells *cells, int32_t x, int32_t y)
 
 /// May the bodies of cell k have another velocity, or pose, than by drifting with the water?
 static inline bool bt_cells_moves(const bt_cells *cells, bt_idx k) { return !cells->asleep[k] || cells->awake[k]; }
-
-/// In the order of (a, b, part, law).
-int bt_memory_by_names(const void *p, const void *q);
-/// Append a record to the memory of a cell.
-void bt_cells_remember(bt_cell *cell, const bt_memory *memory);
-
-/// Impulses of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller
-/// frees.
-bt_memory *bt_cells_take_memory(const bt_world *world, int64_t *n);
-/// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds,
-/// have been set, and the memory [n], which is released, is that of all ranks. A domain has been created, but
-/// nothing is distributed yet.
-void bt_cells_restore(bt_world *world, bt_memory *memory, int64_t n);
 
 /// Cell that owns the contacts of bodies a and b, −1 = not here.
 bt_idx bt_cells_of_pair(const bt_world *world, bt_idx a, bt_idx b);

@@ -8,6 +8,17 @@
 
 #include "space/cells.h"
 
+/// What is remembered of a pair, by the names that last: state of the world. What the numbers mean is known to
+/// contact/law.h; here they are moved with the pair.
+typedef struct bt_memory {
+    bt_gid a, b;
+    uint16_t part[2];    ///< as in bt_pair
+    int32_t n_points;
+    uint32_t feature[2]; ///< of the points
+    double value[4];     ///< rigid: impulses as in bt_contact (ln, lt), N s; of other laws: see there
+    uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
+} bt_memory;
+
 typedef struct bt_exchange {
     /// Collective. Maxima of x [n] over the ranks.
     void (*maxima)(const bt_world *world, double *x, int n);

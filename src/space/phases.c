@@ -30,14 +30,14 @@ static bool has_work(const bt_world *world, bt_idx k)
 
 static bool is_listed(const bt_world *world, bt_idx k)
 {
-    return world->cells->cell[k].work.n_list > 0 || (k == world->cells->n - 1 && bt_tow_has_line(world->tow));
+    return world->cells->cell[k].n_listed > 0 || (k == world->cells->n - 1 && bt_tow_has_line(world->tow));
 }
 
 /// What a visit to cell k takes, in contacts. A cell itself costs something, too.
 static int64_t cost_of(const bt_cells *cells, bt_idx k, bt_which which)
 {
     enum { CELL = 4 };
-    return CELL + (which == BT_LISTED ? cells->cell[k].work.n_list : cells->cell[k].n_contacts);
+    return CELL + (which == BT_LISTED ? cells->cell[k].n_listed : cells->cell[k].n_contacts);
 }
 
 /// Stretches of cells [begin, end) of the order with equal parts of the work, one a share.
@@ -72,7 +72,7 @@ void bt_phases_distribute(bt_world *world)
 {
     bt_cells *cells = world->cells;
     int64_t listed = 0;
-    for (bt_idx i = 0; i < cells->n_order; i++) listed += cells->cell[cells->order[i]].work.n_list;
+    for (bt_idx i = 0; i < cells->n_order; i++) listed += cells->cell[cells->order[i]].n_listed;
     const bt_idx n = BT_MANY(listed, BT_FEW_CONTACTS) ? omp_get_max_threads() : 1;
     if (n > cells->cap_shares) {
         free(cells->share);
@@ -133,7 +133,7 @@ void bt_phases_order(bt_world *world)
         cells->order[at[stretch_of(world, k)]++] = k;
         find_before(world, k);
         cells->n_contacts += cells->cell[k].n_contacts;
-        cells->cell[k].work.n_list = cells->cell[k].n_contacts; // until they are listed
+        cells->cell[k].n_listed = cells->cell[k].n_contacts; // until they are listed
     }
     bt_phases_distribute(world);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Loads of the floes in a step, floes that split by them, and pieces in their place; see step/splitting.h.
+// Loads of the floes in a step, and floes that split by them; see step/splitting.h.
 #include "step/splitting.h"
 
 #include <math.h>
@@ -9,69 +9,12 @@
 #include "base/elementary.h"
 #include "base/inside.h"
 #include "body/bodies.h"
+#include "contact/cell_contacts.h"
 #include "contact/crush.h"
 #include "contact/law.h"
-#include "contact/row.h"
-#include "force/forces.h"
 #include "loads/collision.h"
 #include "partition/domain.h"
-#include "space/cells.h"
 #include "split/cut.h"
-
-void bt_splitting_free(bt_splitting *splitting)
-{
-    if (!splitting) return;
-    free(splitting->split);
-    free(splitting->begin);
-    free(splitting->vertex);
-    free(splitting->sum);
-    free(splitting->borne);
-    free(splitting);
-}
-
-// --- the history -----------------------------------------------------------------------------------------------------
-
-static bool is_piece(const bt_splitting *splitting, bt_gid gid)
-{
-    return gid >= splitting->first && gid < splitting->first + 2 * splitting->n;
-}
-
-int64_t bt_splitting_generation(const bt_splitting *splitting, bt_gid gid)
-{
-    return splitting && is_piece(splitting, gid) ? bt_splitting_birth(splitting, gid - splitting->first)->generation
-                                                 : 0;
-}
-
-bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t *path)
-{
-    int64_t way = 0, bit = 1;
-    for (; splitting && is_piece(splitting, gid); bit <<= 1) {
-        const bt_gid k = gid - splitting->first;
-        way |= k % 2 ? bit : 0;
-        gid = bt_splitting_birth(splitting, k)->parent;
-    }
-    *path = bit | way;
-    return gid;
-}
-
-void bt_splitting_append(bt_splitting *splitting, const bt_split_record *record, const double *vertex)
-{
-    if (splitting->n == splitting->cap) {
-        splitting->cap = splitting->cap ? 2 * splitting->cap : 64;
-        splitting->split = bt_realloc(splitting->split, (size_t)splitting->cap, sizeof *splitting->split);
-        splitting->begin = bt_realloc(splitting->begin, (size_t)splitting->cap, sizeof *splitting->begin);
-    }
-    splitting->begin[splitting->n] = splitting->n_vertices;
-    splitting->split[splitting->n++] = *record;
-    const int64_t more = record->corners[0] + record->corners[1] + record->corners[2];
-    if (splitting->n_vertices + more > splitting->cap_vertices) {
-        splitting->cap_vertices = 2 * splitting->cap_vertices + more;
-        splitting->vertex = bt_realloc(splitting->vertex, (size_t)splitting->cap_vertices,
-                                       2 * sizeof *splitting->vertex);
-    }
-    memcpy(splitting->vertex + 2 * splitting->n_vertices, vertex, 2 * (size_t)more * sizeof *vertex);
-    splitting->n_vertices += more;
-}
 
 // --- loads -----------------------------------------------------------------------------------------------------------
 
@@ -135,7 +78,7 @@ typedef struct {
 /// Is contact j the edge of floes that have rafted (contact/raft.h)?
 static bool is_raft_edge(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
-    return bt_law_on(&world->par, BT_LAW_RAFTING) && cell->laws.limits[j].record[BT_LAW_RAFTING] >= 0;
+    return bt_law_on(&world->par, BT_LAW_RAFTING) && cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0;
 }
 
 /// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer end: that
@@ -284,8 +227,8 @@ static void add_cell(bt_world *world, const bt_cell *cell, pass what, load_list 
         if (list_a) add_side(world, cell, j, &p, &c, false, to);
         if (list_b) add_side(world, cell, j, &p, &c, true, to);
     }
-    for (bt_idx k = 0; k < cell->laws.n_memory; k++) {
-        const bt_memory *memory = &cell->laws.memory[k];
+    for (bt_idx k = 0; k < cell->laws->n_memory; k++) {
+        const bt_memory *memory = &cell->laws->memory[k];
         if (memory->law != BT_LAW_RAFTING) continue;
         for (int side = 0; side < 2; side++) {
             const bt_idx i = bt_world_index(world, side ? memory->b : memory->a);
@@ -450,16 +393,6 @@ static void add_outline(found_list *list, int n, const double *v)
     list->n_vertices += (size_t)n;
 }
 
-/// ∫r²dA of floe i about its centroid, m⁴: that of a piece is what was left for it.
-static double polar_of(const bt_world *world, bt_idx i)
-{
-    const bt_bodies *bodies = &world->bodies;
-    const bt_splitting *splitting = world->splitting;
-    const bt_gid k = bodies->gid[i] - splitting->first;
-    if (is_piece(splitting, bodies->gid[i])) return bt_splitting_birth(splitting, k)->polar[k % 2];
-    return bt_shape_extent(bt_body_corners(bodies, i), bodies->vertices + 2 * bodies->offset[i]).polar;
-}
-
 static void place_of(const bt_bodies *bodies, bt_idx i, bt_chord_end end, double out[2])
 {
     bt_chord_place(bt_body_corners(bodies, i), bodies->outline + 2 * bodies->offset[i], end, out);
@@ -475,7 +408,7 @@ static bool add_found(const bt_world *world, const judged *j, found_list *to)
     const int n = bt_body_corners(bodies, i);
     const double *outline = bodies->vertices + 2 * bodies->offset[i];
     bt_piece piece[2];
-    if (!bt_split_cut(n, outline, bodies->area[i], polar_of(world, i), &j->best.chord, piece)) return false;
+    if (!bt_split_cut(n, outline, bodies->area[i], bt_splitting_polar(world, i), &j->best.chord, piece)) return false;
     found_row row = {.record = {.step = world->step, .parent = bodies->gid[i],
                                 .generation = bt_splitting_generation(world->splitting, bodies->gid[i]) + 1,
                                 .mode = j->best.mode, .thickness = bodies->thickness[i], .ratio = j->best.ratio},
@@ -518,134 +451,6 @@ static found_list of_all(const bt_world *world, found_list *mine)
     }
     if (all.n > 0) qsort(all.row, all.n, sizeof *all.row, by_parent);
     return all;
-}
-
-// --- pieces ----------------------------------------------------------------------------------------------------------
-
-/// A body for piece k of body i, by its velocity at the start of the step. v: its outline.
-static void put_piece(bt_world *world, bt_idx i, const bt_split_record *record, int k, const double *v, bt_gid gid)
-{
-    bt_bodies *bodies = &world->bodies;
-    const int n = (int)record->corners[k];
-    const double whole = bt_shape_moments(bt_body_corners(bodies, i), bodies->vertices + 2 * bodies->offset[i]).cubic,
-                 own = bt_shape_moments(n, v).cubic;
-    double s, c;
-    bt_sincos(bodies->pose[i].yaw, &s, &c);
-    const double *at = record->at[k], dx = c * at[0] - s * at[1], dy = s * at[0] + c * at[1],
-                 share = record->area[k] / bodies->area[i];
-    const bt_vel u = bodies->vel_start[i];
-    int32_t lap = bodies->lap[i], across = 0;
-    bt_body_def def = {
-        .motion = BT_DYNAMIC, .n_vertices = n, .vertices = v,
-        .x = bt_into_period(bodies->pose[i].x + dx, world->par.x0, world->par.period_x, &lap),
-        .y = bt_into_period(bodies->pose[i].y + dy, world->par.y0, world->par.period_y, &across),
-        .yaw = bodies->pose[i].yaw, .vx = u.x - u.w * dy, .vy = u.y + u.w * dx, .yaw_rate = u.w,
-        .mass = bodies->mass[i] * share, .inertia = bodies->inertia[i] * (record->polar[k] / polar_of(world, i)),
-        .friction = bodies->friction[i], .restitution = bodies->restitution[i], .thickness = bodies->thickness[i],
-        .drag = bodies->drag[i], .large = bodies->large[i] && sqrt(record->area[k] / BT_PI) > world->splitting->large,
-    };
-    def.drag.water_skin *= share;
-    def.drag.air_skin *= share;
-    def.drag.yaw *= own / whole;
-    bt_parts parts;
-    if (!bt_outline_convex(n, v) && bt_outline_split(n, v, &parts)) def.parts = &parts;
-    const bt_idx j = bt_bodies_put(bodies, &def, gid);
-    bodies->area[j] = record->area[k];
-    bodies->share[j] = bodies->share[i];
-    bodies->exposure[j] = bodies->exposure[i];
-    bodies->path[j] = bodies->path[i];
-    bodies->lap[j] = lap;
-}
-
-/// Splits from..n of the history: pieces in the place of parents that this rank holds.
-static void put_pieces(bt_world *world, int64_t from)
-{
-    bt_bodies *bodies = &world->bodies;
-    const bt_splitting *splitting = world->splitting;
-    const bt_idx n = bodies->n;
-    const size_t most = (size_t)n + 2 * (size_t)(splitting->n - from);
-    bt_idx *source = bt_alloc(most, sizeof *source);
-    uint8_t *keep = bt_alloc(most, sizeof *keep);
-    for (bt_idx i = 0; i < n; i++) source[i] = i, keep[i] = 1;
-    for (int64_t k = from; k < splitting->n; k++) {
-        const bt_split_record *record = &splitting->split[k];
-        const bt_idx i = bodies->index_of[record->parent];
-        for (int p = 0; p < 2; p++) {
-            const bt_gid gid = splitting->first + 2 * k + p;
-            bodies->gone[gid] = 0;
-            if (i >= 0) {
-                source[bodies->n] = source[i], keep[bodies->n] = 1;
-                put_piece(world, i, record, p, bt_splitting_outline(splitting, k, p), gid);
-            }
-        }
-        if (i >= 0) keep[i] = 0;
-        bodies->index_of[record->parent] = -1;
-        bodies->gone[record->parent] = 1;
-    }
-    bt_idx kept = 0;
-    for (bt_idx i = 0; i < bodies->n; i++)
-        if (keep[i]) source[kept++] = source[i];
-    bt_bodies_compact(bodies, keep);
-    for (bt_idx i = 0; i < bodies->n; i++) bodies->index_of[bodies->gid[i]] = i;
-    bt_domain_follow(world, source);
-    free(source);
-    free(keep);
-}
-
-/// Records of pairs with parents become those of pairs with their pieces. Impulses are not handed on: points of a piece
-/// have other names.
-static bt_memory *hand_on(const bt_world *world, bt_memory *memory, int64_t *n, int64_t from)
-{
-    const bt_splitting *splitting = world->splitting;
-    const bt_bodies *bodies = &world->bodies;
-    bt_memory *out = bt_alloc(4 * (size_t)*n + 1, sizeof *out);
-    int64_t m = 0;
-    for (int64_t k = 0; k < *n; k++) {
-        const bt_memory *r = &memory[k];
-        if (!bodies->gone[r->a] && !bodies->gone[r->b]) {
-            out[m++] = *r;
-            continue;
-        }
-        if (r->law == BT_LAW_RIGID) continue;
-        bt_gid side[2][2];
-        int n_side[2];
-        for (int e = 0; e < 2; e++) {
-            const bt_gid g = e ? r->b : r->a;
-            side[e][0] = g, n_side[e] = 1;
-            for (int64_t q = from; bodies->gone[g] && q < splitting->n; q++) // few, of one step
-                if (splitting->split[q].parent == g)
-                    side[e][0] = splitting->first + 2 * q, side[e][1] = side[e][0] + 1, n_side[e] = 2;
-        }
-        for (int p = 0; p < n_side[0]; p++)
-            for (int q = 0; q < n_side[1]; q++) {
-                bt_memory piece = *r;
-                bt_gid x = side[0][p], y = side[1][q];
-                if (n_side[0] > 1) piece.part[0] = (uint16_t)bt_part_first(bodies, bt_world_index(world, x));
-                if (n_side[1] > 1) piece.part[1] = (uint16_t)bt_part_first(bodies, bt_world_index(world, y));
-                if (x > y) {
-                    const bt_gid g = x;
-                    const uint16_t part = piece.part[0];
-                    x = y, y = g;
-                    piece.part[0] = piece.part[1], piece.part[1] = part;
-                }
-                piece.a = x, piece.b = y;
-                out[m++] = piece;
-            }
-    }
-    free(memory);
-    *n = m;
-    return out;
-}
-
-/// context: the first of the new splits.
-static bt_memory *change(bt_world *world, bt_memory *memory, int64_t *n, const void *context)
-{
-    bt_bodies *bodies = &world->bodies;
-    const int64_t from = *(const int64_t *)context;
-    for (bt_idx i = 0; i < bodies->n; i++)
-        if (bodies->motion[i] == BT_DYNAMIC) bodies->vel[i] = bodies->vel_start[i];
-    put_pieces(world, from);
-    return hand_on(world, memory, n, from);
 }
 
 // --- the step --------------------------------------------------------------------------------------------------------
@@ -728,20 +533,6 @@ bool bt_splitting_step(bt_world *world, int round)
     }
     free(found.row);
     free(found.vertex);
-    if (again) bt_cells_change(world, change, &from);
+    if (again) bt_splitting_put(world, from);
     return again;
-}
-
-void bt_splitting_restore(bt_world *world) { put_pieces(world, 0); }
-
-uint64_t bt_splitting_hash(const bt_splitting *splitting)
-{
-    uint64_t h = (uint64_t)splitting->n;
-    for (int64_t k = 0; k < splitting->n; k++) h = h * UINT64_C(0x100000001b3) ^ (uint64_t)splitting->split[k].parent;
-    for (int64_t k = 0; k < 2 * splitting->n_vertices; k++) {
-        uint64_t u;
-        memcpy(&u, &splitting->vertex[k], sizeof u);
-        h = h * UINT64_C(0x100000001b3) ^ u;
-    }
-    return h;
 }

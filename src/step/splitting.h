@@ -109,6 +109,13 @@ int64_t bt_splitting_generation(const bt_splitting *splitting, bt_gid gid);
 /// The floe that was there from the start, and the way from it to gid (bt_split_scatter).
 bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t *path);
 
+/// ∫r²dA of floe i about its centroid, m⁴: of a piece, what was left for it.
+double bt_splitting_polar(const bt_world *world, bt_idx i);
+
+/// Collective. Splits from..n of the history: pieces in the place of their parents, all velocities those at the start
+/// of the step.
+void bt_splitting_put(bt_world *world, int64_t from);
+
 /// Collective. After the solve. True: floes were cut, their pieces are new bodies, all velocities are those at the
 /// start of the step, and it is to be solved again. False: nothing splits, or `round` is BT_SPLIT_ROUNDS.
 bool bt_splitting_step(bt_world *world, int round);

@@ -339,12 +339,12 @@ static void forget_contacts(bt_world *world, const uint8_t *moved)
             if (moved[pair->a] || moved[pair->b]) pair->contact = -1;
         }
         bt_idx kept = 0;
-        for (bt_idx j = 0; j < cell->laws.n_memory; j++) {
-            const bt_memory memory = cell->laws.memory[j];
+        for (bt_idx j = 0; j < cell->laws->n_memory; j++) {
+            const bt_memory memory = cell->laws->memory[j];
             if (!was_moved(world, moved, memory.a) && !was_moved(world, moved, memory.b))
-                cell->laws.memory[kept++] = memory;
+                cell->laws->memory[kept++] = memory;
         }
-        cell->laws.n_memory = kept;
+        cell->laws->n_memory = kept;
     }
 }
 

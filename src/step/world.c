@@ -33,6 +33,7 @@ void bt_world_free(bt_world *world)
 {
     if (!world) return;
     bt_bodies_free(&world->bodies);
+    bt_cells_empty(world->cells);
     bt_cells_free(world->cells);
     bt_solver_free(world->solver);
     bt_forces_free(world->forces);
@@ -109,8 +110,8 @@ uint64_t bt_world_hash(const bt_world *world)
         sum += h;
     }
     for (bt_idx k = 0; k < world->cells->n; k++)
-        for (bt_idx i = 0; world->cells->cell[k].own && i < world->cells->cell[k].laws.n_memory; i++)
-            sum += hash_memory(world, &world->cells->cell[k].laws.memory[i]);
+        for (bt_idx i = 0; world->cells->cell[k].own && i < world->cells->cell[k].laws->n_memory; i++)
+            sum += hash_memory(world, &world->cells->cell[k].laws->memory[i]);
     sum = bt_domain_sum_words(world, sum) + mix((uint64_t)world->step);
     if (world->window) sum = mix(sum ^ bt_window_hash(world));
     if (world->splitting && world->splitting->n > 0) sum = mix(sum ^ bt_splitting_hash(world->splitting));

@@ -5,6 +5,7 @@ import json
 import re
 import os
 import random
+import re
 
 import numpy as np
 import pytest
@@ -92,6 +93,24 @@ def test_floes_given_by_hand_take_their_room(tmp_path):
     said = json.loads(call("check", path, "--json").stdout)["ice"]
     about = next(said[k] for k in said if "floes" in k)
     assert abs(about - 1 - made) < 0.06 * made
+
+
+def test_lines_and_json_have_the_same_numbers(tmp_path):
+    """One row gives both (src/app/check_numbers.c). A printed number that is not in the JSON, or has another value
+    there, was written apart."""
+    path = write_case(tmp_path, changed(TOW, tow__mode="line", tow__line={"weight": 0.5}, tow__speed=0.05,
+                                        water__current_x=0.01))
+    found, text = json.loads(call("check", path, "--json").stdout), call("check", path).stdout
+    values = {x for group in found.values() if isinstance(group, dict)
+              for x in group.values() if isinstance(x, (int, float))}
+    known = {f"{x / unit:{form}}" for x in values for unit in (1, 1e6, 1e9)
+             for form in (".2g", ".3g", ".4g", ".6g", ".0f", ".3f")}
+    lines = {line[:21].strip(): line[21:] for line in text.splitlines()}
+    for label in ("domain", "ice region", "concentration", "floes", "mean floe", "body", "body mass", "tow",
+                  "line, weight", "line, start", "domain width", "current", "steps", "reference speed", "memory",
+                  "frames", "disk", "wall time"):
+        numbers = re.findall(r"(?<![\w.])-?\d+\.?\d*(?:e[+-]\d+)?(?![\w.])", lines[label])
+        assert numbers and not [x for x in numbers if x not in known], (label, lines[label])
 
 
 def both(folder, case):

@@ -109,7 +109,8 @@ def test_bodies_that_cannot_give_way(tmp_path, name):
 def test_more_work_does_not_unlock(tmp_path):
     case, _ = SCENES["a row at the wall"]
     some, more = (run(tmp_path, changed(case, solver__max_sweeps=n), name=f"n{n}") for n in (3, 50))
-    assert some.summary["locked_steps"] == more.summary["locked_steps"] > 7
+    found, again = some.series("locked"), more.series("locked")
+    assert found.sum() > 7 and np.all(again >= found), "a lock that little work has proved is there with more"
 
 
 def test_the_same_on_ranks(tmp_path):

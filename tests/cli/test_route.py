@@ -19,6 +19,7 @@ from harness import (BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, change
                      write_case)
 
 import bergtow
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, route, situation, tows, verdict
@@ -314,7 +315,7 @@ def test_what_a_call_leaves(routed):
         assert len(r["members"]) == 4 and all(t["arrived"] for t in r["members"])
         assert r["simulated"]["length"] == pytest.approx(r["predicted"]["length"], rel=0.05)
     map_ = json.loads((out / "routes.geojson").read_text())
-    assert map_["crs"]["properties"]["name"] == situation.LOCAL
+    assert map_["crs"]["properties"]["name"] == _library.limit("map_local_crs")
     kinds = [(f["properties"]["route"], f["properties"]["track"]) for f in map_["features"]]
     assert kinds[:2] == [("straight", "berg"), ("straight", "swath")]
     line = map_["features"][0]["geometry"]["coordinates"]
@@ -537,7 +538,8 @@ LAND = {"type": "Polygon", "coordinates": [[[7, -1], [9.5, -1], [9.5, 1], [7, 1]
 
 
 def local(geometry):
-    return {"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": situation.LOCAL}},
+    return {"type": "FeatureCollection",
+            "crs": {"type": "name", "properties": {"name": _library.limit("map_local_crs")}},
             "features": [{"type": "Feature", "properties": {}, "geometry": geometry}]}
 
 

@@ -9,7 +9,7 @@
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "run/setup.h"
-#include "space/cells.h"
+#include "contact/cell_contacts.h"
 #include "bergtow/world.h"
 #include "partition/domain.h"
 #include "case/case_derived.h"

@@ -71,13 +71,13 @@ static int check_marks(const bt_world *w)
     size_t n = 0, n_all;
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_cell *c = &t->cell[t->busy[j]];
-        if (t->busy[j] < t->n - 1) mine[n++] = (mark){c->x, c->y, c->work.swept, 0};
+        if (t->busy[j] < t->n - 1) mine[n++] = (mark){c->x, c->y, c->swept, 0};
     }
     mark *all = bt_domain_gather_all(w, mine, n, sizeof *mine, &n_all);
     free(mine);
     for (size_t k = 0; k < n_all; k++) {
         const bt_idx here = bt_cells_at(t, all[k].x, all[k].y);
-        if (here >= 0 && t->is_busy[here] && t->cell[here].work.swept != all[k].swept)
+        if (here >= 0 && t->is_busy[here] && t->cell[here].swept != all[k].swept)
             fail(w, "a cell is swept on one rank and not on another", all[k].x, all[k].y);
     }
     free(all);

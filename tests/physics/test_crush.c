@@ -222,7 +222,7 @@ TEST(pushed_shut)
         bt_world_step(w);
         bt_cell *t = NULL;
         const bt_idx j = contact_with_last(w, &t);
-        const bt_limit *l = &t->laws.limits[j];
+        const bt_limit *l = &t->laws->limits[j];
         assert_int_equal(t->contacts[j].n, 2);
         for (int k = 0; k < 2; k++) CHECK_CLOSE(l->flat[k], 0.5 * pressure * h * dt, 0.06 * pressure * h * dt);
         bt_world_free(w);
@@ -245,8 +245,8 @@ TEST(a_corner_out_of_sight_is_not_forgotten)
         const bt_idx floe = bt_world_index(w, 0);
         bt_cell *t = NULL;
         contact_with_last(w, &t);
-        const double deep = t->laws.memory[0].value[0];
-        assert_true(t->laws.n_memory == 1 && t->laws.memory[0].n_points == 2 && deep > 0.02);
+        const double deep = t->laws->memory[0].value[0];
+        assert_true(t->laws->n_memory == 1 && t->laws->memory[0].n_points == 2 && deep > 0.02);
         *vel(w, 0) = (bt_vel){1e-6, 0, 0, 0};
         // about the corner that remains where it is
         w->bodies.pose[floe].yaw = 0.06, w->bodies.pose[floe].x -= 0.5 * (cos(0.06) + sin(0.06)) - 0.5;
@@ -255,8 +255,8 @@ TEST(a_corner_out_of_sight_is_not_forgotten)
         bt_world_step(w);
         const bt_idx j = contact_with_last(w, &t);
         assert_int_equal(t->contacts[j].n, 1 + fast);
-        assert_true(t->laws.memory[0].n_points == 2);
-        for (int i = 0; i < 2; i++) CHECK_CLOSE(t->laws.memory[0].value[i], deep, 0.01 * deep);
+        assert_true(t->laws->memory[0].n_points == 2);
+        for (int i = 0; i < 2; i++) CHECK_CLOSE(t->laws->memory[0].value[i], deep, 0.01 * deep);
         bt_world_free(w);
     }
 }
@@ -587,11 +587,11 @@ TEST(memory)
     scene_wall(w, 0.5, -50, 5, 50, 0);
     for (int s = 0; s < 200; s++) bt_world_step(w);
     const double deep = pose(w, 0)->x;
-    assert_true(deep > 0.02 && w->cells->cell[0].laws.n_memory == 1);
+    assert_true(deep > 0.02 && w->cells->cell[0].laws->n_memory == 1);
     for (int s = 0; s < 20; s++) bt_world_step(w);
     CHECK_CLOSE(pose(w, 0)->x, deep, 0);
     const uint64_t hash = bt_world_hash(w);
-    w->cells->cell[0].laws.memory[0].value[0] *= 1 + 1e-15;
+    w->cells->cell[0].laws->memory[0].value[0] *= 1 + 1e-15;
     assert_true(bt_world_hash(w) != hash);
 
     const double away[] = {0.5, 0.95, 1.1}; // of the memory, from the face
@@ -640,9 +640,9 @@ TEST(rebound_below_the_limit)
         before = now;
     }
     assert_true(before < -1e-3 && depth > 0.01);
-    assert_true(w->cells->cell[0].laws.n_memory == 1);
+    assert_true(w->cells->cell[0].laws->n_memory == 1);
     for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_LAW_MEMORY; s++) bt_world_step(w);
-    assert_true(w->cells->cell[0].laws.n_memory == 0); // parted, forgotten
+    assert_true(w->cells->cell[0].laws->n_memory == 0); // parted, forgotten
     bt_world_free(w);
 }
 
@@ -704,7 +704,7 @@ TEST(laws_of_a_jam)
         for (bt_idx k = 0; k < w->cells->n; k++) {
             const bt_cell *t = &w->cells->cell[k];
             for (bt_idx j = 0; j < t->n_contacts; j++) {
-                const bt_limit *l = &t->laws.limits[j];
+                const bt_limit *l = &t->laws->limits[j];
                 const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
                 for (int i = 0; i < t->contacts[j].n; i++) {
                     assert_true(l->grown[i] >= 0);
@@ -733,7 +733,7 @@ TEST(parts_share_their_dent)
     scene_wall(w, v[0], -50, 5, 50, 0);
     for (int s = 0; s < 200; s++) bt_world_step(w);
     const double deep = pose(w, 0)->x;
-    bt_law_state *laws = &w->cells->cell[0].laws;
+    bt_law_state *laws = w->cells->cell[0].laws;
     assert_true(deep > 0.02 && laws->n_memory == 2);
     for (int k = 0; k < 2; k++)
         for (int i = 0; i < 2; i++) laws->memory[k].feature[i] = 1000, laws->memory[k].value[i] /= 1 + k;

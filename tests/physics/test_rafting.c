@@ -189,7 +189,7 @@ TEST(pushed_shut)
         int seen = 0;
         for (bt_idx k = 0; k < w->cells->n; k++)
             for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
-                const bt_limit *l = &w->cells->cell[k].laws.limits[j];
+                const bt_limit *l = &w->cells->cell[k].laws->limits[j];
                 if (w->cells->cell[k].contacts[j].n < 2 || isinf(l->cap[0])) continue;
                 seen++;
                 for (int e = 0; e < 2; e++)
@@ -228,7 +228,7 @@ TEST(out_behind)
     }
     assert_true(under && parted);
     bt_idx records = 0;
-    for (bt_idx k = 0; k < w->cells->n; k++) records += w->cells->cell[k].laws.n_memory;
+    for (bt_idx k = 0; k < w->cells->n; k++) records += w->cells->cell[k].laws->n_memory;
     assert_int_equal(records, 0);
     bt_world_free(w);
 }

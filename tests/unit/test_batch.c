@@ -10,7 +10,9 @@ enum { BODIES = 60, CONTACTS = 230 };
 
 /// A cell whose contacts join random bodies, some of infinite mass; most contacts are listed.
 typedef struct {
-    bt_cell cell;
+    bt_cell cell; // with these:
+    bt_law_state laws;
+    bt_work_list work;
     bt_contact contacts[CONTACTS];
     bt_gaps gaps[CONTACTS];
     bt_limit limits[CONTACTS];
@@ -64,7 +66,7 @@ static void make_sheets(bt_contact *u, uint64_t *rng)
 /// Flat bounds for all contacts; a third of them become sheets.
 static void bind(knot_of_floes *s, uint64_t *rng)
 {
-    s->cell.laws.limits = s->limits;
+    s->cell.laws->limits = s->limits;
     for (bt_idx i = 0; i < CONTACTS; i++) {
         bt_limit *l = &s->limits[i];
         *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
@@ -86,12 +88,13 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
         if (i % 7) s->inv[i] = (bt_inv){0.1 + scene_uniform(rng), 0.1 + scene_uniform(rng)};
         s->v[i] = (bt_vel){any(rng), any(rng), any(rng), 0};
     }
-    s->cell =
-        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS,
-                  .work = {.list = s->list, .cap_list = CONTACTS}};
+    s->laws = (bt_law_state){0};
+    s->work = (bt_work_list){.list = s->list, .cap_list = CONTACTS};
+    s->cell = (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS, .laws = &s->laws,
+                        .work = &s->work};
     for (bt_idx i = 0; i < CONTACTS; i++) {
         s->contacts[i] = random_contact(rng, s->inv);
-        if (scene_uniform(rng) < listed) s->list[s->cell.work.n_list++] = i;
+        if (scene_uniform(rng) < listed) s->list[s->cell.n_listed++] = i;
     }
 }
 
@@ -116,30 +119,30 @@ static void own_contacts(knot_of_floes *s)
 /// All contacts into the list.
 static void list_all(bt_cell *cell)
 {
-    for (bt_idx i = 0; i < CONTACTS; i++) cell->work.list[i] = i;
-    cell->work.n_list = CONTACTS;
+    for (bt_idx i = 0; i < CONTACTS; i++) cell->work->list[i] = i;
+    cell->n_listed = CONTACTS;
 }
 
 /// The same visit with the scalar update; returns what it turned against its move.
 static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep *o, int times, double *most)
 {
     static double y[CONTACTS][3];
-    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
+    for (bt_idx j = 0; o->moves && j < s->cell.n_listed; j++) {
         bt_contact *u = &s->contacts[order[j]];
         bt_rounds_move(o, u->ln, s->in_place[order[j]].before, y[j], 2);
         bt_rounds_move(o, &u->lt, s->in_place[order[j]].before + 2, y[j] + 2, 1);
     }
     for (int n = 0; n < times; n++) {
         double largest = 0;
-        for (bt_idx j = 0; j < s->cell.work.n_list; j++) {
-            const bt_limit *l = s->cell.laws.limits ? &s->limits[order[j]] : NULL;
+        for (bt_idx j = 0; j < s->cell.n_listed; j++) {
+            const bt_limit *l = s->cell.laws->limits ? &s->limits[order[j]] : NULL;
             const bt_mass *m = &s->in_place[order[j]].mass;
             largest = bt_max(largest, bt_update_contact(&s->contacts[order[j]], m, l, s->v, s->inv));
         }
         if (n == 0) *most = largest;
     }
     double against = 0;
-    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
+    for (bt_idx j = 0; o->moves && j < s->cell.n_listed; j++) {
         const bt_contact *u = &s->contacts[order[j]];
         const bt_mass *m = &s->in_place[order[j]].mass;
         const double *x = s->in_place[order[j]].before;
@@ -152,8 +155,8 @@ static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep
 /// The contacts of the list in the order in which they are swept, [n_list]; of a cell that has been swept.
 static void swept_order(const bt_cell *cell, bt_idx *contact)
 {
-    for (bt_idx k = 0; k < cell->work.n_batches; k++)
-        for (int l = 0; l < cell->work.batch[k].n; l++) *contact++ = cell->work.batch[k].contact[l];
+    for (bt_idx k = 0; k < cell->work->n_batches; k++)
+        for (int l = 0; l < cell->work->batch[k].n; l++) *contact++ = cell->work->batch[k].contact[l];
 }
 
 /// The residual pass four at a time against one by one, bit for bit; the sum of squares of a packed cell but for
@@ -162,14 +165,14 @@ static void check_residual(knot_of_floes *four, knot_of_floes *one)
 {
     const bt_problem p = {.tolerance = 1e-3};
     bt_idx list[CONTACTS], n = 0;
-    const bt_idx n_list = four->cell.work.n_list;
+    const bt_idx n_list = four->cell.n_listed;
     memcpy(list, four->list, sizeof list);
-    const bool packed = four->cell.work.packed;
+    const bool packed = four->cell.work->packed;
     const bt_found f = bt_batch_residual(&four->cell, four->v, four->inv, &p);
     bt_found e = {0};
     for (bt_idx i = 0; i < CONTACTS; i++) {
         const bt_contact *u = &one->contacts[i];
-        const bt_limit *k = one->cell.laws.limits ? &one->limits[i] : NULL;
+        const bt_limit *k = one->cell.laws->limits ? &one->limits[i] : NULL;
         const bt_mass *m = &one->in_place[i].mass;
         const double r = bt_contact_residual(u, m, k, one->v, p.tolerance, &e.squares), *x = one->in_place[i].before;
         e.most = bt_max(e.most, r);
@@ -179,15 +182,15 @@ static void check_residual(knot_of_floes *four, knot_of_floes *one)
         if (u->n == 0) on = on || r > 0;
         for (int c = 0; c < u->n; c++)
             on = on || !(bt_normal_velocity(u, c, &one->v[u->a], &one->v[u->b]) + u->bias[c] >= 0);
-        if (on) assert_true(n < four->cell.work.n_list && four->list[n] == i), n++;
+        if (on) assert_true(n < four->cell.n_listed && four->list[n] == i), n++;
     }
-    assert_int_equal(n, four->cell.work.n_list);
+    assert_int_equal(n, four->cell.n_listed);
     assert_true(f.most == e.most && f.rows == e.rows && f.bad == e.bad);
     CHECK_CLOSE(f.squares, e.squares, packed ? 1e-13 * e.squares : 0);
     const bool same = n == n_list && memcmp(list, four->list, (size_t)n * sizeof *list) == 0;
-    assert_true(four->cell.work.packed == (packed && same)); // batches of the same contacts stay
+    assert_true(four->cell.work->packed == (packed && same)); // batches of the same contacts stay
     memcpy(four->list, list, sizeof list);
-    four->cell.work.n_list = n_list;
+    four->cell.n_listed = n_list;
 }
 
 /// Totals of a sweep that adds up what it turned against its moves in units of 1 J.
@@ -210,22 +213,22 @@ TEST(batches_do_what_single_updates_do)
         const int times = 1 + k % 3;
         // A list, and then another, in which contacts that were in the first move on.
         for (int round = 0; round < 2; round++) {
-            if (round > 0) list_all(&four.cell), one.cell.work.n_list = CONTACTS;
+            if (round > 0) list_all(&four.cell), one.cell.n_listed = CONTACTS;
             const double beta = k % 4 == 1 ? 0.7 : 0;
             const bt_sweep o = {.problem = &never_calm, .moves = k % 2, .beta = beta, .lead = {beta}};
             bt_totals totals = no_totals();
             double most_of_one = 0;
             bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, &totals);
-            assert_true(four.cell.work.packed);
-            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), times * four.cell.work.n_list, 0);
-            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_MOVED]), o.moves && beta > 0 ? four.cell.work.n_list : 0, 0);
+            assert_true(four.cell.work->packed);
+            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), times * four.cell.n_listed, 0);
+            CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_MOVED]), o.moves && beta > 0 ? four.cell.n_listed : 0, 0);
             swept_order(&four.cell, order);
             const double most = totals.most, against = bt_sum_value(&totals.sum[BT_SWEEP_AGAINST]);
             CHECK_CLOSE(scalar_visit(&one, order, &o, times, &most_of_one), against, 1e-11 * (1 + fabs(against)));
             if (k % 7 < 3) check_residual(&four, &one);
             bt_batch_unpack(&four.cell);
-            assert_false(four.cell.work.packed);
-            assert_int_equal(four.cell.work.n_last, four.cell.work.n_list);
+            assert_false(four.cell.work->packed);
+            assert_int_equal(four.cell.work->n_last, four.cell.n_listed);
             CHECK_CLOSE(most, most_of_one, 0);
             for (int i = 0; i < BODIES; i++) {
                 assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
@@ -257,15 +260,15 @@ TEST(each_listed_contact_is_in_one_batch)
     bt_totals totals = no_totals();
     bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){.problem = &never_calm}, 1, &totals);
     swept_order(&s.cell, order);
-    for (bt_idx j = 0; j < s.cell.work.n_list; j++) {
+    for (bt_idx j = 0; j < s.cell.n_listed; j++) {
         assert_false(seen[order[j]]);
         seen[order[j]] = true;
     }
-    assert_true(BT_LANES * s.cell.work.n_batches < 1.15 * s.cell.work.n_list);
+    assert_true(BT_LANES * s.cell.work->n_batches < 1.15 * s.cell.n_listed);
     // A visit ends when a pass has changed nothing that matters.
     totals = no_totals();
     bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){.problem = &always_calm}, 5, &totals);
-    CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), s.cell.work.n_list, 0);
+    CHECK_CLOSE(bt_sum_value(&totals.sum[BT_SWEEP_UPDATES]), s.cell.n_listed, 0);
     free(s.cell.contacts);
 }
 
@@ -293,8 +296,8 @@ TEST(a_batch_that_has_rested_catches_up_with_the_moves)
     one = s;
     own_contacts(&s);
     assert_true(sweep_once(&s, (double[2]){0}, &always_calm) == CONTACTS);
-    const bt_batch *batch = s.cell.work.batch;
-    for (bt_idx k = 0; k < s.cell.work.n_batches; k++)
+    const bt_batch *batch = s.cell.work->batch;
+    for (bt_idx k = 0; k < s.cell.work->n_batches; k++)
         for (int l = 0; l < batch[k].n; l++)
             for (int c = 0; c < 3; c++)
                 x0[batch[k].contact[l]][c] = batch[k].before[c][l], x1[batch[k].contact[l]][c] = batch[k].x[c][l];
@@ -313,7 +316,7 @@ TEST(a_batch_that_has_rested_catches_up_with_the_moves)
     double most;
     scalar_visit(&one, order, &(bt_sweep){0}, 1, &most);
     assert_true(sweep_once(&s, (double[2]){0.7, 0.5}, &always_calm) == CONTACTS);
-    for (bt_idx k = 0; k < s.cell.work.n_batches; k++)
+    for (bt_idx k = 0; k < s.cell.work->n_batches; k++)
         for (int l = 0; l < batch[k].n; l++) {
             const bt_idx i = batch[k].contact[l];
             const bt_contact *u = &one.contacts[i];

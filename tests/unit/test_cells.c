@@ -150,7 +150,7 @@ static void check_busy(const bt_cells *t)
         }
         assert_true(k < t->n - 1 && t->asleep[k] == BT_ASLEEP && !t->awake[k] && t->bound[k] == 0 && t->speed[k] == 0);
         assert_true(!t->cell[k].active && !t->cell[k].search.pairs && t->cell[k].n_contacts == 0 &&
-                    t->cell[k].overlap == 0 && !t->cell[k].work.swept);
+                    t->cell[k].overlap == 0 && !t->cell[k].swept);
     }
     assert_int_equal(n, t->n_busy);
 }
@@ -358,12 +358,12 @@ TEST(work_is_counted_cell_by_cell)
     for (int k = 0; k < 4; k++) {
         bt_world_step(w);
         int64_t work = 0;
-        for (bt_idx c = 0; c < w->cells->n; c++) work += w->cells->cell[c].work.updates;
+        for (bt_idx c = 0; c < w->cells->n; c++) work += w->cells->cell[c].updates;
         assert_int_equal(work - before, w->stats.contact_updates);
         before = work;
     }
-    assert_true(w->cells->cell[w->cells->n - 1].work.updates > 0);
-    assert_true(before > w->cells->cell[w->cells->n - 1].work.updates);
+    assert_true(w->cells->cell[w->cells->n - 1].updates > 0);
+    assert_true(before > w->cells->cell[w->cells->n - 1].updates);
     bt_world_free(w);
 }
 

@@ -235,7 +235,7 @@ TEST(shares_follow_the_lists)
         bt_world *w = fill(&(scene){90, 90, false, false, -1, 0}, &rng);
         bt_cells *t = w->cells;
         for (bt_idx i = 0; i < t->n_order; i++)
-            t->cell[t->order[i]].work.n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
+            t->cell[t->order[i]].n_listed = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
         bt_phases_distribute(w);
         assert_int_equal(t->n_shares, threads);
         for (int p = 0; p < 2 * BT_COLOURS; p++) {
@@ -249,19 +249,19 @@ TEST(shares_follow_the_lists)
                 int64_t contacts = 0;
                 for (bt_idx i = share->begin; i < share->end; i++) {
                     const bt_cell *cell = &t->cell[t->order[i]];
-                    const bt_idx n = listed ? cell->work.n_list : cell->n_contacts;
+                    const bt_idx n = listed ? cell->n_listed : cell->n_contacts;
                     assert_true(!listed || n > 0);
                     contacts += n;
                     largest = n > largest ? n : largest;
                 }
                 least = contacts < least ? contacts : least, most = contacts > most ? contacts : most;
             }
-            for (; listed && at < t->start[p / 2 + 1]; at++) assert_int_equal(t->cell[t->order[at]].work.n_list, 0);
+            for (; listed && at < t->start[p / 2 + 1]; at++) assert_int_equal(t->cell[t->order[at]].n_listed, 0);
             assert_int_equal(at, t->start[p / 2 + 1]);
             assert_true((double)(most - least) <= 2 * (double)largest + 0.05 * (double)most);
         }
         assert_sound(w, -1);
-        for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].work.n_list = 0;
+        for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].n_listed = 0;
         bt_phases_distribute(w);
         assert_sound(w, -1);
         bt_world_free(w);

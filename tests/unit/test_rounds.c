@@ -27,7 +27,7 @@ static void residual_of(bt_world *w, bt_idx k, const void *context, bt_totals *t
     (void)context, (void)t;
     bt_cell *cell = &w->cells->cell[k];
     bt_rounds_list(cell);
-    cell->work.list[cell->work.n_list++] = 0;
+    cell->work->list[cell->n_listed++] = 0;
     made_up.looks++;
     bt_rounds_found(cell, &(bt_found){.most = made_up.residual[made_up.at], .bad = 1});
 }
@@ -68,9 +68,10 @@ static double run_rounds(const double *residual, int length, double limit)
         bt_world_add(w, &d);
     }
     detect_all(w, 0.1);
+    bt_rounds_begin(w);
     assert_int_equal(w->cells->n_order, 1);
     assert_int_equal(w->cells->n_contacts, 1);
-    w->cells->cell[w->cells->order[0]].work.swept = true;
+    w->cells->cell[w->cells->order[0]].swept = true;
     const bt_problem p = {.residual = residual_of, .sweep = sweep, .keep = keep, .vel = w->bodies.vel,
                           .tolerance = 1, .cap = 0.9, .length = length, .limit = limit};
     bt_work work = {.residual = INFINITY};
@@ -163,7 +164,7 @@ static void list_in_turn(bt_world *w, bt_idx k, const void *context, bt_totals *
     (void)context, (void)t;
     bt_cell *cell = &w->cells->cell[k];
     bt_rounds_list(cell);
-    if (apart.passes[which(w, k)]++ >= which(w, k)) cell->work.list[cell->work.n_list++] = 0;
+    if (apart.passes[which(w, k)]++ >= which(w, k)) cell->work->list[cell->n_listed++] = 0;
     bt_rounds_found(cell, &(bt_found){.most = 9, .bad = 1});
 }
 
@@ -173,7 +174,7 @@ static void speed_up(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     const bt_cell *cell = &w->cells->cell[k];
     const int c = which(w, k), n = apart.sweeps[c];
     t->most = 1e3;
-    if (cell->work.n_list == 0) return;
+    if (cell->n_listed == 0) return;
     const bt_cell *moved = c ? &w->cells->cell[cell->right] : cell;
     if (n < SEEN) apart.speed[c][n] = w->bodies.vel[moved->first].x, apart.sweeps[c]++;
     w->bodies.vel[moved->first].x += 1;
@@ -193,6 +194,7 @@ TEST(what_is_new_in_the_lists_has_no_momentum)
         bt_world_add(w, &d);
     }
     detect_all(w, 0.1);
+    bt_rounds_begin(w);
     assert_int_equal(w->cells->n_order, 2);
     for (bt_idx i = 0; i < 4; i++) w->bodies.vel[i].x = 7;
     const bt_problem p = {.residual = list_in_turn, .sweep = speed_up, .vel = w->bodies.vel, .tolerance = 1, .cap = 0.9,
@@ -232,7 +234,7 @@ static void look(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     (void)context, (void)t;
     looks[w->cells->cell[k].x > 2]++;
     bt_rounds_list(&w->cells->cell[k]);
-    if (w->cells->cell[k].x <= 2) w->cells->cell[k].work.list[w->cells->cell[k].work.n_list++] = 0;
+    if (w->cells->cell[k].x <= 2) w->cells->cell[k].work->list[w->cells->cell[k].n_listed++] = 0;
     bt_rounds_found(&w->cells->cell[k], &(bt_found){.most = 2, .rows = 1});
 }
 
@@ -249,6 +251,7 @@ TEST(a_residual_is_taken_where_something_moved)
         bt_world_add(w, &d);
     }
     detect_all(w, 0.1);
+    bt_rounds_begin(w);
     const bt_problem p = {.residual = look, .settle = nothing, .vel = w->bodies.vel, .tolerance = 1, .per_square = 1};
     bt_work work = {0};
     const bt_since since[4] = {BT_BEGINS, BT_SWEPT, BT_SETTLES, BT_SWEPT};

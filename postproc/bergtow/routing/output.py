@@ -4,8 +4,7 @@ import json
 import os
 from xml.sax.saxutils import escape, quoteattr
 
-from bergtow import writing
-from bergtow.routing.situation import LOCAL
+from bergtow import _library, writing
 
 import numpy as np
 
@@ -35,7 +34,8 @@ def features(candidates, place, numbers):
 
 def geojson(candidates, place, numbers, path, force):
     """Metres east and north of x = y = 0, by their own crs, where the case has no place. Errors: RunError."""
-    crs = {} if place.origin else {"crs": {"type": "name", "properties": {"name": LOCAL}}}
+    local = {"type": "name", "properties": {"name": _library.limit("map_local_crs")}}
+    crs = {} if place.origin else {"crs": local}
     found = {"type": "FeatureCollection", **crs, "made_by": writing.MARK,
              "features": features(candidates, place, numbers)}
     writing.write_text(json.dumps(writing.plain(found), allow_nan=False) + "\n", path, force)

@@ -23,7 +23,6 @@ import numpy as np
 
 FIXED = 2  # bt_simulation: a body at rest for ever
 GRAVITY = 9.81  # m/s2
-LOCAL = "urn:x-bergtow:crs:local-metres-east-north"
 #: keys of the tow that a route says itself
 OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
@@ -135,13 +134,14 @@ def no_go_file(path, place):
         why = error if type(error) in (ValueError, json.JSONDecodeError) else "it is built otherwise"
         raise RunError(path, f"is no GeoJSON of polygons ({why})", "write Polygon or MultiPolygon features, in "
                        "degrees", CASE) from None
-    if crs not in ("", LOCAL) and not crs.upper().endswith("CRS84"):
+    local = _library.limit("map_local_crs")
+    if crs not in ("", local) and not crs.upper().endswith("CRS84"):
         raise RunError(path, f"its coordinates are {crs}", f"convert it with ogr2ogr -t_srs EPSG:4326, or give metres "
-                       f"east and north of x = y = 0 the crs {LOCAL}", CASE)
-    if crs != LOCAL and place.origin is None:
+                       f"east and north of x = y = 0 the crs {local}", CASE)
+    if crs != local and place.origin is None:
         raise RunError(path, "is in degrees, and the map of this case has no place", "set ice.origin_lon and "
-                       f"ice.origin_lat, or give the file metres and the crs {LOCAL}", CASE)
-    return [place.map(ring) if crs == LOCAL else place.metres(ring) for ring in rings]
+                       f"ice.origin_lat, or give the file metres and the crs {local}", CASE)
+    return [place.map(ring) if crs == local else place.metres(ring) for ring in rings]
 
 
 # ---- the case
