@@ -120,6 +120,7 @@ _SIGNATURES = {
     "bt_case_check_text": (Status, POINTER(Options), POINTER(c_void_p), POINTER(c_void_p)),
     "bt_case_unused": (c_void_p, c_char_p),
     "bt_file_holds": (c_char_p, c_char_p),
+    "bt_ensemble_state": (c_int, c_char_p, POINTER(c_int), POINTER(c_void_p), POINTER(c_void_p)),
     "bt_folder_lock": (Status, c_char_p, POINTER(c_int)),
     "bt_seal_check": (Status, c_char_p, c_char_p),
     "bt_record_keep": (Status, c_char_p, c_char_p, c_char_p, c_size_t),

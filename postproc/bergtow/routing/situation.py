@@ -17,7 +17,7 @@ from bergtow.errors import CASE, USAGE, Refused, RunError
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
-from bergtow.study.runs import errors_in, is_file
+from bergtow.study.runs import errors_in
 
 import numpy as np
 
@@ -184,6 +184,15 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
     text = f"# {path.name} without the way of the tow, which each route says; {writing.MARK}\n"
     writing.write_text(text + json.dumps(merged, indent=1, ensure_ascii=False) + "\n", out, force)
     return out, ramp
+
+
+def is_file(folder, text):
+    """Is this text of a case the name of a file: of a table, of outlines, of a field? Whatever the key, so that none is
+    forgotten; a title that is one by chance does no harm."""
+    try:
+        return (folder / text).is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _drop(section, names):
