@@ -330,8 +330,8 @@ def estimate(runs, s, some, n):
     """Seconds by the estimate of `bergtow check`: of the first candidate's tow that keeps frames, of one that does not,
     and of wall time of the n tows of every candidate."""
     keys = situation.reading(s.values, s.field) | some[0].keys
-    replay, plain = (json.loads(checked(runs.program, s.case, [f"{k}={v}" for k, v in (keys | runs.own(
-        i, keys)).items()], "--json"))["cost"]["core_time_s"] for i in (0, 1))
+    replay, plain = (json.loads(checked(runs.program, s.case, runs.sets(i, keys), "--json"))["cost"]["core_time_s"]
+                     for i in (0, 1))
     ways = sum(c.seconds for c in some) / some[0].seconds
     return replay, plain, ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
 

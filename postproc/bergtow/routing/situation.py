@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bergtow import _library, writing
-from bergtow._calls import Calls
+from bergtow._calls import called
 from bergtow.case import Case
 from bergtow.errors import CASE, USAGE, Refused, RunError
 from bergtow.routing import planner
@@ -257,7 +257,7 @@ def field(program, case, folder):
     """FOLDER/ice.h5, the floes of a case. Errors: RunError in the program's words."""
     folder.mkdir(parents=True, exist_ok=True)
     out = folder / "ice.h5"
-    code, said = Calls().run([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL)
+    code, said = called([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL)
     if code:
         raise Refused(case, "\n".join(errors_in(said)) or "the field is refused", code)
     return out

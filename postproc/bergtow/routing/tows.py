@@ -178,6 +178,10 @@ class Tows(CaseRuns):
         frames = -1.0 if i else float(values["run.duration"].split()[0]) / FRAMES
         return {k: v for k, v in (member | {"output.frame_interval": f"{frames:.10g} s"}).items() if k not in values}
 
+    def sets(self, i, values):
+        """What replaces values of the case in the tow of a member, as texts of --set."""
+        return [f"{k}={v}" for k, v in (values | self.own(i, values)).items()]
+
     def study(self, n, values):
         return {"set": values, "variants": {f"m{i + 1:03d}": self.own(i, values) for i in range(n)}}
 

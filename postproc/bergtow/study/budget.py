@@ -132,7 +132,7 @@ def of_ensemble(e, of=OF[0], computed=None):
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study",
                        CASE)
-    if "fields: common" in e.study:
+    if "fields: common" in e.study or "fields: numbered" in e.study:
         raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own",
                        CASE)
     meaning, done, values = numbers(e, of)

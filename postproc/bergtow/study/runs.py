@@ -23,7 +23,7 @@ from functools import cached_property
 from pathlib import Path
 
 from bergtow import _library
-from bergtow._calls import Calls
+from bergtow._calls import called
 from bergtow.errors import CASE, USAGE, Refused, RunError
 from bergtow.result import integrity
 from bergtow.result.run import Run
@@ -260,7 +260,7 @@ def ensemble_made(folder):
 def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(), line=None, **options):
     """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
     long as it takes): whether all have settled, finished or failed, and the messages of the program. more: words of the
-    call; line and options: as of Calls.run. Errors: RunError where the program refuses the study; a member that fails
+    call; line and options: as of called(). Errors: RunError where the program refuses the study; a member that fails
     is none, and the others are gathered as ever."""
     call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs), *more]
     call += [part for text in sets for part in ("--set", text)]
@@ -268,7 +268,7 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
     if np.isfinite(limit):
         call += ["--max-wall", str(limit)]
     before, began = ensemble_made(folder), time.monotonic()
-    code, said = Calls().run(call + ["--quiet"] * quiet, line, env=os.environ | ONE_THREAD, **options)
+    code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | ONE_THREAD, **options)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
     return not stopped_by_limit(code, time.monotonic() - began, limit), said
