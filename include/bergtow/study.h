@@ -33,8 +33,8 @@
 // with scale log, of the logarithm. The source stands in ensemble.h5 and in the reports.
 //
 // A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows
-// from (seed, condition, repeat) alone (with common and numbered fields from (seed, repeat)), so more repeats may be asked for later
-// without changing a member.
+// from (seed, condition, repeat) alone (with common and numbered fields from (seed, repeat)), so more repeats may be
+// asked for later without changing a member.
 #ifndef BERGTOW_STUDY_H
 #define BERGTOW_STUDY_H
 

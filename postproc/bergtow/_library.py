@@ -123,7 +123,6 @@ _SIGNATURES = {
     "bt_ensemble_state": (c_int, c_char_p, POINTER(c_int), POINTER(c_void_p), POINTER(c_void_p)),
     "bt_folder_lock": (Status, c_char_p, POINTER(c_int)),
     "bt_seal_check": (Status, c_char_p, c_char_p),
-    "bt_record_keep": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
     "bt_stats_mean": (Mean, POINTER(c_double), c_int64),

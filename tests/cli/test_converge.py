@@ -302,7 +302,8 @@ def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change)
 
 def test_a_value_of_the_call_wins_over_one_of_the_user(tmp_path):
     """And what YAML takes for nothing or for a number is the text that the program reads."""
-    runs = runs_of(tmp_path, changed(SHORT, run__title="a"), ["tow.ramp = 0.5 s", "run.title=none", "ice.shape=rectangles"])
+    runs = runs_of(tmp_path, changed(SHORT, run__title="a"),
+                   ["tow.ramp = 0.5 s", "run.title=none", "ice.shape=rectangles"])
     assert runs.make("case", [0], {"tow.ramp": 0.25}) == [None]
     with Run(runs.path("case", 0)) as there:
         assert there.value("tow.ramp") == 0.25 and there.case["ice.shape"] == "rectangles"

@@ -162,8 +162,8 @@ class CaseRuns:
         # failed ones are tried once in each call
         more = ["--retry-failed"] if FAILED in before[len(self._ends.get(name, ())):] else []
         try:
-            _, said = run_members(self.program, study, self.home(name), [], self.jobs, self.last - began, not line, more,
-                                  line, pass_fds=[self.lock] if self.lock >= 0 else [])
+            _, said = run_members(self.program, study, self.home(name), [], self.jobs, self.last - began, not line,
+                                  more, line, pass_fds=[self.lock] if self.lock >= 0 else [])
         except Refused as error:
             code = code_of(error.reason)
             if code == "other_study":
@@ -212,8 +212,8 @@ class CaseRuns:
         """Errors: RunError where there is ice that no seed changes, whose scatter is none and decides nothing. Fields
         without floes are alike, and pass."""
         if json.loads((self.path(name, 0) / "summary.json").read_text())["n_floes"]:
-            raise RunError(self.case, "the ice is read or given floe by floe, and no seed changes it", "let the program "
-                           "make the ice, by removing ice.outlines, ice.field or floes", CASE)
+            raise RunError(self.case, "the ice is read or given floe by floe, and no seed changes it", "let the "
+                           "program make the ice, by removing ice.outlines, ice.field or floes", CASE)
 
     def code_of_failure(self):
         """Exit code of the first run that failed."""
