@@ -50,7 +50,8 @@ void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(p
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
 /// Append a message. Errors: returns the status that it is given.
 bt_status bt_fail(bt_errors *err, bt_status status, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
-/// The code of the last message. Code of errors: no_solution, of guard.no_solution (src/run/guard.h).
+/// The code of the last message. Codes of errors: no_solution, of guard.no_solution (src/run/guard.h); other_study, the
+/// folder of an ensemble holds another one; one_field, no seed changes the ice of a study with several fields.
 void bt_errors_code(bt_errors *err, const char *code);
 /// Print every message on stderr, one a line, prefixed "bergtow: ", with its code in brackets behind it.
 void bt_errors_print(const bt_errors *err);

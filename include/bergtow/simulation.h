@@ -190,12 +190,8 @@ char *bt_list_json(const char *what);
 /// BT_ERR_CASE, it is damaged, or no such file of this version; BT_ERR_IO; BT_ERR_USAGE, another kind.
 bt_status bt_seal_check(const char *path, const char *kind);
 
-/// The record of a run that has just ended in a folder: what its files are. name, and n bytes of what it was made by:
-/// whose it is. Errors: BT_ERR_IO, also where the files are not what a whole run leaves.
-bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n);
-
-/// Are the files of the folder those of its record, and is that of this name and bytes? Errors: BT_ERR_CASE, they are
-/// missing or changed; BT_ERR_IO.
+/// Are the files of a member's folder those of its record, and is that of this name and of the study in these n bytes
+/// of study.resolved.yml? Errors: BT_ERR_CASE, they are missing or changed; BT_ERR_IO.
 bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n);
 
 /// One process at a time in a folder of many runs: the lock DIR/lock holds until the descriptor *lock is closed, here

@@ -18,7 +18,8 @@
 //     samples: 100                         # conditions of the Latin hypercube
 //     repeats: 20                          # fields of each condition
 //     seed: 1
-//     fields: own                          # of each condition; common: the same seeds, and so the same ice, in all
+//     fields: own                          # of each condition; common: the same seeds, and so the same ice, in all;
+//                                          # numbered: the same, and the seeds are seed, seed + 1, ...
 //     ranks: 1                             # MPI ranks that work on one member
 //
 // A key is decided once: not under two of parameters, variants and with, and under `with` for values of one parameter
@@ -32,8 +33,8 @@
 // with scale log, of the logarithm. The source stands in ensemble.h5 and in the reports.
 //
 // A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows
-// from (seed, condition, repeat) alone (with common fields from (seed, repeat)), so more repeats may be asked for later
-// without changing a member.
+// from (seed, condition, repeat) alone (with common and numbered fields from (seed, repeat)), so more repeats may be
+// asked for later without changing a member.
 #ifndef BERGTOW_STUDY_H
 #define BERGTOW_STUDY_H
 
@@ -44,6 +45,8 @@ extern "C" {
 #endif
 
 typedef enum { BT_SAMPLING_GRID, BT_SAMPLING_LATIN_HYPERCUBE } bt_sampling;
+/// Seeds of the fields: from seed, condition and repeat; from seed and repeat; seed + repeat.
+typedef enum { BT_FIELDS_OWN, BT_FIELDS_COMMON, BT_FIELDS_NUMBERED } bt_study_fields;
 typedef enum { BT_UNIFORM, BT_TRIANGULAR, BT_NORMAL } bt_distribution;
 
 enum { BT_MAX_PARAMETERS = 32, BT_MAX_MEMBERS = 100000 };
@@ -86,7 +89,7 @@ typedef struct bt_study {
     bt_study_variant *with; ///< [n_with] name: "key=value" of a parameter
     int n_with;
     bt_sampling sampling;
-    bool common_fields;  ///< repeat r has the same seed in every condition
+    bt_study_fields fields;
     int64_t samples, repeats, seed, ranks;
     int64_t n_conditions;
 } bt_study;

@@ -309,7 +309,7 @@ static void print_study(const bt_study *study, const numbers *sums, const bt_err
     printf("members              %" PRId64 " condition%s x %" PRId64 " field%s = %" PRId64 "%s%s", study->n_conditions,
            bt_plural(study->n_conditions), study->repeats, bt_plural(study->repeats), bt_study_n_members(study),
            study->sampling == BT_SAMPLING_LATIN_HYPERCUBE
-           ? ", a Latin hypercube" : "", study->common_fields ? ", the same fields in all conditions" : "");
+           ? ", a Latin hypercube" : "", study->fields != BT_FIELDS_OWN ? ", the same fields in all conditions" : "");
     if (study->ranks > 1) printf(", %" PRId64 " ranks each", study->ranks);
     printf("\n");
     if (fixed)

@@ -4,7 +4,7 @@
 #include "case/schema.h"
 
 static const char *const samplings[] = {"grid", "latin-hypercube", NULL};
-static const char *const fields[] = {"own", "common", NULL};
+static const char *const fields[] = {"own", "common", "numbered", NULL};
 
 #define ROW(key, kind, preset_, doc_) {.name = key, .type = BT_KEY_##kind, .preset = preset_, .doc = doc_}
 #define WHOLE(key, preset_, range_, doc_) \
@@ -32,7 +32,8 @@ const bt_key bt_study_keys[] = {
     WHOLE("repeats", "1", "[1, 100000]", "fields of each condition; 1 where no ice depends on the seed, as it is read"),
     WHOLE("seed", "1", "[0, 9.2e18]", "from it follow the seeds of the fields, and the Latin hypercube"),
     CHOICE("fields", fields, "own",
-           "fields of each condition: its own, or the same in all, made once, to compare conditions on the same ice"),
+           "fields of each condition: its own, or the same in all, made once, to compare conditions on the same ice; "
+           "numbered: the same, and field r has the seed `seed` + r - 1, as with --set ice.seed of a run"),
     WHOLE("ranks", "1", "[1, 1048576]", "MPI ranks that work on one member"),
 };
 const int bt_n_study_keys = sizeof bt_study_keys / sizeof *bt_study_keys;

@@ -260,8 +260,8 @@ static void forget_failures(const bt_ensemble *ensemble)
 }
 
 /// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or
-/// die. reported: that has been said.
-static bool wait_for_others(bt_ensemble *ensemble, bool reported)
+/// die. looks: how many there were before; the first are close together, for a short member ends soon.
+static bool wait_for_others(bt_ensemble *ensemble, int looks)
 {
     int64_t n = 0;
     for (int64_t i = 0; ensemble->world->rank == 0 && i < ensemble->n; i++) {
@@ -270,11 +270,11 @@ static bool wait_for_others(bt_ensemble *ensemble, bool reported)
     }
     bt_comm_bcast(ensemble->world, &n, sizeof n);
     if (n == 0) return false;
-    if (!reported && !ensemble->o->quiet && ensemble->jobs == 1 && ensemble->world->rank == 0) {
+    if (looks == 0 && !ensemble->o->quiet && ensemble->jobs == 1 && ensemble->world->rank == 0) {
         printf("waiting for %" PRId64 " member%s at work in other processes (--no-wait does not)\n", n, bt_plural(n));
         fflush(stdout);
     }
-    nanosleep(&(struct timespec){.tv_nsec = 500000000}, NULL);
+    nanosleep(&(struct timespec){.tv_nsec = looks < 50 ? 10000000 : 500000000}, NULL);
     return true;
 }
 
@@ -382,12 +382,13 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     bt_halt_catch(on_signal, NULL, before);
     const bool helped = ensemble.jobs > 1;
     if (helped) options->helpers->start(options->helpers->of, ensemble.jobs - 1, ensemble.threads);
-    bool others = false;
+    bool others;
+    int looks = 0;
     do {
         if (!idle) status = work(&ensemble);
         bt_comm_rest(comm);
         status = bt_comm_agree(comm, status);
-        others = status == BT_OK && !options->leave && options->max_steps == 0 && wait_for_others(&ensemble, others);
+        others = status == BT_OK && !options->leave && options->max_steps == 0 && wait_for_others(&ensemble, looks++);
     } while (others);
     if (helped) options->helpers->end(options->helpers->of, status == BT_ERR_SIGNAL);
     bt_halt_let_go(before);

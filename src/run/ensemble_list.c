@@ -91,11 +91,13 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
     size_t size;
     *old = access(path, F_OK) == 0;
     bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
-    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text))
+    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text)) {
         status = bt_fail(err, BT_ERR_CASE,
                          "%s: holds the members of another study (see %s): only `repeats` may change; give another "
                          "folder with -o, or restore the study and its base case",
                          dir, path);
+        bt_errors_code(err, "other_study");
+    }
     const char *kept = *old ? before : text;
     if (status == BT_OK) bt_checksum_digest_text(kept, strlen(kept), digest);
     free(before);

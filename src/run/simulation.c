@@ -538,27 +538,12 @@ bt_status bt_seal_check(const char *path, const char *kind)
     return reported(BT_ERR_USAGE, &err);
 }
 
-/// The records of one member.
-static bt_member_records one_record(uint64_t *seen, const void *made_by, size_t n)
-{
-    bt_member_records records = {.n = 1, .seen = seen};
-    bt_checksum_digest_text(made_by, n, records.study);
-    return records;
-}
-
-bt_status bt_record_keep(const char *folder, const char *name, const void *made_by, size_t n)
-{
-    uint64_t seen = 0;
-    bt_errors err = {0};
-    bt_member_records records = one_record(&seen, made_by, n);
-    return reported(bt_member_record_write(&records, 0, name, folder, &err), &err);
-}
-
 bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n)
 {
     uint64_t seen = 0;
     bt_errors err = {0};
-    bt_member_records records = one_record(&seen, made_by, n);
+    bt_member_records records = {.n = 1, .seen = &seen};
+    bt_checksum_digest_text(made_by, n, records.study);
     return reported(bt_member_record_check(&records, 0, name, folder, &err), &err);
 }
 

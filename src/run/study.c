@@ -66,9 +66,10 @@ void bt_study_member(const bt_study *study, int64_t m, bt_member *out)
 {
     *out = (bt_member){.condition = m / study->repeats, .repeat = m % study->repeats};
     snprintf(out->name, sizeof out->name, "c%03" PRId64 "-r%03" PRId64, out->condition + 1, out->repeat + 1);
-    const int64_t condition = study->common_fields ? 0 : out->condition;
+    const int64_t condition = study->fields == BT_FIELDS_OWN ? out->condition : 0;
     bt_rng rng = bt_rng_start(study->seed, BT_RNG_MEMBER, condition * ((int64_t)1 << 32) + out->repeat);
-    out->seed = (int64_t)(bt_rng_bits(&rng) >> 2); // below 4.7e18
+    out->seed = study->fields == BT_FIELDS_NUMBERED ? study->seed + out->repeat
+                                                    : (int64_t)(bt_rng_bits(&rng) >> 2); // below 4.7e18
     int most = study->n_set + study->n_parameters + 1;
     for (int i = 0; i < study->n_variants; i++) most += study->variant[i].n_set;
     for (int i = 0; i < study->n_with; i++) most += study->with[i].n_set;
@@ -158,6 +159,12 @@ bool bt_study_resolved_alike(const char *a, const char *b)
     return true;
 }
 
+/// A choice of a study, as it is written.
+static const char *word(const char *key, unsigned choice)
+{
+    return bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, key)].choices[choice];
+}
+
 char *bt_study_resolved(const bt_study *study, bt_errors *err)
 {
     bt_case input;
@@ -170,9 +177,9 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err)
     FILE *out = text.out;
     fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another "
                  "study.\n");
-    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", study->seed,
-            bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, "sampling")].choices[study->sampling],
-            study->n_conditions, study->common_fields ? "fields: common\n" : "");
+    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n", study->seed,
+            word("sampling", study->sampling), study->n_conditions);
+    if (study->fields != BT_FIELDS_OWN) fprintf(out, "fields: %s\n", word("fields", study->fields));
     for (int p = 0; p < study->n_parameters; p++) {
         fprintf(out, "%s:", study->parameter[p].name);
         const bt_study_parameter *parameter = &study->parameter[p];
@@ -315,12 +322,14 @@ void bt_study_check_ice(const bt_study *study, bt_errors *err)
         open = v.fixed;
         for (int i = 0; i < v.n; i++) open = open || v.idle[i];
     }
-    if (v.fixed)
+    if (v.fixed) {
         bt_errors_add(err,
                       "%s: repeats: the ice does not depend on the seed, as it is read from a file, or there is none: "
                       "the %" PRId64 " fields of a condition would be one run; set repeats: 1, and for other ice vary "
                       "the place of the body (body.x, body.y), or the file",
                       study->path, study->repeats);
+        bt_errors_code(err, "one_field");
+    }
     for (int i = 0; i < v.n; i++)
         if (v.idle[i])
             bt_errors_add(err, "%s%.*s: has no effect, as all ice is read from files: members that differ by it would "
@@ -424,10 +433,12 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         char line[96];
         snprintf(line, sizeof line, "%" PRId64 " bytes, xxh128 %s\n", file->bytes, file->digest);
         const char *before = bt_case_said_of(kept, file->path);
-        if (before && strncmp(before, line, strlen(line)))
+        if (before && strncmp(before, line, strlen(line))) {
             status = bt_fail(err, BT_ERR_CASE,
                              "%s: has changed since members in %s were made with it, and is of another study now; "
                              "restore it, or give another folder with -o", file->path, dir);
+            bt_errors_code(err, "other_study");
+        }
         if (before) continue;
         fprintf(text.out, "%s: %s", file->path, line);
         added++;

@@ -43,6 +43,13 @@ static int find_key(const bt_study_reader *reader, int line, const char *where, 
     return k;
 }
 
+/// Can a key be set to this in all members, or in some? A list of points is a text, which is read with the case.
+static bool may_set(const bt_study_reader *reader, int line, const char *name, int key, const bt_node *value)
+{
+    if (bt_case_keys[key].type == BT_KEY_POINTS && value->kind == BT_NODE_SCALAR) return true;
+    return bt_study_check_value(reader, line, name, key, value);
+}
+
 /// A map of keys and values into a list "key=value", and where each stands.
 static void read_set(const bt_study_reader *reader, const bt_node *map, int line, const char *where, char ***set,
                      char ***at, int *n)
@@ -57,7 +64,7 @@ static void read_set(const bt_study_reader *reader, const bt_node *map, int line
         char prefix[96];
         snprintf(prefix, sizeof prefix, "%.80s: ", where);
         const int key = find_key(reader, map->key_line[i], prefix, map->key[i]);
-        if (key < 0 || !bt_study_check_value(reader, map->key_line[i], map->key[i], key, map->item[i])) continue;
+        if (key < 0 || !may_set(reader, map->key_line[i], map->key[i], key, map->item[i])) continue;
         (*at)[*n] = place_of(reader->s, map->key_line[i]);
         (*set)[(*n)++] = bt_text_of("%s=%s", map->key[i], map->item[i]->text);
     }
@@ -259,7 +266,7 @@ static bool read_number(const bt_study_reader *reader, const bt_node *root, cons
     return true;
 }
 
-/// Place of the word given for a key in its list of two, 0 where there is none.
+/// Place of the word given for a key in its list, 0 where there is none.
 static int read_choice(const bt_study_reader *reader, const bt_node *root, const char *key)
 {
     int line;
@@ -268,7 +275,8 @@ static int read_choice(const bt_study_reader *reader, const bt_node *root, const
     if (!node || !bt_study_is_scalar(reader, node, line, key)) return 0;
     for (int k = 0; list[k]; k++)
         if (!strcmp(list[k], node->text)) return k;
-    bt_study_complain(reader, line, "%s: %.60s: give %s or %s", key, node->text, list[0], list[1]);
+    bt_study_complain(reader, line, "%s: %.60s: give %s%s%s or %s", key, node->text, list[0], list[2] ? ", " : "",
+                      list[2] ? list[1] : "", list[2] ? list[2] : list[1]);
     return 0;
 }
 
@@ -307,7 +315,7 @@ static void read_entries(const bt_study_reader *reader, const bt_node *root)
     if ((node = entry(root, "parameters", &line))) read_parameters(reader, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(reader, node, line);
     if ((node = entry(root, "with", &line))) read_with(reader, node, line);
-    study->common_fields = read_choice(reader, root, "fields") == 1;
+    study->fields = (bt_study_fields)read_choice(reader, root, "fields");
     for (int i = 0; i < study->n_parameters && study->sampling == BT_SAMPLING_GRID; i++)
         if (study->parameter[i].distribution != BT_UNIFORM)
             bt_errors_add(reader->err, "%s%s: a distribution is drawn from; set sampling: latin-hypercube and samples",
@@ -359,7 +367,7 @@ static void take_override(bt_study *study, const char *text, bt_errors *err)
     const bt_study_reader reader = {.s = study, .err = err, .place = place};
     const int key = find_key(&reader, 0, "", name);
     const bt_node node = {.kind = BT_NODE_SCALAR, .text = (char *)value, .plain = true};
-    if (key < 0 || !bt_study_check_value(&reader, 0, name, key, &node)) return;
+    if (key < 0 || !may_set(&reader, 0, name, key, &node)) return;
     const char *where = bt_study_varied(study, name); // that would win over `set`
     if (where) {
         bt_study_complain(&reader, 0, "%s: stands under `%s` of %s, which would win; change it there", name, where,

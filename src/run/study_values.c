@@ -49,8 +49,8 @@ bool bt_study_check_value(const bt_study_reader *reader, int line, const char *n
 {
     const bt_key *k = &bt_case_keys[key];
     if (value->kind != BT_NODE_SCALAR || k->type == BT_KEY_POINTS) {
-        bt_study_complain(reader, line, "%s: a study takes single values; make another base case for lists of points",
-                          name);
+        bt_study_complain(reader, line, "%s: a study takes single values; points can be set as a text, as in "
+                          "tow.waypoints: \"[[0, 0], [90 m, 5 m]]\"", name);
         return false;
     }
     bt_case scratch;

@@ -10,7 +10,7 @@ import time
 import pytest
 from harness import BERGTOW, TOW, call, changed, environment, heard, quick, write_case
 
-from bergtow._calls import Calls
+from bergtow._calls import called
 from bergtow._interrupts import held
 from bergtow.study import runs as case_runs
 
@@ -93,14 +93,9 @@ def test_a_stop_of_a_run_alone_is_one_of_the_call():
             case_runs.stopped_by_limit(6, 2.9, limit)
 
 
-def test_nothing_begins_after_a_stop(tmp_path):
-    calls = Calls()
-    code, said = calls.run(["sh", "-c", "echo a; echo b >&2; exit 3"], (lines := []).append)
+def test_a_call_gives_its_code_its_messages_and_its_lines():
+    code, said = called(["sh", "-c", "echo a; echo b >&2; exit 3"], (lines := []).append)
     assert (code, said, lines) == (3, "b\n", ["a\n"])
-    calls.stop()
-    with pytest.raises(KeyboardInterrupt):
-        calls.run(["touch", str(tmp_path / "begun")])
-    assert not (tmp_path / "begun").exists()
 
 
 def test_a_second_stop_leaves_no_run_behind(tmp_path):
@@ -120,15 +115,14 @@ with open(sys.argv[1], "w") as file: file.write(f"asked {len(asked)} times")
 os._exit(0)
 """
     try:
-        calls = Calls()
         with pytest.raises(KeyboardInterrupt):
-            calls.run([sys.executable, "-c", slow, str(tmp_path / "ended")],
-                      lambda text: os.kill(os.getpid(), signal.SIGINT))
+            called([sys.executable, "-c", slow, str(tmp_path / "ended")],
+                   lambda text: os.kill(os.getpid(), signal.SIGINT))
         assert (tmp_path / "ended").read_text() == "asked 1 times"
         with pytest.raises(KeyboardInterrupt), held():
             os.kill(os.getpid(), signal.SIGINT)
-            calls = None
-        assert calls is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+            there = True
+        assert there and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
 

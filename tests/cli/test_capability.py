@@ -385,7 +385,7 @@ class made_up_run(Told):
     """A run whose body keeps 0.15 m/s below a concentration of 0.5, and stops above."""
 
     def __init__(self, path):
-        super().__init__((0.15 if float(path.parent.name) < 0.5 else 0.0) * np.arange(11.0))
+        super().__init__((0.15 if float(path.parents[1].name) < 0.5 else 0.0) * np.arange(11.0))
 
     def __enter__(self):
         return self

@@ -2,7 +2,6 @@
 """bergtow converge: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
 import json
 import re
-import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 import made_up_ensemble as made_up
-from made_up_ensemble import record
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
 from bergtow import cli
@@ -173,8 +171,8 @@ def test_a_channel_that_is_too_narrow_is_found(tmp_path):
     row = found["rows"][0]
     assert row["judged"] == "matters" and row["effect"] < -0.3 and row["fields"] <= 16 and row["same_ice"]
     assert 0 < row["pairing"] < 2 and ", the same ice, error x " in text
-    begun = json.loads((tmp_path / "out/converge/width-0-cut/f001/call.json").read_text())
-    assert {"ice.extent.y_min=-4", "ice.extent.y_max=4"} <= set(begun)
+    study = (tmp_path / "out/converge/width-0-cut.yml").read_text()
+    assert "\n  ice.extent.y_min: '-4'\n  ice.extent.y_max: '4'\n" in study
     assert "the walls are felt; without them, take 8 m or wider" in text
 
 
@@ -202,10 +200,10 @@ def test_runs_that_do_not_reach_their_tolerance_tell_nothing_of_it(tmp_path):
 @pytest.mark.slow
 def test_runs_are_kept_and_a_spent_budget_is_reported(tmp_path):
     found, _ = converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.2, "--margin", 1e-6)
-    made = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/converge/*/*/summary.json")}
+    made = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/converge/*/members/*/summary.json")}
     assert found["rows"][0]["judged"] == "open" and found["rows"][0]["why"] in (
         "the budget is spent", f"{converge.FIELDS[-1]} fields scatter too much") and len(made) >= 5
-    kept = [p for p in made if (p.parent / "call.json").exists()]
+    kept = [p for p in made if (p.parent / "finished").exists()]
     converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.02, "--margin", 1e-6)
     assert len(kept) >= 4 and all(p.stat().st_mtime_ns == made[p] for p in kept)
 
@@ -263,66 +261,57 @@ def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monk
     assert never["dt"][0]["why"] == converge.SPENT
 
 
+SHORT = changed(CASE, run__duration=2, output__window_start=1)
+
+
 def runs_of(folder, case, given=()):
     path = write_case(folder, case)
     return case_runs.CaseRuns(path, folder / "out", "converge", Path(BERGTOW), list(given), 1, np.inf, np.inf)
 
 
-def settled(runs, i, values=None, name="case", **summary):
-    """A run as the program leaves it, without its results."""
-    runs.path(name, i).mkdir(parents=True, exist_ok=True)
-    (runs.path(name, i) / "summary.json").write_text(json.dumps({"n_floes": 9, "state_hash": f"{i}"} | summary))
-    for file in ("result.h5", "case.resolved.yml"):
-        (runs.path(name, i) / file).write_text(f"{file} of field {i}")
-    whose, made_by = runs.record(name, i, values or {})
-    record(runs.path(name, i), made_by.decode(), whose)
-    (runs.path(name, i) / "call.json").write_text(json.dumps(runs.stamp(i, values or {})))
-
-
 @pytest.mark.parametrize("where", ["case", "base", "set", "value"])
 def test_a_file_that_the_case_names_is_a_part_of_it(tmp_path, where):
     """A run of another table is another run, whoever names the table."""
-    (tmp_path / "current.csv").write_text("t,u,v\n0,0,0\n")
-    named = changed(CASE, water__current_table="current.csv")
-    case = named if where == "case" else {"base": "base.yml"} if where == "base" else CASE
+    (tmp_path / "current.csv").write_text("t,u,v\n0,0,0\n9,0,0\n")
+    named = changed(SHORT, water__current_table="current.csv")
+    case = named if where == "case" else {"base": "base.yml", "run": {"title": "a"}} if where == "base" else SHORT
     write_case(tmp_path, named, "base.yml")
     given = ["water.current_table=current.csv"] if where == "set" else []
     values = {"water.current_table": "current.csv"} if where == "value" else {}
-    runs = runs_of(tmp_path, case, given)
-    settled(runs, 0, values)
-    assert runs_of(tmp_path, case, given).kept("case", 0, values)
-    (tmp_path / "current.csv").write_text("t,u,v\n0,1,0\n")
-    assert not runs_of(tmp_path, case, given).kept("case", 0, values)
+    def made():
+        runs = runs_of(tmp_path, case, given)
+        assert runs.make("case", [0], values) == [None] and runs.kept("case", 0)
+        return runs.made
+    assert [made(), made()] == [1, 0]
+    (tmp_path / "current.csv").write_text("t,u,v\n0,0.01,0\n9,0,0\n")
+    assert [made(), made()] == [1, 0]
+
+
+@pytest.mark.parametrize("change", ["values", "given", "case", "version"])
+def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change):
+    first = runs_of(tmp_path, SHORT)
+    assert first.make("case", [0, 1], {"ice.friction": 0.1}) == [None, None] and first.made == 2
+    runs = runs_of(tmp_path, changed(SHORT, ice__thickness=0.05) if change == "case" else SHORT,
+                   ["body.draft=0.4"] if change == "given" else [])
+    if change == "version":
+        study = tmp_path / "out/converge/case.yml"
+        study.write_text(study.read_text().replace("# bergtow", "# bergtow 0", 1))
+    assert runs.make("case", [0], {"ice.friction": 0.3 if change == "values" else 0.1}) == [None] and runs.made == 1
+    assert not runs.kept("case", 1)
+
+
+def test_a_value_of_the_call_wins_over_one_of_the_user(tmp_path):
+    """And what YAML takes for nothing or for a number is the text that the program reads."""
+    runs = runs_of(tmp_path, changed(SHORT, run__title="a"),
+                   ["tow.ramp = 0.5 s", "run.title=none", "ice.shape=rectangles"])
+    assert runs.make("case", [0], {"tow.ramp": 0.25}) == [None]
+    with Run(runs.path("case", 0)) as there:
+        assert there.value("tow.ramp") == 0.25 and there.case["ice.shape"] == "rectangles"
+        assert there.case["run.title"] == "none" and there.case["ice.seed"] == "1000"
 
 
 def cut(path):
     path.write_bytes(path.read_bytes()[:-20])
-
-
-def another(path):
-    shutil.copy(path.parents[1] / "f002" / path.name, path)
-
-
-@pytest.mark.parametrize("file, change, said", [
-    ("summary.json", lambda p: p.write_text(p.read_text().replace("9", "8", 1)), "summary.json: has changed since"),
-    ("summary.json", cut, "summary.json: has changed since"),
-    ("summary.json", another, "summary.json: has changed since"),
-    ("summary.json", Path.unlink, "summary.json: "), ("result.h5", another, "result.h5: has changed since"),
-    ("finished", another, "is of another member"), ("finished", cut, "has changed since"),
-    ("finished", Path.unlink, "finished: ")])
-def test_a_run_that_was_changed_is_not_kept(tmp_path, capsys, file, change, said):
-    """Red when the stamp of what it was made by was enough: a summary with another digit was in every number."""
-    first = runs_of(tmp_path, CASE)
-    for i in range(2):
-        settled(first, i)
-    runs = runs_of(tmp_path, CASE)
-    assert runs.kept("case", 0, {}) and runs.kept("case", 1, {}) and not capsys.readouterr().err
-    change(runs.path("case", 0) / file)
-    for again in (runs, runs_of(tmp_path, CASE)):  # looked at before, and not
-        assert not again.kept("case", 0, {}) and again.kept("case", 1, {})
-        warning, = capsys.readouterr().err.splitlines()
-        assert warning.startswith("bergtow converge: warning: ") and "case/f001: " in warning and said in warning
-        assert not again.kept("case", 0, {}) and not capsys.readouterr().err  # said once
 
 
 def test_a_changed_run_is_made_again(tmp_path):
@@ -331,42 +320,48 @@ def test_a_changed_run_is_made_again(tmp_path):
     call = ["converge", "case.yml", "-o", "out", "--vary", "tolerance", "--jobs", "2"]
     assert script(*call, cwd=tmp_path).returncode == 0
     sound = json.loads((tmp_path / "out/converge.json").read_text())["rows"]
-    one, other = (tmp_path / f"out/converge/{name}/summary.json" for name in ("case/f001", "tolerance-1/f002"))
+    one, other = (tmp_path / f"out/converge/{name}/summary.json" for name in
+                  ("case/members/c001-r001", "tolerance-1/members/c001-r002"))
     one.write_text(re.sub(r'("mean_ice_resistance_n": )\S+', r"\g<1>1e6,", one.read_text()))
     cut(other)
     again = script(*call, "--force", cwd=tmp_path)
     assert again.returncode == 0
-    assert again.stderr.count("summary.json: has changed since the member finished; the run is made") == 2
+    for name in ("case: member c001-r001", "tolerance-1: member c001-r002"):
+        assert f"bergtow converge: warning: out/converge/{name} is not sound and is run again: " in again.stderr
     assert json.loads((tmp_path / "out/converge.json").read_text())["rows"] == sound
 
 
+def test_a_run_that_is_changed_meanwhile_is_not_kept(tmp_path):
+    """Of fields that an earlier call has made, and that this one did not ask for."""
+    assert runs_of(tmp_path, SHORT).make("case", [0, 1], {}) == [None, None]
+    runs = runs_of(tmp_path, SHORT)
+    runs.make("case", [0], {})
+    cut(runs.path("case", 1) / "summary.json")
+    assert runs.kept("case", 0) and not runs.kept("case", 1) and not runs.kept("case", 2)
+
+
 def test_runs_are_kept_however_the_folder_is_spelt(tmp_path, monkeypatch):
-    runs = runs_of(tmp_path, CASE)
-    settled(runs, 0)
+    runs = runs_of(tmp_path, SHORT)
+    runs.make("case", [0], {})
     monkeypatch.chdir(tmp_path)
     link = tmp_path / "bergtow"
     link.symlink_to(BERGTOW)
     again = case_runs.CaseRuns(runs.case, Path("out"), "converge", link, [], 1, np.inf, np.inf)
-    assert again.kept("case", 0, {}) and not again.kept("case", 1, {})
+    assert again.make("case", [0, 1], {}) == [None, None] and again.made == 1
 
 
-def test_a_run_that_met_the_budget_goes_on(tmp_path, monkeypatch):
+def test_a_run_that_met_the_budget_goes_on(tmp_path):
     """Red when it is made anew: one that is longer than the budget would never end."""
     long = changed(CASE, run__dt=0.02, run__duration=150, domain__length=60)
     runs = runs_of(tmp_path, long)
     runs.last = time.monotonic()  # a second, the shortest limit
-    assert runs.make("case", [0], {}) == [case_runs.SPENT] and not runs.kept("case", 0, {})
-    assert json.loads((runs.path("case", 0) / "summary.json").read_text())["stopped"]
-    again = runs_of(tmp_path, long)
-    again.last = time.monotonic() + 300
-    monkeypatch.setattr(again, "begin", None)
-    assert again.make("case", [0], {}) == [None] and again.kept("case", 0, {})
+    assert runs.make("case", [0], {}) == [case_runs.SPENT] and not runs.kept("case", 0)
+    stopped = json.loads((runs.path("case", 0) / "summary.json").read_text())
+    assert stopped["stopped"] and 0 < stopped["n_steps"] < 7500 and (runs.path("case", 0) / "checkpoint.h5").exists()
+    assert runs_of(tmp_path, long).make("case", [0], {}) == [None]
     there = json.loads((runs.path("case", 0) / "summary.json").read_text())
     plain = run(tmp_path / "plain", long, "--set", "ice.seed=1000")
     assert there["state_hash"] == plain.hash and there["n_steps"] == 7500
-    # of other values it is another run
-    other = runs_of(tmp_path, long, ["ice.friction=0.1"])
-    assert other.go_on("case", 0, {}) is None and not other.kept("case", 0, {})
 
 
 def test_one_call_at_a_time_works_in_a_folder(tmp_path):
@@ -388,40 +383,62 @@ def test_one_call_at_a_time_works_in_a_folder(tmp_path):
 
 
 def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
-    made = case_runs.CaseRuns.begin
-    monkeypatch.setattr(case_runs.CaseRuns, "begin", lambda runs, name, i, values: made(runs, name, i, values) if
-                        name == "case" else (
-                            5, "bergtow: warning: odd\nbergtow: step 3: no sound state; see theory\n", False))
+    of = case_runs.state_of
+    monkeypatch.setattr(case_runs, "state_of", lambda path: of(path) if "dt-1" not in str(path) else (
+        case_runs.FAILED, 5, "step 3: no sound state; see theory"))
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
-    short = changed(CASE, run__duration=5, output__window_start=2)
-    path = write_case(tmp_path, short)
-    with pytest.raises(RunError, match=r"dt-1/f001: this run failed, and 3 more: step 3: no sound state") as failed:
+    path = write_case(tmp_path, changed(CASE, run__duration=5, output__window_start=2))
+    with pytest.raises(RunError, match=r"dt-1/members/c001-r001: this run failed, and 3 more: step 3: no sound state"
+                       ) as failed:
         cli.perform("converge", path, "-o", tmp_path / "out", "--vary", "dt", "--jobs", "1")
     assert failed.value.status == 5
     row, = json.loads((tmp_path / "out/converge.json").read_text())["rows"]
     assert row["judged"] == "open" and "no sound state" in row["why"]
 
 
+def test_a_run_that_fails_is_tried_once_in_a_call(tmp_path):
+    """With its code, by which other commands know why; the others are made."""
+    failing = changed(SHORT, air__wind_x=15, guard__energy=1e-3)
+    runs = runs_of(tmp_path, failing)
+    why = runs.make("case", [0], {})[0]
+    assert "guard.energy" in why and runs.failed[runs.path("case", 0)] == (why, 5)
+    starts = lambda: (runs.home("case") / "journal.jsonl").read_text().count('"start"')
+    assert len(runs.make("case", [0, 1], {})) == 2 and starts() == 2 and len(runs.failed) == 2
+    again = runs_of(tmp_path, failing)
+    assert again.make("case", [0], {}) == [why] and starts() == 3
+    with pytest.raises(RunError, match="a run of case failed.*mend the case") as failed:
+        again.there("case", 1, {})
+    assert failed.value.status == 5 and starts() == 3
+
+
+def test_values_that_the_program_refuses_are_runs_that_failed(tmp_path):
+    """The others are made; and what an earlier call has left in the folder is none of theirs."""
+    runs = runs_of(tmp_path, SHORT)
+    assert runs.make("dt-1", [0], {}) == [None]
+    runs = runs_of(tmp_path, SHORT)
+    why = runs.make("dt-1", [0, 1], {"domain.width": -1})
+    assert why[0] == why[1] and "domain.width" in why[0] and not runs.kept("dt-1", 0) and runs.made == 0
+    assert set(runs.failed.values()) == {(why[0], 3)} and runs.make("case", [0], {}) == [None]
+
+
 def test_fields_are_those_that_are_there(tmp_path, monkeypatch):
     """A run in between may have met the budget: its folder is no field."""
-    runs = runs_of(tmp_path, CASE)
-    for i in (0, 1, 3, 4):
-        settled(runs, i)
-    asked = []
+    runs, asked = runs_of(tmp_path, CASE), []
+    monkeypatch.setattr(runs, "kept", lambda name, i: i in (0, 1, 3, 4))
     monkeypatch.setattr(runs, "measured", lambda name, fields, measure: asked.extend(fields) or np.arange(4.0))
     assert converge.fields_row(runs)[0]["fields"] == 4 and asked == [0, 1, 3, 4]
 
 
 def test_fields_that_are_the_same_run_are_refused(tmp_path):
-    runs = runs_of(tmp_path, CASE)
-    for i in (0, 1):
-        settled(runs, i, n_floes=0, state_hash="a")
-    assert runs.make("case", [0, 1], {}) == [None, None]  # without floes there is no scatter
-    settled(runs, 0, state_hash="b")
-    assert runs.make("case", [0, 1], {}) == [None, None]
-    settled(runs, 1, state_hash="b")
+    """Without floes there is no scatter, and one run is all fields."""
+    runs = runs_of(tmp_path, changed(SHORT, ice__concentration=0))
+    assert runs.make("case", [0, 1], {}) == [None, None] and runs.made == 1
+    assert [runs.kept("case", i) for i in range(3)] == [True, True, False]
+    assert len(runs.measured("case", range(2), lambda run: run.number("n_floes"))) == 2
+    given = runs_of(tmp_path, changed(SHORT, ice__concentration=0, floes=[{"x": 10, "y": 1, "length": 1}]))
+    assert given.make("case", [0], {}) == [None]
     with pytest.raises(RunError, match="the ice is read.*no seed changes it"):
-        runs.make("case", [0, 1], {})
+        given.make("case", [0, 1], {})
 
 
 class Towed:

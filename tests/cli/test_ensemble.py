@@ -63,6 +63,23 @@ def test_conditions_with_common_fields_make_them_once(tmp_path):
     assert ensemble(tmp_path, "own", "--steps", 1).returncode == SIGNAL and not (tmp_path / "own/fields").exists()
 
 
+def test_a_member_of_numbered_fields_is_the_run_of_its_seed(tmp_path):
+    """Also where a way is set for some members: a list of points, as a text."""
+    way = "[[14, 0.5], [17, 1]]"
+    prepare(tmp_path, {"base": "base.yml", "repeats": 2, "seed": 70, "fields": "numbered",
+                       "variants": {"straight": {}, "led": {"tow.waypoints": way}}}, changed(BASE, run__duration=6))
+    assert ensemble(tmp_path).returncode == DONE
+    for name, seed, more in (("c001-r001", 70, []), ("c001-r002", 71, []),
+                             ("c002-r002", 71, ["--set", f"tow.waypoints={way}"])):
+        alone = call("run", "base.yml", "-o", name, "--set", f"ice.seed={seed}", *more, cwd=tmp_path)
+        assert alone.returncode == DONE, alone.stderr
+        hashes = [json.loads((at / "summary.json").read_text())["state_hash"] for at in
+                  (tmp_path / "all/members" / name, tmp_path / name)]
+        assert hashes[0] == hashes[1]
+    prepare(tmp_path, {"base": "base.yml", "repeats": 2, "seed": 71, "fields": "numbered"})
+    assert "another study" in ensemble(tmp_path).stderr
+
+
 def test_a_study_names_its_members(quiet, tmp_path):
     """The base's title is that of one condition. What the study sets is kept, and a study without a title says no more
     than the base."""

@@ -326,7 +326,7 @@ def test_what_a_call_leaves(routed):
 
 def test_every_route_is_towed_through_the_same_ice(routed):
     fields = {}
-    for path in (routed.out / "route").glob("*/f00*/case.resolved.yml"):
+    for path in (routed.out / "route").glob("*/members/*/case.resolved.yml"):
         text = path.read_text()
         fields.setdefault(path.parent.name, set()).add((re.search(r"field: (.*?)(?:  #|\n)", text)[1],
                                                         *re.findall(r"current_[xy]: (\S+)", text)))
@@ -356,14 +356,14 @@ def test_what_is_killed_goes_on(routed, tmp_path):
     env = environment(BERGTOW=BERGTOW, PYTHONPATH=ROOT / "postproc")
     process = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                preexec_fn=heard)
-    while process.poll() is None and len(list(out.glob("route/*/f0*/finished"))) < 3:
+    while process.poll() is None and len(list(out.glob("route/*/members/*/finished"))) < 3:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     process.communicate()
     assert process.returncode == SIGNAL
     for name in ("route.json", "routes.geojson", "straight.yml", "route.png"):
         assert (out / name).exists(), name
-    kept = {p: p.stat().st_mtime_ns for p in out.glob("route/*/f0*/finished")}
+    kept = {p: p.stat().st_mtime_ns for p in out.glob("route/*/members/*/finished")}
     assert 3 <= len(kept) < 4 * len(routed.found["routes"])
     assert json.loads((out / "route.json").read_text())["verdict"] is None
     again = called("route", tmp_path / "case.yml", *QUICK, "-o", out)
@@ -393,7 +393,7 @@ def test_a_place_gives_degrees_and_a_gpx(tmp_path):
     map_ = json.loads((tmp_path / "out/routes.geojson").read_text())
     assert "crs" not in map_ and {f["properties"]["track"] for f in map_["features"]} == {"berg", "tug", "swath"}
     assert map_["features"][0]["geometry"]["coordinates"][-1] == pytest.approx([lon, lat], abs=1e-6)
-    assert not list((tmp_path / "out/route").glob("*/f001"))
+    assert not list((tmp_path / "out/route").glob("*/members"))
 
 
 def test_a_new_look_leaves_the_way_so_far(tmp_path):
@@ -409,7 +409,7 @@ def test_a_new_look_leaves_the_way_so_far(tmp_path):
     assert (tmp_path / "out/round-1.json").exists()
     series = []
     for name in ("look-1", "look-2", "tow-horizon"):
-        with Run(tmp_path / "out/route" / name / "f001") as r:
+        with Run(tmp_path / "out/route" / name / "members/c001-r001") as r:
             series.append(np.column_stack([r["body_x"], r["body_y"], r["ice_resistance"], r["kinetic_energy"]]))
             assert r.n_pieces > 0
     for early, late in zip(series, series[1:]):
@@ -449,19 +449,20 @@ def test_looks_from_a_line(tmp_path):
     assert re.search("straight line: [^;]*touches an area to keep out of", done.stdout)
     series = []
     for name in ("look-1", "look-2", "look-3", "tow-horizon"):
-        with Run(whole / "out/route" / name / "f001") as r:
+        with Run(whole / "out/route" / name / "members/c001-r001") as r:
             series.append(np.column_stack([r["body_x"], r["body_y"], r["line_tension"]]))
     for early, late in zip(series, series[1:]):
         assert np.array_equal(early, late[:len(early)])
     env = environment(BERGTOW=BERGTOW, PYTHONPATH=ROOT / "postproc")
     process = subprocess.Popen([sys.executable, "-m", "bergtow", "route", "case.yml", *LOOKS, "-o", "out"], env=env,
                                cwd=killed, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while process.poll() is None and not (killed / "out/route/look-2/f001/finished").exists():
+    while process.poll() is None and not (killed / "out/route/look-2/members/c001-r001/finished").exists():
         time.sleep(0.02)
     process.kill()
     process.wait()
     assert not (killed / "out/horizon.yml").exists()
-    again = called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)
+    while "another run is at work" in (again := called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)).stderr:
+        time.sleep(0.1)  # the program still writes the ensemble of the last look
     assert again.returncode == DONE, again.stderr
     other = json.loads((killed / "out/route.json").read_text())
     assert other["rounds"] == found["rounds"]
@@ -488,27 +489,27 @@ def test_the_estimate_of_looks():
 
 def test_the_estimate_of_the_tows(monkeypatch):
     """Of `bergtow check`: 3 s of the tow that keeps frames, 2 s of another; by a clock that goes twice as slow, twice
-    as much. Red: the tow with frames stands for the others; one at a time stands for several; a tow that is there."""
+    as much. Red: the tow with frames stands for the others; one at a time stands for several."""
     def candidate(seconds):
         return SimpleNamespace(name="straight", seconds=seconds, keys={})
-    some, clock = [candidate(100.0), candidate(150.0)], [0.0]
+    some = [candidate(100.0), candidate(150.0)]
     s = SimpleNamespace(values={"ice.outlines": ""}, field="ice.h5", case="case.yml")
-    runs = SimpleNamespace(program="bergtow", jobs=2, made=0, sets=lambda i, keys: [i])
+    runs = SimpleNamespace(program="bergtow", jobs=2, sets=lambda i, keys: [i])
     monkeypatch.setattr(route, "checked", lambda program, case, sets, words: json.dumps(
         {"cost": {"core_time_s": 3 - sets[0]}}))
     told = route.estimate(runs, s, some, 5)
     assert told == (3, 2, 2.5 * (3 * 2 + 0.5))
 
-    def tow(runs, name, members, keys):
-        assert 0 not in members
-        clock[0] += 4 * -(-len(members) // runs.jobs)
-        runs.made += len(members)
-        return [None for _ in members]
-    monkeypatch.setattr(route, "tow", tow)
-    monkeypatch.setattr(route.time, "monotonic", lambda: clock[0])
-    assert route.piloted(runs, some[0], 5, told) == pytest.approx(2 * told[-1])
-    monkeypatch.setattr(route, "tow", lambda runs, name, members, keys: [None for _ in members])
-    assert route.piloted(runs, some[0], 5, told) is None
+    def by_tows(*lines):
+        found = {}
+        line = route.first_tow(found, told)
+        for text in lines:
+            line(text + "\n")
+        return found.get("estimate_by_tow_s")
+    assert by_tows("5 members: 5 conditions x 1 field, 0 settled before", "[1/5] c002-r001 FAILED, 9 s") is None
+    assert by_tows("[1/5] c003-r001 finished, 4 s, variant m003; about 9 s left", "[2/5] c001-r001 finished, 9 s"
+                   ) == pytest.approx(2 * told[-1])
+    assert by_tows("[1/1] c001-r001 finished, 6 s") == pytest.approx(2 * told[-1])
 
 
 def test_the_function_is_the_command(routed, tmp_path):

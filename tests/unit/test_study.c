@@ -104,11 +104,12 @@ TEST(hypercube_has_one_sample_in_each_stratum)
 
 TEST(common_fields_are_the_same_in_every_condition)
 {
-    const char *text = "base: a.yml\nrepeats: 3\nfields: %s\nparameters:\n  run.dt: [1 s, 2 s]\n";
-    int64_t seed[2][6];
-    for (int k = 0; k < 2; k++) {
+    static const char *const words[] = {"own", "common", "numbered"};
+    const char *text = "base: a.yml\nrepeats: 3\nseed: 70\nfields: %s\nparameters:\n  run.dt: [1 s, 2 s]\n";
+    int64_t seed[3][6];
+    for (int k = 0; k < 3; k++) {
         char *t;
-        assert_true(asprintf(&t, text, k ? "common" : "own") > 0);
+        assert_true(asprintf(&t, text, words[k]) > 0);
         bt_study s = read_text(t);
         free(t);
         for (int64_t i = 0; i < 6; i++) {
@@ -122,6 +123,7 @@ TEST(common_fields_are_the_same_in_every_condition)
     for (int i = 0; i < 3; i++) {
         assert_true(seed[0][i] != seed[0][i + 3]);
         assert_true(seed[1][i] == seed[1][i + 3] && seed[1][i] == seed[0][i] && seed[1][i] != seed[1][(i + 1) % 3]);
+        assert_true(seed[2][i] == 70 + i && seed[2][i + 3] == 70 + i);
     }
 }
 

@@ -1,31 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Are the files of runs and ensembles what the program left? Seals, and records of finished runs, by the library
-(bergtow/simulation.h: bt_seal_check, bt_record_keep, bt_record_check)."""
+(bergtow/simulation.h: bt_seal_check, bt_record_check)."""
 import os
 
 from bergtow import _library
 from bergtow.errors import BergtowError
 
-FILES = "summary.json", "result.h5", "case.resolved.yml", "finished"
-
 
 def check_seal(path, kind):
     """kind: "ensemble", "result", ... Errors: BergtowError."""
     _library.library().bt_seal_check(os.fsencode(path), kind.encode())
-
-
-def stamp(folder):
-    """What tells that no file of a finished run has changed since it was looked at; None where one is missing."""
-    try:
-        some = [(folder / file).stat() for file in FILES]
-    except OSError:
-        return None
-    return [(s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in some]
-
-
-def keep(folder, name, made_by):
-    """Write the record of a run that has just finished in a folder. Errors: BergtowError."""
-    _library.library().bt_record_keep(os.fsencode(folder), name.encode(), made_by, len(made_by))
 
 
 def fault_of_member(folder, name, made_by):

@@ -11,6 +11,7 @@ stopped: tows are those of study/runs.py.
 """
 import base64
 import json
+import re
 import time
 from pathlib import Path
 
@@ -244,9 +245,9 @@ def calibrated(a, w, s, runs):
     return planner.Weights(*fit.weights), told["force_factor"], told
 
 
-def tow(runs, name, some, keys):
-    """Make the tows of some members, and say why those failed that did."""
-    why = runs.make(name, some, keys)
+def tow(runs, name, some, keys, line=None):
+    """Make the tows of some members, and say why those failed that did. line: as of runs.make()."""
+    why = runs.make(name, some, keys, line)
     for i, reason in zip(some, why):
         if reason and reason != SPENT:
             runs.tell((name, i), f"{runs.path(name, i)}: {reason}")
@@ -335,16 +336,17 @@ def estimate(runs, s, some, n):
     return replay, plain, ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
 
 
-def piloted(runs, c, n, told):
-    """Seconds of wall time of all tows, by the first ones of candidate c, as many at a time as all will be; None where
-    they were there before. told: estimate()."""
+def first_tow(found, told):
+    """Says how long all tows will take, by the first that ends while others are made: a function for the lines of the
+    program. told: estimate()."""
     replay, plain, total = told
-    some = range(1, min(n, 1 + runs.jobs)) if n > 1 else range(1)  # the first member keeps frames
-    clock, made = time.monotonic(), runs.made
-    why = tow(runs, c.name, some, c.keys)
-    if any(why) or runs.made - made < len(some):
-        return None
-    return total * (time.monotonic() - clock) / (plain if n > 1 else replay)
+
+    def line(text):
+        ended = re.match(r"\[\d+/\d+\] c(\d+)-r001 finished, ([^ ,]+) s", text)
+        if ended and "estimate_by_tow_s" not in found:
+            found["estimate_by_tow_s"] = total * float(ended[2]) / (replay if int(ended[1]) == 1 else plain)
+            print(f"by the first tow: {words.amount(found['estimate_by_tow_s'], 's')} in all\n", flush=True)
+    return line
 
 
 def perform(a):
@@ -419,12 +421,8 @@ def verify(a, w, s, goal, some, n, runs, files, found, told):
     runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
     found["left_out"] = [m.left_out for m in runs.members]
     outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
-    seconds = piloted(runs, some[0], n, told)
-    if seconds is not None:
-        found["estimate_by_tow_s"] = seconds
-        print(f"by the first tows: {words.amount(seconds, 's')} in all\n", flush=True)
     for c in some:
-        why = tow(runs, c.name, range(n), c.keys)
+        why = tow(runs, c.name, range(n), c.keys, first_tow(found, told) if c is some[0] else None)
         if SPENT in why:
             files.write(found)
             raise RunError(folder, f"the budget of {a.budget:g} min is spent before every tow is made",

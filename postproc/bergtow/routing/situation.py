@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bergtow import _library, writing
-from bergtow._calls import Calls
+from bergtow._calls import called
 from bergtow.case import Case
 from bergtow.errors import CASE, USAGE, Refused, RunError
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
-from bergtow.study.runs import errors_in, is_file
+from bergtow.study.runs import errors_in
 
 import numpy as np
 
@@ -186,6 +186,15 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
     return out, ramp
 
 
+def is_file(folder, text):
+    """Is this text of a case the name of a file: of a table, of outlines, of a field? Whatever the key, so that none is
+    forgotten; a title that is one by chance does no harm."""
+    try:
+        return (folder / text).is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def _drop(section, names):
     """Take a key out of a case, by the names that lead to it."""
     for name in names[:-1]:
@@ -248,7 +257,7 @@ def field(program, case, folder):
     """FOLDER/ice.h5, the floes of a case. Errors: RunError in the program's words."""
     folder.mkdir(parents=True, exist_ok=True)
     out = folder / "ice.h5"
-    code, said = Calls().run([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL)
+    code, said = called([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL)
     if code:
         raise Refused(case, "\n".join(errors_in(said)) or "the field is refused", code)
     return out

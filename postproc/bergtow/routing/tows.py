@@ -12,9 +12,7 @@ an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
 The goal is reached where the body comes within ARRIVED of its width, at the moment in which it is nearest; every number
 of a tow is of the time up to there, or to its end where the goal is missed.
 """
-import hashlib
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from bergtow.errors import CASE, RunError
 from bergtow.result.run import least
@@ -167,23 +165,25 @@ def candidates(routes, speeds, situation):
 
 @dataclass
 class Tows(CaseRuns):
-    """Tows of candidates through members, which take the place of fields."""
+    """Tows of candidates through members, which are conditions of a study: each reads its own ice."""
 
     members: list = field(default_factory=list)
 
-    def sets(self, i, values):
+    def member(self, i):
+        return f"c{i + 1:03d}-r001"
+
+    def own(self, i, values):
+        """The keys of a member; the first one keeps frames."""
         member = self.members[i].keys if self.members else {}
         frames = -1.0 if i else float(values["run.duration"].split()[0]) / FRAMES
-        texts = member | {"output.frame_interval": f"{frames:.10g} s"} | values
-        return [*self.given, *(f"{key}={text}" for key, text in texts.items())]
+        return {k: v for k, v in (member | {"output.frame_interval": f"{frames:.10g} s"}).items() if k not in values}
 
-    def stamp(self, i, values):
-        texts = self.sets(i, values)
-        read = next((t.partition("=")[2] for t in texts if t.startswith("ice.field=")), None)
-        return [self.identity, *([hashlib.sha256(Path(read).read_bytes()).hexdigest()] if read else []), *texts]
+    def sets(self, i, values):
+        """What replaces values of the case in the tow of a member, as texts of --set."""
+        return [f"{k}={v}" for k, v in (values | self.own(i, values)).items()]
 
-    def refuse_copies(self, name, fields):
-        """Members may well be alike: in open water all are."""
+    def study(self, n, values):
+        return {"set": values, "variants": {f"m{i + 1:03d}": self.own(i, values) for i in range(n)}}
 
 
 # ---- what a tow says

@@ -138,7 +138,8 @@ def of_ensemble(e, of=OF[0], computed=None):
     """The budget of a number of an ensemble. The numerical error, numerics(), is known for the mean ice resistance
     alone: in per cent of it, which does not apply to a number that includes drag or inertia. If members of the sample
     failed, or have no such number, the missing values are unknown, and there are no intervals. Errors: RunError."""
-    refuse(e.file, "sampling: latin-hypercube" in e.study, "fields: common" in e.study)
+    refuse(e.file, "sampling: latin-hypercube" in e.study,
+           "fields: common" in e.study or "fields: numbered" in e.study)
     meaning, done, values = numbers(e, of)
     if (without := e.without_bound(np.arange(e.n))) and not of.startswith(BOUNDED):
         raise RunError(e.file, f"has no budget of {of}: {without}", "let ice give way (ice.rafting.kappa, "
@@ -197,7 +198,7 @@ def perform(a):
     analysis.begin("budget", a.study, "study", folder, a.force)
     if a.study.is_file() and is_study(a.study):  # the program refuses a case, and reads a pipe
         keys = contents(a.study)
-        refuse(a.study, keys.get("sampling") == "latin-hypercube", keys.get("fields") == "common")
+        refuse(a.study, keys.get("sampling") == "latin-hypercube", keys.get("fields", "own") != "own")
         if isinstance(n := keys.get("samples"), int) and n < stat_budget.LEAST:
             raise RunError(a.study, f"has {n} samples, too few for a budget", f"take {stat_budget.LEAST} or more", CASE)
     converge = read_converge(a.converge, folder)

@@ -142,7 +142,7 @@ class Search:
         name, some = self.folder(c, value), c.trials.setdefault(value, [])
         failed = c.failed.setdefault(value, [])
         first = len(some) + len(failed)
-        if time.monotonic() + self.runs.seconds.get(name, 0.0) > self.runs.end:
+        if time.monotonic() + self.runs.seconds.get(name, 0.0) * -(-n // self.runs.jobs) > self.runs.end:
             return False
         numbers = range(first, first + n)
         why = self.runs.make(name, numbers, self.sets(c, value))
@@ -174,9 +174,11 @@ class Search:
         s = c.search
         while (value := s.next()) is not None:
             p = s.point(value)
-            sure = next((k for k in range(1, s.most) if bracket.OPEN not in (
-                s.verdict(p.good + k, p.bad, p.failed), s.verdict(p.good, p.bad + k, p.failed))), s.most)
-            if not self.add(c, value, max(1, min(self.runs.jobs, sure, s.most - p.n))):
+            ends = {k: {s.verdict(p.good + k, p.bad, p.failed), s.verdict(p.good, p.bad + k, p.failed)}
+                    for k in range(1, s.most)}
+            least = next((k for k in ends if ends[k] != {bracket.OPEN}), 1)  # no fewer can decide
+            sure = next((k for k in ends if bracket.OPEN not in ends[k]), s.most)
+            if not self.add(c, value, max(1, min(max(least, min(self.runs.jobs, sure)), s.most - p.n))):
                 c.why = SPENT
                 return
 
@@ -185,7 +187,7 @@ class Search:
         for value in np.linspace(c.search.start, c.search.end, points) if points > 1 else ():
             value = float(value)
             while c.search.point(value).n < fields and not c.search.point(value).spent:
-                if not self.add(c, value, min(self.runs.jobs, fields - c.search.point(value).n)):
+                if not self.add(c, value, fields - c.search.point(value).n):
                     return
         # what speaks against the bracket is decided, or stays as it is where the budget does not reach
         while p := next((p for p in c.search.against() if c.search.more(p.value)), None):

@@ -2,7 +2,8 @@
 """Does a result depend on numerical choices: the width and length of the domain, the time step, the tolerance, the
 window, the start, the number of fields?
 
-    bergtow converge CASE.yml -o DIR --budget 10        DIR/converge.json, DIR/converge/NAME/fNNN, a verdict a line
+    bergtow converge CASE.yml -o DIR --budget 10        DIR/converge.json, the ensembles DIR/converge/NAME,
+                                                        a verdict a line
 
 One value is changed at a time, and the case is run with it and without it on the same seeds, so that both are
 compared on the same ice. For a width or length the field of the smaller domain is that of the larger one, cut to it
@@ -295,7 +296,7 @@ def window(study, margin):
 
 def fields_row(study):
     """How many fields the mean needs, from those that are there."""
-    kept = [i for i in range(FIELDS[-1]) if study.kept("case", i, {})]  # one in between may have met the budget
+    kept = [i for i in range(FIELDS[-1]) if study.kept("case", i)]  # one in between may have met the budget
     n, x = len(kept), study.measured("case", kept, mean_resistance)
     if not np.isfinite(x).all():
         return [{"name": "fields", "key": "repeats", "judged": "open", "why": "a run has no mean ice resistance"}]
@@ -309,7 +310,7 @@ def fields_row(study):
 def verdicts(study):
     """{verdict on the window: number of tows of the unchanged case}."""
     found = Counter()
-    for i in (i for i in range(FIELDS[-1]) if study.kept("case", i, {})):
+    for i in (i for i in range(FIELDS[-1]) if study.kept("case", i)):
         with Run(study.path("case", i)) as run:
             found[run.verdict[0]] += 1
     return dict(found)
@@ -378,7 +379,7 @@ def perform(a):
     with locked(folder / "converge") as study.lock:
         rows = converge(study, a.vary, a.margin, a.tries)
         values = None  # of the case: not known where the budget was spent before its first run was through
-        if study.kept("case", 0, {}):
+        if study.kept("case", 0):
             with Run(study.path("case", 0)) as run:
                 values = run.case
     found = {"case": str(a.case), "set": a.set, "values": values, "margin": a.margin,

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bergtow._calls import Calls
+from bergtow._calls import called
 from bergtow._program import program_path
 from bergtow.case import setting
 from bergtow.errors import IO, OK, BergtowError
@@ -66,7 +66,7 @@ class Ensemble:
             command = [word for word in command if word != "--retry-failed"]
         command += ["--threads", str(threads)] if threads else []
         # a group of its own: a Ctrl-C comes here, and reaches the program once
-        code, errors = Calls().run(command, lambda text: progress and print(text, end="", flush=True),
+        code, errors = called(command, lambda text: progress and print(text, end="", flush=True),
                                    start_new_session=True)
         if code != OK:
             raise BergtowError(errors.strip() or f"bergtow ensemble ended with {code}", code)

@@ -123,7 +123,7 @@ class Runs:
 
     def takes(self, name, sets, fields):
         """s for the runs that are not there yet."""
-        missing = sum(not self.runs.kept(name, i, sets) for i in fields)
+        missing = sum(not self.runs.kept(name, i) for i in fields)
         seconds = float(sets["run.duration"].split()[0]) if "run.duration" in sets else self.duration
         return -(-missing // self.runs.jobs) * self.own.get(name, self.pace) * seconds
 

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Runs of one case with some keys replaced, made on demand and kept in folders. bergtow converge and bergtow capability
-base their decisions on them.
+"""Runs of one case with some keys replaced, as studies that `bergtow ensemble` runs: bergtow converge, capability,
+design and route base their decisions on them. What they need of it: "Many runs" in docs/architecture.md.
 
-    DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: its inputs;
-                                begun.json in place of it while the run is under way or stopped; finished: the record
-                                of its files, as that of an ensemble's member (result/integrity.py)
+    DIR/SUBJECT/NAME.yml        the study of the values that NAME stands for
+    DIR/SUBJECT/NAME/           its ensemble; field NNN in members/c001-rNNN
 
-A run is kept, and a stopped run continues, as long as the case file, the files that it names, the program and the
-values are unchanged. A run whose files do not fit the record is reported and made anew. One call at a time works in
-DIR/SUBJECT: it and its runs hold the lock of the folder.
+The program keeps runs, resumes those that were stopped, and makes damaged ones again. A folder of another study, or of
+another version of the program, is removed; so one call at a time works in DIR/SUBJECT: it and its runs hold the lock of
+the folder.
 """
 import ctypes
-import hashlib
 import json
 import os
 import re
@@ -19,47 +17,25 @@ import shutil
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from bergtow import _library
-from bergtow._calls import Calls
-from bergtow._interrupts import held
-from bergtow.errors import CASE, IO, USAGE, BergtowError, Refused, RunError
+from bergtow._calls import called
+from bergtow.errors import CASE, USAGE, Refused, RunError
 from bergtow.result import integrity
 from bergtow.result.run import Run
-from bergtow.study.case_file import files
 
 import numpy as np
+import yaml
 
 DONE, STOPPED, SPENT = 0, 6, "the budget is spent"  # exit codes of the program; a run that met its limit
-FRESH = 2, 3, 4  # exit codes of a resume that cannot use the files of the run
+WAITING, FINISHED, FAILED = range(3)  # bt_member_state
 WARNING = "bergtow: warning:"  # in front of a message of the program
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
-
-
-def texts_of(value):
-    """Texts in the contents of a YAML file."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, (dict, list)):
-        for part in value.values() if isinstance(value, dict) else value:
-            yield from texts_of(part)
-
-
-def is_file(folder, text):
-    """Is this text of a case the name of a file: of a table, of outlines, of a field? Whatever the key, so that none is
-    forgotten; a title that is one by chance does no harm."""
-    try:
-        return (folder / text).is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def digest(path):
-    return hashlib.sha256(path.read_bytes()).digest()
+FIRST_SEED = 1000  # of the fields
 
 
 def errors_in(said):
@@ -70,7 +46,7 @@ def errors_in(said):
 
 def code_of(why):
     """The code in brackets behind an error of the program, None where it has none."""
-    found = re.search(r" \[(\w+)\]$", why or "")
+    found = re.search(r" \[(\w+)\]$", why or "", re.MULTILINE)
     return found and found[1]
 
 
@@ -95,6 +71,14 @@ def locked(folder):
         os.close(lock.value)
 
 
+def state_of(folder):
+    """(state, exit code, why) of a member, as the program has it (bergtow/ensemble.h)."""
+    code, texts = ctypes.c_int(), [ctypes.c_void_p(), ctypes.c_void_p()]
+    state = _library.library().bt_ensemble_state(os.fsencode(folder), ctypes.byref(code), *map(ctypes.byref, texts))
+    failure, why = (_library.take_text(text.value) if text.value else "" for text in texts)
+    return state, code.value, (why.splitlines() or [f"exit code {code.value}"])[0] + (failure and f" [{failure}]")
+
+
 @dataclass
 class CaseRuns:
     """The runs of a study of one case."""
@@ -111,62 +95,59 @@ class CaseRuns:
     made: int = 0          #: runs that were made, and not there before
     failed: dict = field(default_factory=dict)   #: {folder: (why, exit code)} of runs that failed in this call
     lock: int = -1         #: of the folder, as locked() gives it
-    calls: Calls = field(default_factory=Calls)
-    _sound: dict = field(default_factory=dict)   #: {folder: stamp of its files} of runs that fit their record
-    _told: set = field(default_factory=set)      #: folders of runs that are reported
+    _ends: dict = field(default_factory=dict)    #: {name: None, or why it failed, of each run that was asked for}
+    _alike: set = field(default_factory=set)     #: names of which no seed changes the ice: all fields are one run
+    _sound: set = field(default_factory=set)     #: folders of runs that fit their record
+    _told: set = field(default_factory=set)      #: runs that are reported
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
             raise RunError("--set ice.seed", "changes nothing, for each field has a seed of its own", "leave it out",
                            USAGE)
-        version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
-        try:
-            layers = files(self.case)
-        except RunError:
-            layers = [(self.case, {})]  # the program will report what is wrong with it
-        read = [(path.parent, text) for path, some in layers for text in texts_of(some)]
-        read += [(self.case.parent, text.partition("=")[2].strip()) for text in self.given]
-        parts = [path for path, _ in layers] + [folder / text for folder, text in read if is_file(folder, text)]
-        #: of the files of the case and of the program
-        self.identity = hashlib.sha256(b"".join(map(digest, parts)) + version).hexdigest()
+
+    @cached_property
+    def version(self):
+        return subprocess.run([self.program, "--version"], capture_output=True, text=True).stdout.partition("\n")[0]
+
+    def home(self, name):
+        return self.folder / self.subject / name
 
     def path(self, name, i):
-        return self.folder / self.subject / name / f"f{i + 1:03d}"
+        return self.home(name) / "members" / self.member(0 if name in self._alike else i)
 
-    def sets(self, i, values):
-        texts = (f"{k}={v if isinstance(v, str) else f'{v:.12g}'}" for k, v in values.items())
-        return [*self.given, "output.frame_interval=-1 s", *texts, f"ice.seed={1000 + i}"]
+    def member(self, i):
+        return f"c001-r{i + 1:03d}"
 
-    def stamp(self, i, values):
-        """The inputs of a run, without its place."""
-        named = [digest(self.case.parent / text).hex() for text in values.values()
-                 if isinstance(text, str) and is_file(self.case.parent, text)]
-        return [self.identity, *named, *self.sets(i, values)]
+    def study(self, n, values):
+        """The study of n fields, without its base."""
+        texts = (text.partition("=") for text in self.given)
+        return {"set": {key.strip(): text.strip() for key, _, text in texts} | {"output.frame_interval": "-1 s"} |
+                {k: v if isinstance(v, str) else f"{v:.12g}" for k, v in values.items()},
+                "fields": "numbered", "seed": FIRST_SEED, "repeats": n}
 
-    def stamped(self, name, i, values, file):
-        try:
-            return json.loads((self.path(name, i) / file).read_text()) == self.stamp(i, values)
-        except (OSError, ValueError):
-            return False
+    def write(self, name, n, values):
+        """NAME.yml; runs of another version of the program are removed."""
+        path = Path(f"{self.home(name)}.yml")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        study = {"base": os.path.relpath(self.case.resolve(), path.parent.resolve()), **self.study(n, values)}
+        for some in (study.get("set", {}), *study.get("variants", {}).values()):
+            some |= {key: None for key, text in some.items() if text in ("", "~", "null")}
+        first = f"# {self.version}\n"
+        if path.exists() and not path.read_text(encoding="utf-8").startswith(first):
+            shutil.rmtree(self.home(name), ignore_errors=True)
+        path.write_text(first + yaml.safe_dump(study, sort_keys=False, allow_unicode=True), encoding="utf-8")
+        return path
 
-    def record(self, name, i, values):
-        """(name, inputs) of a run, in the form of its record."""
-        return f"{self.subject}/{name}/{self.path(name, i).name}", json.dumps(self.stamp(i, values)).encode()
-
-    def kept(self, name, i, values):
-        """Does a run with these inputs exist, with its files unchanged? A warning says why a run is damaged."""
-        path = self.path(name, i)
-        if not self.stamped(name, i, values, "call.json"):
-            return False
-        stamp = integrity.stamp(path)
-        if stamp and self._sound.get(path) == stamp:
-            return True
-        fault = integrity.fault_of_member(path, *self.record(name, i, values))
-        if fault:
-            self.tell(path, f"{path}: {fault}; the run is made again")
-        else:
-            self._sound[path] = stamp
-        return not fault
+    def kept(self, name, i):
+        """Is this run there, with its files unchanged?"""
+        ends, path = self._ends.get(name, ()), self.path(name, i)
+        if i < len(ends):
+            return ends[i] is None
+        if path not in self._sound and name not in self._alike and state_of(path)[0] == FINISHED:
+            made_by = (self.home(name) / "study.resolved.yml").read_bytes()
+            if not integrity.fault_of_member(path, path.name, made_by):
+                self._sound.add(path)
+        return path in self._sound
 
     def tell(self, what, words):
         """A warning, once."""
@@ -174,67 +155,65 @@ class CaseRuns:
             print(f"bergtow {self.subject}: warning: {words}", file=sys.stderr)
         self._told.add(what)
 
-    def call(self, *words):
-        """Run the program within the time left; its exit code and messages, and whether it met that limit."""
-        began = time.monotonic()
-        left = round(max(1.0, self.last - began), 3)
-        code, said = self.calls.run([str(self.program), *map(str, words), "--quiet", "--threads", "1", "--max-wall",
-                               str(left)], stdout=subprocess.DEVNULL, env=os.environ | ONE_THREAD,
-                              pass_fds=[self.lock] if self.lock >= 0 else [])
-        return code, said, stopped_by_limit(code, time.monotonic() - began, left)
-
-    def go_on(self, name, i, values):
-        """Continue a run that an earlier call began; as call(), None where there is none to continue."""
-        path = self.path(name, i)
-        if not (self.stamped(name, i, values, "begun.json") and (path / "checkpoint.h5").exists()):
-            return None
-        done = self.call("resume", path)
-        return None if done[0] in FRESH else done
-
-    def begin(self, name, i, values):
-        path = self.path(name, i)
-        shutil.rmtree(path, ignore_errors=True)
-        path.mkdir(parents=True)
-        (path / "begun.json").write_text(json.dumps(self.stamp(i, values)))
-        t0 = time.monotonic()
-        done = self.call("run", self.case, "-o", path, *(w for text in self.sets(i, values) for w in ("--set", text)))
-        if done[0] == DONE:
-            self.seconds[name] = time.monotonic() - t0
-        return done
-
-    def one(self, name, i, values):
-        """One run, unless it is there already; None, or why it failed."""
-        if self.kept(name, i, values):
-            return None
-        path = self.path(name, i)
-        code, said, spent = self.go_on(name, i, values) or self.begin(name, i, values)
-        if spent:
-            return SPENT
-        if code != DONE:
-            why = (errors_in(said) or [f"exit code {code}"])[0]
-            self.failed[path] = why, code
-            return why
+    def call(self, name, n, values, line):
+        """Let the program run what is missing of n runs, until the budget is spent."""
+        study, began = self.write(name, 1 if name in self._alike else n, values), time.monotonic()
+        before = [state_of(self.path(name, i))[0] for i in range(n)]
+        # failed ones are tried once in each call
+        more = ["--retry-failed"] if FAILED in before[len(self._ends.get(name, ())):] else []
         try:
-            integrity.keep(path, *self.record(name, i, values))
-        except BergtowError as error:
-            self.failed[path] = str(error), IO
-            return str(error)
-        os.replace(path / "begun.json", path / "call.json")
-        self.made += 1
-        return None
+            _, said = run_members(self.program, study, self.home(name), [], self.jobs, self.last - began, not line,
+                                  more, line, pass_fds=[self.lock] if self.lock >= 0 else [])
+        except Refused as error:
+            code = code_of(error.reason)
+            if code == "other_study":
+                shutil.rmtree(self.home(name))
+            elif code == "one_field":
+                self._alike.add(name)
+            else:
+                self.fail(name, n, error)
+                return
+            self.call(name, n, values, line)
+            return
+        for text in said.splitlines():
+            if text.startswith(WARNING):
+                self.tell((name, text), f"{self.home(name)}: {text.removeprefix(WARNING).strip()}")
+        self._ends[name] = [self.outcome(name, i) for i in range(n)]
+        there = [i for i, why in enumerate(self._ends[name]) if why is None]
+        if new := len({self.path(name, i) for i in there if before[i] != FINISHED}):
+            self.made += new
+            self.seconds[name] = (time.monotonic() - began) / -(-new // self.jobs)
 
-    def make(self, name, fields, values):
-        """Runs of these fields, as many at a time as there are jobs: None, or why it failed, of each."""
-        with ThreadPoolExecutor(self.jobs) as pool:
-            try:
-                why = list(pool.map(lambda i: self.one(name, i, values), fields))
-            except BaseException:
-                with held():
-                    self.calls.stop()
-                    pool.shutdown()
-                raise
-        self.refuse_copies(name, [i for i in range(max(fields, default=-1) + 1) if self.kept(name, i, values)])
-        return why
+    def fail(self, name, n, error):
+        """The program refuses a case with these values: each of its runs has failed."""
+        why = error.reason.splitlines()[0]
+        self._ends[name] = [why] * n
+        self.failed |= {self.path(name, i): (why, error.status) for i in range(n)}
+
+    def outcome(self, name, i):
+        path = self.path(name, i)
+        state, code, why = state_of(path)
+        self.failed.pop(path, None)
+        if state == FAILED:
+            self.failed[path] = why, code
+        return {WAITING: SPENT, FAILED: why, FINISHED: None}[state]
+
+    def make(self, name, fields, values, line=None):
+        """The runs of these fields, and of those before them: None, or why it failed, of each of these. line: gets each
+        line that the program prints."""
+        n = max(fields, default=-1) + 1
+        if len(self._ends.get(name, ())) < n or SPENT in self._ends[name][:n]:
+            self.call(name, n, values, line)
+        if name in self._alike and n > 1 and self.kept(name, 0):
+            self.refuse_ice(name)
+        return [self._ends[name][i] for i in fields]
+
+    def refuse_ice(self, name):
+        """Errors: RunError where there is ice that no seed changes, whose scatter is none and decides nothing. Fields
+        without floes are alike, and pass."""
+        if json.loads((self.path(name, 0) / "summary.json").read_text())["n_floes"]:
+            raise RunError(self.case, "the ice is read or given floe by floe, and no seed changes it", "let the "
+                           "program make the ice, by removing ice.outlines, ice.field or floes", CASE)
 
     def code_of_failure(self):
         """Exit code of the first run that failed."""
@@ -247,24 +226,10 @@ class CaseRuns:
             raise RunError(path, f"this run failed{more}: {why}",
                            "the result is without it; remove the cause of the failure", code)
 
-    def refuse_copies(self, name, fields):
-        """Errors: RunError where two of these fields are the same run, whose scatter is none and decides nothing.
-        Fields without floes are alike, and pass."""
-        try:
-            ends = [json.loads((self.path(name, i) / "summary.json").read_text()) for i in fields[:2]]
-        except (OSError, ValueError) as error:  # where no record tells
-            raise RunError(self.path(name, fields[0]), f"a summary cannot be read ({error})",
-                           "remove the folder, and call again") from None
-        first, second = (e.get("state_hash") if e.get("n_floes") else None for e in (ends + [{}, {}])[:2])
-        if first is not None and first == second:
-            raise RunError(self.case, "two fields with seeds of their own end in the same state: the ice is read or "
-                           "given floe by floe, and no seed changes it", "let the program make the ice, by removing "
-                           "ice.outlines, ice.field or floes", CASE)
-
     def there(self, name, n, values):
         """Are n runs there now, or could they be made? False where the budget does not reach so far."""
-        missing = [i for i in range(n) if not self.kept(name, i, values)]
-        expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-len(missing) // self.jobs)
+        missing = sum(not self.kept(name, i) for i in range(n))
+        expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-missing // self.jobs)
         if missing and time.monotonic() + expected > self.end:
             return False
         why = {i: w for i, w in enumerate(self.make(name, range(n), values)) if w}
@@ -292,17 +257,18 @@ def ensemble_made(folder):
         return None
 
 
-def run_members(binary, study, folder, sets, jobs, seconds, quiet=True):
+def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(), line=None, **options):
     """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
-    long as it takes): whether all have settled, finished or failed, and the messages of the program. Errors: RunError
-    where the program refuses the study; a member that fails is none, and the others are gathered as ever."""
-    call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs)]
+    long as it takes): whether all have settled, finished or failed, and the messages of the program. more: words of the
+    call; line and options: as of called(). Errors: RunError where the program refuses the study; a member that fails
+    is none, and the others are gathered as ever."""
+    call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs), *more]
     call += [part for text in sets for part in ("--set", text)]
-    limit = round(max(1.0, seconds)) if np.isfinite(seconds) else np.inf
+    limit = round(max(1.0, seconds), 3) if np.isfinite(seconds) else np.inf
     if np.isfinite(limit):
         call += ["--max-wall", str(limit)]
     before, began = ensemble_made(folder), time.monotonic()
-    code, said = Calls().run(call + ["--quiet"] * quiet, env=os.environ | ONE_THREAD)
+    code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | ONE_THREAD, **options)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
     return not stopped_by_limit(code, time.monotonic() - began, limit), said
