@@ -273,7 +273,7 @@ MUTANTS = {
          "floes that turn stay inside a hull"),
         ("        cell->contacts = aside->contacts;\n", "", "rows of the projection stay"),
         ("row->ln[0] = row->ln[1] = row->lt = row->mu = 0;", "row->mu = 0;", "the projection starts from impulses"),
-        ("    cell->laws.limits = NULL;\n", "", "the projection ends at the bounds of ice"),
+        ("    cell->laws->limits = NULL;\n", "", "the projection ends at the bounds of ice"),
         ("if (limit->record[law] >= 0) return false;", ";", "rafted floes are pushed apart"),
         (" + slip);", ");", "a floe that slides along a turning bar stays inside it"),
         ("        gaps->gap[i] += bt_normal_velocity(contact, i, &d[contact->a]",

@@ -427,7 +427,9 @@ static void cost(sink *to, const bt_checked *c)
     number(to, "cost.us_a_floe_and_step", NULL, " (%.2g us a floe and step at this concentration",
            1e6 * bt_cost_floe_step(input, ice->concentration));
     number(to, "cost.making_of_ice_s", NULL, making > 0 ? "; the making of ice %.2g s of it" : NULL, making);
-    word(to, NULL, NULL, input->ice.splitting.toughness > 0 ? "; without the time that splits and their pieces take)" : ")");
+    if (input->ice.splitting.toughness > 0)
+        word(to, NULL, NULL, "; without the time that splits and their pieces take");
+    word(to, NULL, NULL, ")");
 }
 
 // --- all of it -------------------------------------------------------------------------------------------------------

@@ -319,7 +319,7 @@ def test_no_load_case_begins_that_would_not_end():
     """By the pace of the runs before, with all runs of a pair at once; a shorter one may still fit. Red: the base was
     run, and no time was left for the head sea; runs were begun until the limit stopped them."""
     made, kept = [], set()
-    here = SimpleNamespace(jobs=2, end=design.time.monotonic() + 100, kept=lambda name, i, sets: name in kept,
+    here = SimpleNamespace(jobs=2, end=design.time.monotonic() + 100, kept=lambda name, i: name in kept,
                            make=lambda name, fields, sets: made.append(name) or [None] * len(fields))
     runs = load_cases.Runs(here, range(4), range(2), 600.0, 0.05)  # 30 s a run, 60 s four of them
     assert runs.make({"base": {}, "head-sea": {}}) == "budget" and made == []
@@ -338,7 +338,7 @@ def test_the_pace_is_that_of_the_runs_themselves(monkeypatch):
         made.append(name)
         now[0] += 180.0 if name == "head-sea" else 30.0
         return [None] * len(fields)
-    here = SimpleNamespace(jobs=2, end=250.0, kept=lambda name, i, sets: False, make=make)
+    here = SimpleNamespace(jobs=2, end=250.0, kept=lambda name, i: False, make=make)
     runs = load_cases.Runs(here, range(4), range(2), 600.0, 0.05)
     assert runs.make({"head-sea": {}}) == "budget" and made == ["head-sea"]
     assert runs.make({"start": {}}, runs.few) is None and now[0] == 210

@@ -2,7 +2,6 @@
 """What `run` refuses, `check` refuses: the same message, the same exit code. What `run` goes through with a doubt,
 `check` calls valid with a warning."""
 import json
-import re
 import os
 import random
 import re

@@ -143,8 +143,9 @@ def test_values_set_beside_the_case_are_those_of_the_study(tmp_path, monkeypatch
 @pytest.mark.parametrize("place", ["taken", "taken/deeper"])
 def test_a_file_in_place_of_the_folder(tmp_path, command, place):
     write_case(tmp_path, CASE)
-    (tmp_path / "study.yml").write_text(yaml.safe_dump({"base": "case.yml", "repeats": 2, "parameters": {
-        "ice.friction": {"from": 0.1, "to": 0.3, "distribution": "uniform", "source": "assumed"}}}))
+    (tmp_path / "study.yml").write_text(yaml.safe_dump({
+        "base": "case.yml", "sampling": "latin-hypercube", "samples": 8, "parameters": {"ice.friction": {
+            "from": 0.1, "to": 0.3, "distribution": "uniform", "source": "assumed"}}}))
     (tmp_path / "taken").touch()
     result = script(command, "study.yml" if command == "budget" else "case.yml", "-o", place, cwd=tmp_path)
     assert result.returncode == 4 and result.stderr.endswith(
