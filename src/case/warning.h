@@ -27,7 +27,7 @@
     ROW(OUTRUN, "outrun", "steps of_steps", "a body moved farther than the contact detection looks ahead")             \
     ROW(REBOUNDS_LOWERED, "rebounds_lowered", "steps of_steps", "rebounds that would have added energy were lowered")  \
     ROW(ENERGY_ADDED, "energy_added", "steps of_steps", "contacts added energy")                                       \
-    ROW(OVERLAP, "overlap", "overlap_m share_percent -", "bodies overlap")                                             \
+    ROW(OVERLAP, "overlap", "overlap_m share_percent", "bodies overlap")                                             \
     ROW(CRUSHED, "crushed", "depth_m share_percent", "floes were crushed deeper than the model holds")                 \
     ROW(END_INSIDE, "end_inside", "time_s from_s", "the towing end was within the hull")                               \
     ROW(STALLED, "stalled", "time_s of_s speed_percent", "the towed body stood still, held by the ice")                \

@@ -149,8 +149,9 @@ def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
         assert done.returncode == DONE, done.stderr
         found = json.loads(done.stdout)
         assert found["domain"] == {"length_m": 1500, "width_m": 400, "across": "domain.width",
-                                   "sides": "periodic images",
+                                   "sides": "periodic images", "floe_sizes": pytest.approx(400 / 30),
                                    "body_widths": pytest.approx(5, rel=1e-3), "body_widths_needed": widths,
+                                   "packed_s": None, "packed_way_m": None, "packed_concentration": None,
                                    "load_unbounded": c >= 0.75}
         assert len(found["warnings"]) == (widths is not None) + (c >= 0.75) and found["ice"]["concentration"] == c
         assert found["run"]["n_steps"] == 5 and found["run"]["tow_distance_m"] == 2.5
