@@ -45,7 +45,7 @@ typedef struct bt_law_state {
     bool rising;                    ///< some bounds have a rising part
 } bt_law_state;
 
-/// Room for so many bytes where the contacts are; what was there is lost when there was less.
+/// Room for so many bytes in place of the contacts, which are lost if there was less.
 void bt_cells_make_room(bt_cell *cell, size_t bytes);
 
 /// Room for so many bytes after the contacts, which stay but may be moved; returns where it begins.

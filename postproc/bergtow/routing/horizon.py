@@ -120,7 +120,7 @@ class Horizon:
             moved = np.array(s.drift) * (time - run.frame_times[frame])
             outlines = run.polygons(frame)
             some = np.append(s.moving, np.arange(run.n_start, run.n_floes))
-            some = some[np.isfinite(run.pose(frame)[some, 0])]  # what has split is not there, its pieces are
+            some = some[np.isfinite(run.pose(frame)[some, 0])]  # pieces stand for the floes that split
             ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in some],
                                       thickness=run.thickness[some])
             body = np.array([run["body_x"][-1], run["body_y"][-1]])

@@ -96,7 +96,7 @@ class CaseRuns:
     failed: dict = field(default_factory=dict)   #: {folder: (why, exit code)} of runs that failed in this call
     lock: int = -1         #: of the folder, as locked() gives it
     _ends: dict = field(default_factory=dict)    #: {name: None, or why it failed, of each run that was asked for}
-    _alike: set = field(default_factory=set)     #: names of which no seed changes the ice: all fields are one run
+    _alike: set = field(default_factory=set)     #: names whose ice no seed changes: all fields are one run
     _sound: set = field(default_factory=set)     #: folders of runs that fit their record
     _told: set = field(default_factory=set)      #: runs that are reported
 
@@ -156,7 +156,7 @@ class CaseRuns:
         self._told.add(what)
 
     def call(self, name, n, values, line):
-        """Let the program run what is missing of n runs, until the budget is spent."""
+        """Let the program make those of n runs that are missing, until the budget is spent."""
         study, began = self.write(name, 1 if name in self._alike else n, values), time.monotonic()
         before = [state_of(self.path(name, i))[0] for i in range(n)]
         # failed ones are tried once in each call
