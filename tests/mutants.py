@@ -29,6 +29,14 @@ OBSERVE = ["unit/test_observe", "cli/test_balance.py", "cli/test_tow.py",
 PLAN = "cli/test_route_planner.py::test_"
 WHOLE = "cli/test_splitting.py::test_"
 KNOWN = "cli/test_splitting_answers.py::test_"
+SPLITTING = [f"{WHOLE}a_wedge_splits_a_free_square_at_its_load",
+             f"{WHOLE}a_vertex_that_cannot_go_in_opens_nothing",
+             f"{WHOLE}generations_and_reserve_are_limits_that_are_told",
+             f"{KNOWN}a_split_keeps_momentum_and_angular_momentum",
+             f"{KNOWN}a_split_takes_no_momentum_and_no_energy",
+             f"{KNOWN}the_speed_at_which_a_crushed_corner_splits_a_floe",
+             f"{KNOWN}a_small_floe_rafts_where_a_large_one_splits",
+             "parallel/test_splitting_ranks.py::test_ranks_and_threads_split_alike[2-1]"]
 
 MUTANTS = {
     "src/force/laws.h": (DRAG, [
@@ -844,14 +852,7 @@ MUTANTS = {
         ("if (x->axis == y->axis && study->parameter[y->axis].name != y->text) continue;", "",
          "each value of a parameter has keys of its own"),
     ]),
-    "src/step/pieces.c": ([f"{WHOLE}a_wedge_splits_a_free_square_at_its_load",
-                              f"{WHOLE}a_vertex_that_cannot_go_in_opens_nothing",
-                              f"{WHOLE}generations_and_reserve_are_limits_that_are_told",
-                              f"{KNOWN}a_split_keeps_momentum_and_angular_momentum",
-                              f"{KNOWN}a_split_takes_no_momentum_and_no_energy",
-                              f"{KNOWN}the_speed_at_which_a_crushed_corner_splits_a_floe",
-                              f"{KNOWN}a_small_floe_rafts_where_a_large_one_splits",
-                              "parallel/test_splitting_ranks.py::test_ranks_and_threads_split_alike[2-1]"], [
+    "src/step/pieces.c": (SPLITTING, [
         (".vy = u.y + u.w * dx,", ".vy = u.y,", "pieces do not turn with their parent"),
         ("    bt_domain_follow(world, source);\n", "", "owners of other bodies"),
         ("bodies->gone[record->parent] = 1;", "", "a floe that has split is waited for"),
@@ -859,14 +860,7 @@ MUTANTS = {
         (".inertia = bodies->inertia[i] * (record->polar[k] / bt_splitting_polar(world, i))",
          ".inertia = bodies->inertia[i] * share", "inertia goes with the area"),
     ]),
-    "src/step/splitting.c": ([f"{WHOLE}a_wedge_splits_a_free_square_at_its_load",
-                              f"{WHOLE}a_vertex_that_cannot_go_in_opens_nothing",
-                              f"{WHOLE}generations_and_reserve_are_limits_that_are_told",
-                              f"{KNOWN}a_split_keeps_momentum_and_angular_momentum",
-                              f"{KNOWN}a_split_takes_no_momentum_and_no_energy",
-                              f"{KNOWN}the_speed_at_which_a_crushed_corner_splits_a_floe",
-                              f"{KNOWN}a_small_floe_rafts_where_a_large_one_splits",
-                              "parallel/test_splitting_ranks.py::test_ranks_and_threads_split_alike[2-1]"], [
+    "src/step/splitting.c": (SPLITTING, [
         ("sharp = one && !is_raft_edge(world, cell, j) && (gives_way(world, BT_LAW_CRUSHING, contact) ||",
          "sharp = one && !is_raft_edge(world, cell, j) && (true ||", "rigid wedges"),
         (".opening = force * p->opening[of_b],", ".opening = collision ? 0 : force * p->opening[of_b],",

@@ -2,8 +2,8 @@
 // Contacts of a cell: records, bounds, and the memory of contact laws; and how all of them pass to new cells.
 //
 // bt_cell.contacts [n_contacts] and .gaps hold the contacts of the step. New labels leave none until the next
-// detection: then both arrays have search.n_pairs entries, of which n, impulses and features are set, for detection to
-// take over. While contacts are packed (bt_work_list.packed), batches use the memory of .contacts.
+// detection: then both arrays have search.n_pairs entries, and detection takes over their n, impulses and features.
+// While contacts are packed (bt_work_list.packed), batches use the memory of .contacts.
 #ifndef BERGTOW_CELL_CONTACTS_H
 #define BERGTOW_CELL_CONTACTS_H
 
@@ -57,7 +57,7 @@ void bt_cells_rest(bt_cells *cells);
 /// Take from a cell whose bodies rest what a step needs for its contacts; what contact laws remember stays.
 void bt_cells_idle(bt_cell *cell);
 
-/// Take everything from the cells, of which none is left.
+/// Free what the cells hold; none is left.
 void bt_cells_empty(bt_cells *cells);
 
 /// In the order of (a, b, part, law).

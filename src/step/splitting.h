@@ -109,7 +109,7 @@ int64_t bt_splitting_generation(const bt_splitting *splitting, bt_gid gid);
 /// The floe that was there from the start, and the way from it to gid (bt_split_scatter).
 bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t *path);
 
-/// ∫r²dA of floe i about its centroid, m⁴: of a piece, what was left for it.
+/// ∫r²dA of floe i about its centroid, m⁴; of a piece, as the cut has given it.
 double bt_splitting_polar(const bt_world *world, bt_idx i);
 
 /// Collective. Splits from..n of the history: pieces in the place of their parents, all velocities those at the start
