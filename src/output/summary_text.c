@@ -146,12 +146,17 @@ static void print_forces(const bt_summary *summary, const bt_case *input)
                ? input->reference.source : "no source given", summary->reference_ratio);
 }
 
-static void print_splits(const bt_splitting *splitting)
+static void print_splits(const bt_splitting *splitting, int64_t n_steps)
 {
     const bt_split_totals *totals = &splitting->total;
     printf("  splits              %lld: %lld at a load, %lld bent, %lld burst; cracks of %.4g m, work %.4g J\n",
            (long long)splitting->n, (long long)totals->by_mode[BT_SPLIT_NEAR], (long long)totals->by_mode[BT_SPLIT_FAR],
            (long long)totals->by_mode[BT_SPLIT_BURST], totals->crack_length, totals->work);
+    if (splitting->n > 0)
+        printf("    sizes             floes of %.3g m (median) into pieces of %.3g m, the smallest of %.3g m; in %.2g %% of "
+               "the steps\n",
+               bt_splitting_size(splitting, true, 0.5), bt_splitting_size(splitting, false, 0.5),
+               bt_splitting_size(splitting, false, 0), 100.0 * (double)totals->steps / (double)n_steps);
     printf("    could not split   %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",
            (long long)totals->too_small, (long long)totals->too_old, (long long)totals->rafted,
            (long long)totals->no_id, (long long)totals->deferred);
@@ -203,7 +208,7 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
         if (line) fputs(line, stdout);
         free(line);
     }
-    if (totals->splitting) print_splits(totals->splitting);
+    if (totals->splitting) print_splits(totals->splitting, totals->n_steps);
     bt_summary_window_print(totals->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", totals->wall_time, totals->ranks,
            totals->threads);

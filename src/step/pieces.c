@@ -37,6 +37,34 @@ bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t 
     return gid;
 }
 
+static int ascending(const void *p, const void *q)
+{
+    const double a = *(const double *)p, b = *(const double *)q;
+    return (a > b) - (a < b);
+}
+
+double bt_splitting_size(const bt_splitting *splitting, bool before, double share)
+{
+    if (splitting->n == 0) return NAN;
+    double *size = bt_alloc(2 * (size_t)splitting->n, sizeof *size); // of pieces; 0: it has split
+    size_t n = 0;
+    for (int64_t k = 0; k < splitting->n; k++) {
+        const bt_split_record *record = &splitting->split[k];
+        if (before) {
+            if (record->generation == 1) size[n++] = sqrt(record->area[0] + record->area[1]);
+            continue;
+        }
+        for (int i = 0; i < 2; i++) size[n++] = sqrt(record->area[i]);
+        if (record->generation > 1) size[record->parent - splitting->first] = 0;
+    }
+    qsort(size, n, sizeof *size, ascending);
+    size_t gone = 0;
+    while (size[gone] == 0) gone++;
+    const double found = size[gone + (size_t)(share * (double)(n - 1 - gone))];
+    free(size);
+    return found;
+}
+
 double bt_splitting_polar(const bt_world *world, bt_idx i)
 {
     const bt_bodies *bodies = &world->bodies;

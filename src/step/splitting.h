@@ -109,6 +109,10 @@ int64_t bt_splitting_generation(const bt_splitting *splitting, bt_gid gid);
 /// The floe that was there from the start, and the way from it to gid (bt_split_scatter).
 bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t *path);
 
+/// Size √A, m, that this share of the pieces that are there, or (before) of the floes that they are of, does not
+/// exceed; NaN if none has split.
+double bt_splitting_size(const bt_splitting *splitting, bool before, double share);
+
 /// ∫r²dA of floe i about its centroid, m⁴; of a piece, as the cut has given it.
 double bt_splitting_polar(const bt_world *world, bt_idx i);
 

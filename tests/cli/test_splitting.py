@@ -169,6 +169,11 @@ def test_every_piece_has_its_parent_and_their_areas_add_up(tmp_path):
     there = piece[end[-2]:end[-1]] + len(own)
     assert gone.sum() == (parents < len(own)).sum()
     assert area[:len(own)][~gone].sum() + area[there].sum() == pytest.approx(own.sum(), rel=1e-12)
+    told, pieces = r.summary["splitting"], np.sqrt(area[there])
+    assert made["generation"].max() > 1  # some pieces are gone, too
+    assert told["size_before_m"] == pytest.approx(np.quantile(np.sqrt(own[gone]), 0.5, method="lower"))
+    assert told["piece_size_m"] == pytest.approx(np.quantile(pieces, 0.5, method="lower"))
+    assert told["least_piece_m"] == pytest.approx(pieces.min())
     # outlines: anticlockwise about their centroids
     offsets, v = made["offsets"], made["vertices"]
     for a, b, expected in zip(offsets[:-1], offsets[1:], made["area"]):

@@ -267,10 +267,12 @@ def quality(run):
     if run.summary.get("splitting"):
         at, bent, burst, steps, small, old = (n(f"splitting.{name}") for name in (
             "near", "far", "burst", "steps", "refused_size", "refused_generation"))
+        sizes = (f"floes of {style.short(n('splitting.size_before_m'))} m (median √A) into pieces of "
+                 f"{style.short(n('splitting.piece_size_m'))} m; " if n("splitting.splits") else "")
         rows.append((
             "splits", f"{n('splitting.splits'):.0f}",
             f"{at:.0f} at a load, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks of "
-            f"{style.short(n('splitting.crack_length_m'))} m; kept whole by their size {small:.0f}, by their "
+            f"{style.short(n('splitting.crack_length_m'))} m; {sizes}kept whole by their size {small:.0f}, by their "
             f"generation {old:.0f}"
         ))
     if n("stalled_s", 0):
