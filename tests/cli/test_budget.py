@@ -245,7 +245,7 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     """What made them fail may be what is asked for. They are named, and no script takes the rest for the whole."""
     failing = {(18, 0), (19, 1)}
     folder = with_status(tmp_path / "a", lambda c, r: made_up.FAILED if (c, r) in failing else made_up.FINISHED)
-    monkeypatch.setattr(budget, "run_members", lambda *a: (False, ""))
+    monkeypatch.setattr(budget, "run_members", lambda *a: (False, []))
     (tmp_path / "study.yml").write_text("")
     with pytest.raises(RunError, match=r"2 of 40 members failed \(c019-r001, c020-r002\)"):
         cli.perform("budget", tmp_path / "study.yml", "-o", folder)
