@@ -15,6 +15,7 @@ from bergtow.result import findings
 from bergtow.result.run import Run
 from bergtow.study import analysis, bracket, capability
 from bergtow.study import runs as case_runs
+from bergtow.table import written
 from bergtow.text import capability as capability_text
 
 THRUST = changed(TOW, run__duration=30, run__dt=0.1, output__window_start=10, domain__length=16, domain__width=6,
@@ -409,14 +410,15 @@ def test_its_block_for_a_report(tmp_path):
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
     block = analysis.chapter("capability", findings.read("capability", tmp_path))
-    assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
-    assert "| stood still | failed |" in block["markdown"] and "| 2 of 2 | – | 1 |" in block["markdown"]
-    assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
-    assert "WARNING" not in block["markdown"]  # of an earlier program: nothing tells
+    said = written(block["parts"], True)
+    assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in said
+    assert "| stood still | failed |" in said and "| 2 of 2 | – | 1 |" in said
+    assert "150 kN" in said and "4 runs failed" in said
+    assert "WARNING" not in said  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    said = analysis.chapter("capability", findings.read("capability", tmp_path))["markdown"]
-    assert "at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
+    said = written(analysis.chapter("capability", findings.read("capability", tmp_path))["parts"])
+    assert "WARNING: at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
     for row in rows:

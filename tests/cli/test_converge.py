@@ -18,6 +18,7 @@ from bergtow.errors import RunError
 from bergtow.result.run import Run
 from bergtow.study import converge
 from bergtow.study import runs as case_runs
+from bergtow.table import written
 from bergtow.text import converge as converge_text
 
 
@@ -58,9 +59,9 @@ def test_verdicts():
 
 
 def test_windows_that_are_not_steady_are_counted():
-    said = converge_text.doubtful({"verdicts": {"steady": 5, "too short": 2, "not steady": 1}})
+    said = written(converge_text.doubtful({"verdicts": {"steady": 5, "too short": 2, "not steady": 1}}))
     assert said.startswith("WARNING: of the 8 tows of the case as it is, 1 not steady and 2 too short: ")
-    assert converge_text.doubtful({"verdicts": {"steady": 5}}) == converge_text.doubtful({}) == ""
+    assert converge_text.doubtful({"verdicts": {"steady": 5}}) == converge_text.doubtful({}) == []
 
 
 def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
@@ -235,7 +236,7 @@ def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
     (folder / "converge.json").write_text(json.dumps(found))
     text = script("statistics", folder, "--resamples", 1).stdout
     assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
-    assert "take 20 m, or wider" in text and converge_text.text(found) in text
+    assert "take 20 m, or wider" in text and written(converge_text.content(found)) in text
 
 
 def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monkeypatch):

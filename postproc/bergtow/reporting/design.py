@@ -43,6 +43,7 @@ from bergtow.study import analysis, answer, assumed, domain_width, gear, load_ca
 from bergtow.study.case_file import contents, files, is_study, says, section
 from bergtow.study.domain_width import read_ice_of, reads_ice
 from bergtow.study.runs import CaseRuns, locked, run_members
+from bergtow.table import written
 from bergtow.text import answer as answer_text
 
 import numpy as np
@@ -354,7 +355,7 @@ def answer_of(work, a, plan, began):
                                     case=str(a.file), report="report.html"))
     writing.write_json(found, a.output / "answer.json", a.force)
     print(f"\n{answer_text.text(found)}\n")
-    print("\n".join([*(f"note: {remark}" for remark in answer_text.remarks(found)), *answer_text.warnings(found)]))
+    print(written([[*(f"note: {remark}" for remark in answer_text.remarks(found)), *answer_text.warnings(found)]]))
     print(a.output / "answer.json")
 
 
