@@ -53,8 +53,11 @@ bt_status bt_fail(bt_errors *err, bt_status status, const char *fmt, ...) __attr
 /// The code of the last message. Codes of errors: no_solution, of guard.no_solution (src/run/guard.h); other_study, the
 /// folder of an ensemble holds another one; one_field, no seed changes the ice of a study with several fields.
 void bt_errors_code(bt_errors *err, const char *code);
-/// Print every message on stderr, one a line, prefixed "bergtow: ", with its code in brackets behind it.
+/// Print every message on stderr, one a line, prefixed "bergtow: ", with its code in brackets behind it; where the
+/// environment has BERGTOW_MESSAGES=json, as an object {"warning", "code", "text"} for programs.
 void bt_errors_print(const bt_errors *err);
+/// Print a message that begins with "warning: ".
+void bt_errors_warn(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 /// Release the messages; the list is empty then.
 void bt_errors_free(bt_errors *err);
 /// All messages of `from` behind those of `to`; from is empty then.

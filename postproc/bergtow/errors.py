@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Union
+from typing import NamedTuple, Optional, Union
 
 #: exit codes of the commands, as those of the program (bergtow/base.h: bt_status): done; usage; a case or a map that
 #: is refused; a file that cannot be read or written, and members that are missing from a number; a run that failed;
 #: stopped by the user, a signal or a limit
 OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
+
+
+class Message(NamedTuple):
+    """Of the program, as it writes them with BERGTOW_MESSAGES=json; code: by which decisions are made."""
+    text: str
+    code: Optional[str] = None
+    warning: bool = False
+
+    def __str__(self) -> str:
+        return "warning: " * self.warning + self.text + (f" [{self.code}]" if self.code else "")
 
 
 class BergtowError(Exception):
@@ -34,8 +45,11 @@ class RunError(BergtowError):
 
 
 class Refused(RunError):
-    """An input that the program refuses, with the program's messages, one error a line, and its exit code."""
+    """An input that the program refuses, with the errors among its messages, and its exit code. otherwise: the reason
+    where it gives none."""
 
-    def __init__(self, path: Union[str, os.PathLike[str]], said: str, status: int) -> None:
-        BergtowError.__init__(self, said, status)
-        self.path, self.reason, self.remedy = Path(path), said, ""
+    def __init__(self, path: Union[str, os.PathLike[str]], said: Sequence[Message], status: int,
+                 otherwise: str) -> None:
+        self.errors = [message for message in said if not message.warning] or [Message(otherwise)]
+        self.path, self.reason, self.remedy = Path(path), "\n".join(map(str, self.errors)), ""
+        BergtowError.__init__(self, self.reason, status)

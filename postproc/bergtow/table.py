@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Tables of text or Markdown, and the format of numbers in them."""
+"""Tables of text or Markdown, and the format of numbers in them.
+
+What is written at a terminal and on a page is a list of parts: each a Table, or a list of lines, of which some are
+Warned.
+"""
+from typing import NamedTuple
+
 import numpy as np
 
 from bergtow.result.at_least import AtLeast
@@ -9,6 +15,27 @@ FAR = 10.0  # times a level: an end beyond bounds nothing
 
 def hours_text(hours):
     return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
+
+
+class Table(NamedTuple):
+    """A head and rows of texts; by: the column of which equal cells are one on a page."""
+    head: list
+    rows: list
+    by: int = 0
+
+
+class Warned(str):
+    """A line that warns."""
+
+
+def marked(line):
+    return f"WARNING: {line}" if isinstance(line, Warned) else line
+
+
+def written(parts, markdown=False):
+    """Parts as text or Markdown, with an empty line between two."""
+    return "\n\n".join(table(part.head, part.rows, markdown) if isinstance(part, Table) else
+                       "\n".join(map(marked, part)) for part in parts)
 
 
 PROSE = 40  # characters: a column with a longer cell holds words, not numbers

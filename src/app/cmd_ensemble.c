@@ -71,10 +71,9 @@ static void jobs_start(void *of, int n, int threads)
         const int error = posix_spawn(&pid, "/proc/self/exe", NULL, NULL, words, environ);
         jobs->pid[jobs->n++] = error == 0 ? pid : 0;
         if (error != 0)
-            fprintf(stderr,
-                    "bergtow: warning: job %d of %d could not be started: %s; the others take its members; to have as "
-                    "many, raise the limit on processes (ulimit -u), or ask for fewer with --jobs\n",
-                    i + 2, n + 1, strerror(error));
+            bt_errors_warn("warning: job %d of %d could not be started: %s; the others take its members; to have as "
+                           "many, raise the limit on processes (ulimit -u), or ask for fewer with --jobs",
+                           i + 2, n + 1, strerror(error));
     }
     unsetenv(mark);
     if (bind) setenv("OMP_PROC_BIND", bind, 1);
@@ -92,10 +91,9 @@ static void jobs_end(void *of, bool stop)
         while (jobs->pid[i] > 0 && waitpid((pid_t)jobs->pid[i], &how, 0) < 0 && errno == EINTR) continue;
         // all else it has said itself
         if (!stop && WIFSIGNALED(how))
-            fprintf(stderr,
-                    "bergtow: warning: job %d of %d was ended by signal %d (%s); the others took its members over; "
-                    "where memory is short, ask for fewer jobs with --jobs\n",
-                    i + 2, jobs->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
+            bt_errors_warn("warning: job %d of %d was ended by signal %d (%s); the others took its members over; where "
+                           "memory is short, ask for fewer jobs with --jobs",
+                           i + 2, jobs->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
     }
     jobs->n = 0;
 }

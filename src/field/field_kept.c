@@ -154,11 +154,9 @@ static bool take(const char *path, const char *name, bt_field *field)
                        unpacked(field, name, bytes, size);
     free(bytes);
     bt_errors_free(&why);
-    if (whole) return true;
-    bt_errors_add(&why, "warning: %s: is damaged, or not a field of this program; the field is made again", path);
-    bt_errors_print(&why);
-    bt_errors_free(&why);
-    return false;
+    if (!whole)
+        bt_errors_warn("warning: %s: is damaged, or not a field of this program; the field is made again", path);
+    return whole;
 }
 
 /// By way of a name of this process; not brought to the disk, for a file that is not whole is made anew.

@@ -316,13 +316,9 @@ static bt_status check_ice(const bt_study *study, bt_errors *err)
 static void warn_fixed(const bt_ensemble *ensemble)
 {
     if (ensemble->fixed == 0 || ensemble->s->repeats == 1) return;
-    bt_errors warnings = {0};
-    bt_errors_add(&warnings,
-                  "warning: in %" PRId64 " of %" PRId64 " conditions the ice does not depend on the seed, as it is "
-                  "read from a file, or there is none: the fields of each are one run",
-                  ensemble->fixed, ensemble->s->n_conditions);
-    bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
+    bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions the ice does not depend on the seed, as it is "
+                   "read from a file, or there is none: the fields of each are one run",
+                   ensemble->fixed, ensemble->s->n_conditions);
 }
 
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,

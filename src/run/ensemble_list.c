@@ -191,8 +191,8 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
 static void print_warnings(bt_errors *list)
 {
     const size_t more = list->n > BT_MOST_REPORTED ? list->n - BT_MOST_REPORTED : 0;
-    for (size_t k = 0; k < list->n - more; k++) fprintf(stderr, "bergtow: %s\n", list->text[k]);
-    if (more) fprintf(stderr, "bergtow: warning: and %zu more members that are not sound; see journal.jsonl\n", more);
+    for (size_t k = 0; k < list->n - more; k++) bt_errors_warn("%s", list->text[k]);
+    if (more) bt_errors_warn("warning: and %zu more members that are not sound; see journal.jsonl", more);
 }
 
 void bt_ensemble_share_records(bt_ensemble *ensemble)

@@ -23,16 +23,12 @@
 /// What the user should know of the checkpoint that is taken.
 static void report(const bt_snapshot *snap, const char *said)
 {
-    bt_errors warnings = {0};
-    if (said) bt_errors_add(&warnings, "warning: %s", said);
+    if (said) bt_errors_warn("warning: %s", said);
     const bt_item *item = bt_snapshot_find(snap, "about/revision");
     if (item && item->type == BT_ITEM_TEXT && strcmp(item->data, BT_REVISION))
-        bt_errors_add(&warnings,
-                      "warning: %s was written by revision %s of the program, and this is %s: the run may continue "
-                      "differently",
-                      snap->path, (const char *)item->data, BT_REVISION);
-    bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
+        bt_errors_warn("warning: %s was written by revision %s of the program, and this is %s: the run may continue "
+                       "differently",
+                       snap->path, (const char *)item->data, BT_REVISION);
 }
 
 /// Rank 0. The folder is ours, and what it holds is read; but for the case.

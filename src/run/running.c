@@ -333,10 +333,7 @@ static void step_at_pace(bt_world *world, bt_pace *pace)
 
 static void warn(const char *text, int64_t step)
 {
-    bt_errors warnings = {0};
-    bt_errors_add(&warnings, "warning: --dump-contacts: step %" PRId64 " %s; no file is written", step, text);
-    bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
+    bt_errors_warn("warning: --dump-contacts: step %" PRId64 " %s; no file is written", step, text);
 }
 
 static bt_status dump(const run *running, bt_errors *err)

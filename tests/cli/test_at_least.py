@@ -27,12 +27,12 @@ from bergtow.plot import resistance as plot_resistance  # noqa: E402
 from bergtow.reporting import run as report_run  # noqa: E402
 from bergtow import table as text_table  # noqa: E402
 from bergtow.result.at_least import AtLeast  # noqa: E402
-from bergtow.errors import RunError  # noqa: E402
+from bergtow.errors import Message, RunError  # noqa: E402
 from bergtow.result.run import Run  # noqa: E402
 from bergtow.result.members import Members  # noqa: E402
 from bergtow.reporting.ensemble import OPTIONS  # noqa: E402
 
-ENDED = "step 13: nothing gives way [no_solution]"
+ENDED = Message("step 13: nothing gives way", "no_solution")
 
 
 # ---- the number

@@ -20,6 +20,7 @@ from bergtow.result.run import Run
 from bergtow.stats import load as stat_load
 from bergtow.stats import variance as stat_budget
 from bergtow.study import analysis, budget
+from bergtow.table import written
 from bergtow.text import budget as budget_text
 from bergtow.writing import plain
 from test_loads import SERIES
@@ -149,7 +150,7 @@ def said_of(rows, own, rng):
         "units": "N", "of": "mean_ice_resistance_n", "meaning": "mean", "wanted": 80, "title": "t",
         "assumed": {"a": {"distribution": "uniform", "source": ""}}}
     budget_text.figure(plain(found))
-    return found, budget_text.text(plain(found))
+    return found, written(budget_text.content(plain(found)))
 
 
 def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
@@ -227,7 +228,7 @@ def test_a_study_that_is_cut_short_is_taken_as_far_as_it_is_a_fair_sample(tmp_pa
     found = budget.of_ensemble(e)
     assert (found["members"], found["conditions"], found["waiting"], found["left_out"]) == (30, 20, 9, 1)
     assert np.isfinite(found["mean_95"]).all()
-    said = budget_text.text(plain(found | {"numerics": None}))
+    said = written(budget_text.content(plain(found | {"numerics": None})))
     assert said.startswith("WARNING: 9 of 40 members are still to come") and "beyond the first gap 1 are done" in said
     with pytest.raises(RunError, match="too few members for a budget: 0 conditions, needs 8"):
         budget.of_ensemble(Members(with_status(tmp_path / "b", lambda c, r: r == 0 and c >= 8)))
@@ -237,7 +238,7 @@ def test_tows_with_doubts_are_counted(tmp_path):
     found = budget.of_ensemble(Members(with_status(tmp_path / "a", lambda c, r: made_up.FINISHED,
                                                     window={"n_contact_stretches": 2.0})))
     assert found["doubts"] == {"few": 2}
-    said = budget_text.text(plain(found | {"numerics": None}))
+    said = written(budget_text.content(plain(found | {"numerics": None})))
     assert "WARNING: 2 of 40 tows carry warnings and are in the numbers (2 few;" in said
 
 
@@ -245,7 +246,7 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     """What made them fail may be what is asked for. They are named, and no script takes the rest for the whole."""
     failing = {(18, 0), (19, 1)}
     folder = with_status(tmp_path / "a", lambda c, r: made_up.FAILED if (c, r) in failing else made_up.FINISHED)
-    monkeypatch.setattr(budget, "run_members", lambda *a: (False, ""))
+    monkeypatch.setattr(budget, "run_members", lambda *a: (False, []))
     (tmp_path / "study.yml").write_text("")
     with pytest.raises(RunError, match=r"2 of 40 members failed \(c019-r001, c020-r002\)"):
         cli.perform("budget", tmp_path / "study.yml", "-o", folder)
@@ -298,7 +299,7 @@ def test_a_failed_member_that_is_not_in_the_sample_takes_no_interval_from_it(tmp
     found = budget.of_ensemble(Members(with_status(tmp_path / "a", lambda c, r: status.get((c, r), made_up.FINISHED))))
     assert np.isfinite([*found["mean_95"], *found["fields"]["sd_95"]]).all()
     assert list(found["failed"]) == found["failed_beyond"] == ["c016-r001"]
-    said = budget_text.text(plain(found | {"numerics": None}))
+    said = written(budget_text.content(plain(found | {"numerics": None})))
     assert "c016-r001: it diverged). They lie beyond the first gap" in said and "no intervals" not in said
 
 
@@ -392,7 +393,7 @@ def test_a_study_end_to_end(small):
     minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
     block = analysis.chapter("budget", findings.read("budget", folder / "out"))
-    assert "\n\n| part |" in f"\n\n{block['markdown']}" and len(block["figure"]().axes) == 2
+    assert written(block["parts"], True).startswith("| part |") and len(block["figure"]().axes) == 2
     case = Run(member).case
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}
     def with_it(row, values):

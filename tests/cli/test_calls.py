@@ -98,6 +98,22 @@ def test_a_call_gives_its_code_its_messages_and_its_lines():
     assert (code, said, lines) == (3, "b\n", ["a\n"])
 
 
+def test_a_message_has_its_code_beside_its_text(tmp_path):
+    """With BERGTOW_MESSAGES=json; what is none of the program's own is an error, too."""
+    write_case(tmp_path, changed(LONG, run__dt=0.05, run__duration=1, output__window_start=0.5))
+    (tmp_path / "study.yml").write_text("base: case.yml\nrepeats: 1\nseed: 1\n")
+    words = BERGTOW, "ensemble", "study.yml", "-o", "out", "--quiet"
+    said = [subprocess.run([*words, *more], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1, **case_runs.MESSAGES),
+                           capture_output=True, text=True).stderr for more in ([], ["--set", "tow.speed=0.3 m/s"])]
+    (tmp_path / "out/members/c001-r001/summary.json").write_text("{}")
+    said.append(call(*words[1:], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1, **case_runs.MESSAGES)).stderr)
+    assert said[0] == ""
+    (other,), (damaged,) = (case_runs.messages(text) for text in said[1:])
+    assert (other.code, other.warning) == ("other_study", False) and str(other).endswith("base case [other_study]")
+    assert damaged.warning and not damaged.code and str(damaged).startswith("warning: member c001-r001 is not sound")
+    assert case_runs.messages("MPI: no\n\n") == [case_runs.Message("MPI: no", None, False)]
+
+
 def test_a_second_stop_leaves_no_run_behind(tmp_path):
     """The program takes its time, and is waited for; it is asked once."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -15,6 +15,7 @@ from bergtow.result import findings
 from bergtow.result.run import Run
 from bergtow.study import analysis, bracket, capability
 from bergtow.study import runs as case_runs
+from bergtow.table import written
 from bergtow.text import capability as capability_text
 
 THRUST = changed(TOW, run__duration=30, run__dt=0.1, output__window_start=10, domain__length=16, domain__width=6,
@@ -367,10 +368,10 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
         c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=12))
         search.find(c)
         return c, capability.found_of(c, 0.1)
-    c, found = found_with(lambda i: "diverged" if i == 2 else None)
+    c, found = found_with(lambda i: case_runs.Message("diverged") if i == 2 else None)
     assert found["resolved"] and found["points"][0]["failed"] == 1 and found["points"][0]["fields"] == 11
     assert [t.field for t in c.trials[0.2]] == [1, 2, *range(4, 13)]
-    _, found = found_with(lambda i: "diverged" if i % 3 == 2 else None)
+    _, found = found_with(lambda i: case_runs.Message("diverged") if i % 3 == 2 else None)
     assert not found["resolved"] and found["makes_it"] is None
     # after the second no outcome of twelve fields decides
     assert found["why"] == "at 0.2 2 of 6 runs failed, which leaves it undecided"
@@ -378,7 +379,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
     monkeypatch.setattr(runs, "end", 0.0)
     late = capability.Condition("late", "late", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2))
     search.find(late)
-    assert late.why == case_runs.SPENT and not capability.found_of(late, 0.1)["resolved"]
+    assert late.why == case_runs.SPENT.text and not capability.found_of(late, 0.1)["resolved"]
 
 
 class made_up_run(Told):
@@ -402,21 +403,22 @@ def test_its_block_for_a_report(tmp_path):
              "mean_tension_95": [None, None]}
     hard = point | {"value": 0.9, "made": 0, "mean_speed_95": [None, None]}
     rows = [{"label": f"ice.thickness {h} m", "for": h, "makes_it": 0.5, "does_not": None, "estimate": 0.8,
-             "resolved": False, "why": case_runs.SPENT, "runs": 5, "points": [point, hard]} for h in (0.5, 1.0)]
+             "resolved": False, "why": case_runs.SPENT.text, "runs": 5, "points": [point, hard]} for h in (0.5, 1.0)]
     found = {"case": "case.yml", "title": "a $ in the title", "set": [], "search": "ice.concentration", "unit": "",
              "range": [0.2, 0.95], "resolution": 0.05, "for": "ice.thickness", "for_unit": "m", "speed": 0.3,
              "share": 0.5, "most_fields": 12, "breaking_load": 1e6, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
     block = analysis.chapter("capability", findings.read("capability", tmp_path))
-    assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
-    assert "| stood still | failed |" in block["markdown"] and "| 2 of 2 | – | 1 |" in block["markdown"]
-    assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
-    assert "WARNING" not in block["markdown"]  # of an earlier program: nothing tells
+    said = written(block["parts"], True)
+    assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in said
+    assert "| stood still | failed |" in said and "| 2 of 2 | – | 1 |" in said
+    assert "150 kN" in said and "4 runs failed" in said
+    assert "WARNING" not in said  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    said = analysis.chapter("capability", findings.read("capability", tmp_path))["markdown"]
-    assert "at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
+    said = written(analysis.chapter("capability", findings.read("capability", tmp_path))["parts"])
+    assert "WARNING: at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
     for row in rows:

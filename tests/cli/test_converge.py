@@ -18,6 +18,7 @@ from bergtow.errors import RunError
 from bergtow.result.run import Run
 from bergtow.study import converge
 from bergtow.study import runs as case_runs
+from bergtow.table import written
 from bergtow.text import converge as converge_text
 
 
@@ -58,9 +59,9 @@ def test_verdicts():
 
 
 def test_windows_that_are_not_steady_are_counted():
-    said = converge_text.doubtful({"verdicts": {"steady": 5, "too short": 2, "not steady": 1}})
+    said = written(converge_text.doubtful({"verdicts": {"steady": 5, "too short": 2, "not steady": 1}}))
     assert said.startswith("WARNING: of the 8 tows of the case as it is, 1 not steady and 2 too short: ")
-    assert converge_text.doubtful({"verdicts": {"steady": 5}}) == converge_text.doubtful({}) == ""
+    assert converge_text.doubtful({"verdicts": {"steady": 5}}) == converge_text.doubtful({}) == []
 
 
 def test_a_tow_that_ends_in_the_window_has_no_mean_to_compare():
@@ -235,7 +236,7 @@ def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
     (folder / "converge.json").write_text(json.dumps(found))
     text = script("statistics", folder, "--resamples", 1).stdout
     assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
-    assert "take 20 m, or wider" in text and converge_text.text(found) in text
+    assert "take 20 m, or wider" in text and written(converge_text.content(found)) in text
 
 
 def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monkeypatch):
@@ -249,16 +250,16 @@ def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monk
         asked.append((kind.name, study.end - time.monotonic()))
         study.made += kind.name == "dt" and len(asked) < 8
         enough = kind.name != "dt" or study.end - time.monotonic() > 50
-        return [{"name": kind.name, "judged": "none"} if enough else {"name": kind.name, "why": converge.SPENT}]
+        return [{"name": kind.name, "judged": "none"} if enough else {"name": kind.name, "code": converge.SPENT.code}]
 
     monkeypatch.setattr(converge, "vary", vary)
     kinds = [k for k in converge.KINDS if k.name in ("start", "dt", "tolerance")]
     found = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 90)
     assert [name for name, _ in asked] == ["start", "dt", "tolerance", "dt"]
-    assert [rows[0].get("why") for rows in found.values()] == [None] * 3
+    assert [rows[0].get("code") for rows in found.values()] == [None] * 3
     assert [round(left) for _, left in asked] == [30, 45, 90, 90]
     never, asked[:] = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 30), []
-    assert never["dt"][0]["why"] == converge.SPENT
+    assert never["dt"][0]["code"] == "budget"
 
 
 SHORT = changed(CASE, run__duration=2, output__window_start=1)
@@ -385,7 +386,7 @@ def test_one_call_at_a_time_works_in_a_folder(tmp_path):
 def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
     of = case_runs.state_of
     monkeypatch.setattr(case_runs, "state_of", lambda path: of(path) if "dt-1" not in str(path) else (
-        case_runs.FAILED, 5, "step 3: no sound state; see theory"))
+        case_runs.FAILED, 5, case_runs.Message("step 3: no sound state; see theory")))
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     path = write_case(tmp_path, changed(CASE, run__duration=5, output__window_start=2))
     with pytest.raises(RunError, match=r"dt-1/members/c001-r001: this run failed, and 3 more: step 3: no sound state"
@@ -401,7 +402,7 @@ def test_a_run_that_fails_is_tried_once_in_a_call(tmp_path):
     failing = changed(SHORT, air__wind_x=15, guard__energy=1e-3)
     runs = runs_of(tmp_path, failing)
     why = runs.make("case", [0], {})[0]
-    assert "guard.energy" in why and runs.failed[runs.path("case", 0)] == (why, 5)
+    assert "guard.energy" in why.text and runs.failed[runs.path("case", 0)] == (why, 5)
     starts = lambda: (runs.home("case") / "journal.jsonl").read_text().count('"start"')
     assert len(runs.make("case", [0, 1], {})) == 2 and starts() == 2 and len(runs.failed) == 2
     again = runs_of(tmp_path, failing)
@@ -417,7 +418,7 @@ def test_values_that_the_program_refuses_are_runs_that_failed(tmp_path):
     assert runs.make("dt-1", [0], {}) == [None]
     runs = runs_of(tmp_path, SHORT)
     why = runs.make("dt-1", [0, 1], {"domain.width": -1})
-    assert why[0] == why[1] and "domain.width" in why[0] and not runs.kept("dt-1", 0) and runs.made == 0
+    assert why[0] == why[1] and "domain.width" in why[0].text and not runs.kept("dt-1", 0) and runs.made == 0
     assert set(runs.failed.values()) == {(why[0], 3)} and runs.make("case", [0], {}) == [None]
 
 

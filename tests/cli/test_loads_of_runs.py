@@ -17,6 +17,7 @@ from bergtow.reporting import method as report_method
 from bergtow.result.members import Members
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import design_value as statement
+from bergtow.table import written
 from bergtow.text import loads as loads_text
 
 N = 4
@@ -147,14 +148,15 @@ def test_samples_of_several_steps(tmp_path):
 def test_tables_pictures_and_answer_have_them(towed):
     e, s = towed
     labels = {x["label"] for x in s["conditions"][0]["loads"].values()}
-    for table in loads_text.signals(s, False), loads_text.quantiles(s, False):
+    signals = written(loads_text.signals(s))
+    for table in signals, written(loads_text.quantiles(s)):
         assert all(label in table for label in labels)
     with h5py.File(e.folder(0) / "result.h5") as f:
         x, y = f["panels/middle"][:].T
     p = s["conditions"][0]["panels"]
     most = int(np.argmax(p["mean"]))
     bearing = np.degrees(np.arctan2(y[most], x[most])) % 360
-    assert f"Hull panels, the case: panel {most} (at {bearing:.0f}° from" in loads_text.signals(s, False)
+    assert f"Hull panels, the case: panel {most} (at {bearing:.0f}° from" in signals
     drawn = dict(plot_ensemble.pictures(e, argparse.Namespace(**report_ensemble.OPTIONS), s["conditions"]))
     assert {"above-tow-force", "above-vessel-thrust", "above-line-tension-1", "above-line-tension-2"} <= set(drawn)
     x = s["conditions"][0]["loads"]["vessel_thrust"]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """bergtow route around its planner: positions, members of a map, routes as cases, the towed circle, an honest choice,
 what is kept through a kill, and the receding horizon."""
+import contextlib
 import functools
 import json
 import re
@@ -501,15 +502,18 @@ def test_the_estimate_of_the_tows(monkeypatch):
     assert told == (3, 2, 2.5 * (3 * 2 + 0.5))
 
     def by_tows(*lines):
-        found = {}
-        line = route.first_tow(found, told)
-        for text in lines:
-            line(text + "\n")
+        """lines: wall times of the tows that are finished at each line of the program, {tow: s}."""
+        found, here = {}, {}
+        monkeypatch.setattr(route, "state_of", lambda i: (route.FINISHED if i in here else 0, 0, None))
+        monkeypatch.setattr(route, "Run", lambda i: contextlib.nullcontext(
+            SimpleNamespace(number={"wall_time_s": here[i]}.get)))
+        line = route.first_tow(found, told, range(5))
+        for now in lines:
+            here |= now
+            line("in any words")
         return found.get("estimate_by_tow_s")
-    assert by_tows("5 members: 5 conditions x 1 field, 0 settled before", "[1/5] c002-r001 FAILED, 9 s") is None
-    assert by_tows("[1/5] c003-r001 finished, 4 s, variant m003; about 9 s left", "[2/5] c001-r001 finished, 9 s"
-                   ) == pytest.approx(2 * told[-1])
-    assert by_tows("[1/1] c001-r001 finished, 6 s") == pytest.approx(2 * told[-1])
+    assert by_tows({}, {}) is None and by_tows({0: 7, 1: 3}, {}) is None  # those were there before
+    assert by_tows({1: 1}, {2: 4}, {0: 9}) == by_tows({}, {0: 6}) == pytest.approx(2 * told[-1])
 
 
 def test_the_function_is_the_command(routed, tmp_path):

@@ -42,7 +42,8 @@ from bergtow.result.run import Run
 from bergtow.study import analysis, answer, assumed, domain_width, gear, load_cases
 from bergtow.study.case_file import contents, files, is_study, says, section
 from bergtow.study.domain_width import read_ice_of, reads_ice
-from bergtow.study.runs import WARNING, CaseRuns, locked, run_members
+from bergtow.study.runs import CaseRuns, locked, run_members
+from bergtow.table import written
 from bergtow.text import answer as answer_text
 
 import numpy as np
@@ -86,7 +87,7 @@ class Work:
         """Run the members that are not there yet. True when all have settled. Errors: RunError."""
         settled, said = run_members(self.program, study, self.folder, self.given, self.jobs, self.left(), self.quiet)
         # at the limit the fields stop and the call does not; failed members are named again when all are gathered
-        sys.stderr.writelines(line for line in said.splitlines(keepends=True) if settled or line.startswith(WARNING))
+        sys.stderr.writelines(f"bergtow: {message}\n" for message in said if settled or message.warning)
         return settled
 
 
@@ -354,7 +355,7 @@ def answer_of(work, a, plan, began):
                                     case=str(a.file), report="report.html"))
     writing.write_json(found, a.output / "answer.json", a.force)
     print(f"\n{answer_text.text(found)}\n")
-    print("\n".join([*(f"note: {remark}" for remark in answer_text.remarks(found)), *answer_text.warnings(found)]))
+    print(written([[*(f"note: {remark}" for remark in answer_text.remarks(found)), *answer_text.warnings(found)]]))
     print(a.output / "answer.json")
 
 

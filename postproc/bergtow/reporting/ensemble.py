@@ -2,14 +2,12 @@
 """The contents of the report of an ensemble: the tables of bergtow statistics, the pictures of bergtow plot-ensemble,
 and every member with its doubts.
 
-The tables come from text/ensemble.py as Markdown, so that the page, the terminal and the README of a study say the
-same.
+The tables come from text/ensemble.py, so that the page, the terminal and the README of a study say the same.
 """
 import argparse
 import os
 import sys
 from dataclasses import replace
-from itertools import groupby
 
 from bergtow import table as text_table
 from bergtow.errors import RunError
@@ -42,7 +40,6 @@ NUMERICAL = ("solver.", "run.", "impact.", "estimate.", "ice.seed", "ice.shake",
 DECIDE = ("ice.size", "tow.speed", "body.drag.water_form", "water.current_x", "water.current_y", "air.wind_x",
           "air.wind_y")
 STATUS = {FINISHED: "finished", FAILED: "failed"}
-WARNED = "WARNING: "
 
 
 def unbroken(text):
@@ -50,40 +47,21 @@ def unbroken(text):
     return text.replace(" %", "\u00a0%")
 
 
-def cells(line):
-    return [unbroken(cell.strip()) for cell in line.strip().strip("|").split(" | ")]
-
-
-def blocks(markdown):
-    """The Markdown that ensemble_text writes as [{"kind": "heading", "text"}, {"kind": "table", "head", "rows"},
-    {"kind": "text", "lines", "warnings"}]."""
+def blocks(parts):
+    """Parts of bergtow/table.py as blocks of a page: {"kind": "table", "head", "rows"}, with the column to the left
+    whose equal cells are one, and {"kind": "text", "lines", "warnings"} of lines that follow each other."""
     out = []
-    lines = [line for line in markdown.splitlines() if line.strip()]
-    for kind, some in groupby(lines,
-                              key=lambda line: "heading" if line.startswith("#") else "table"
-                              if line.startswith("|") else "text"):
-        some = list(some)
-        if kind == "heading":
-            out += [{"kind": kind, "text": line.lstrip("# ")} for line in some]
-        elif kind == "table":
-            head, *rows = (cells(line) for k, line in enumerate(some) if k != 1)
-            if head[:2] == ["condition", "load"]:  # rows go by the load: on a page its cell spans them
-                head, *rows = ([row[1], row[0], *row[2:]] for row in (head, *rows))
-            out.append({"kind": kind, "head": head, "rows": rows})
-        else:
-            warned = [line[len(WARNED):] for line in some if line.startswith(WARNED)]
-            out.append({"kind": kind, "lines": [line for line in some if not line.startswith(WARNED)],
-                        "warnings": warned})
+    for part in parts:
+        if isinstance(part, text_table.Table):
+            head, *rows = ([unbroken(scrubbed(text)) for text in (row[part.by], *row[:part.by], *row[part.by + 1:])]
+                           for row in (part.head, *part.rows))
+            out.append(table(head, rows))
+            continue
+        if not out or out[-1]["kind"] != "text":
+            out.append(lines(faint=True))
+        for line in part:
+            out[-1]["warnings" if isinstance(line, text_table.Warned) else "lines"].append(scrubbed(line))
     return out
-
-
-def sections(markdown):
-    """(lines of the section on the members, [(heading, blocks)] of all others)."""
-    found = blocks(markdown)
-    starts = [k for k, b in enumerate(found) if b["kind"] == "heading"]
-    parts = [(found[a]["text"], found[a + 1:b]) for a, b in zip(starts[1:], [*starts[2:], len(found)])]
-    intro = [line for title, some in parts if title == "Members" for b in some for line in b["lines"]]
-    return intro, [part for part in parts if part[0] != "Members"]
 
 
 MARGIN = 1.05  # times the largest value simulated: a lower design value leaves little room for loads not seen
@@ -278,14 +256,13 @@ CHAPTERS = (("Loads", (("Loads", ()), ("Quantiles of loads", ("above", )), ("Ret
 
 def parts(found, drawn):
     """The chapters of CHAPTERS: [(heading, blocks)]."""
-    out, by_title = [], dict(found)
+    out = []
     for heading, some in CHAPTERS:
         blocks_of = []
         for title, begins in some:
-            if title in by_title:
-                blocks_of += [{"kind": "heading", "text": title}] if title != heading else []
-                blocks_of += by_title[title]
-                blocks_of += [p for name, p in drawn.items() if name.startswith(begins)] if begins else []
+            blocks_of += [{"kind": "heading", "text": title}] if title != heading else []
+            blocks_of += blocks(found[title])
+            blocks_of += [p for name, p in drawn.items() if name.startswith(begins)] if begins else []
         out.append((heading, blocks_of))
     return out
 
@@ -294,7 +271,7 @@ def of_part(name, part):
     """(heading, blocks) of a chapter of study/analysis.py."""
     figure = part.get("figure")
     drawn = report_run.picture(name, part["heading"], figure) if figure else None
-    return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
+    return part["heading"], blocks(part["parts"]) + ([drawn] if drawn else [])
 
 
 #: text in place of a chapter that has not been made
@@ -392,10 +369,7 @@ def of_answer(found):
     if found is None:
         return "", []
     from bergtow.text import answer as answer_text
-    said = blocks(scrubbed(answer_text.text(found, markdown=True)))
-    starts = [k for k, b in enumerate(said) if b["kind"] == "heading"]
-    parts_of = [(said[a]["text"], said[a + 1:b]) for a, b in zip(starts, [*starts[1:], len(said)])]
-    return answer_text.sentence(found), [part for part in parts_of if part[0] != answer_text.HEADINGS["plan"]]
+    return answer_text.sentence(found), [(heading, blocks(some)) for heading, some in answer_text.tables(found)]
 
 
 def governs(s):
@@ -431,7 +405,8 @@ def context(folder, place=None, given=None, also=()):
     s = ensemble.statistics(e, options)
     if s["holes"]:
         print(f"bergtow report: warning: {s['holes']}", file=sys.stderr)
-    intro, found = sections(ensemble_text.report(s, markdown=True))
+    found = ensemble_text.sections(s, markdown=True)
+    lead, *intro = found["Members"][0]
     rows, rows_of = provenance(e), members(e, s)
     runs = first_runs(e, s)
     values = [replace(v, value=scrubbed(v.value)) for v in varied(e, runs)]
@@ -439,7 +414,7 @@ def context(folder, place=None, given=None, also=()):
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})
-    warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
+    warned = loads_text.warnings(s) + intro
     told = document.answer_beside(e.path)
     sentence, tables = of_answer(told)
     checked, estimates = independent_check(e, s)
@@ -462,7 +437,7 @@ def context(folder, place=None, given=None, also=()):
         "beside": beside(results, told), "chapters": parts(found, drawn),
         "members": rows_of, "members_by_condition": by_condition(s),
         "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
-        "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
+        "waiting": waiting, "lead": lead, "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
         "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]
     }

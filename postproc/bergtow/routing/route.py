@@ -11,7 +11,6 @@ stopped: tows are those of study/runs.py.
 """
 import base64
 import json
-import re
 import time
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from bergtow.errors import CASE, IO, USAGE, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, situation, tows, verdict
 from bergtow.study import analysis
-from bergtow.study.runs import SPENT, checked, locked
+from bergtow.study.runs import FINISHED, SPENT, checked, locked, state_of
 from bergtow.text import route as words
 
 import numpy as np
@@ -336,15 +335,19 @@ def estimate(runs, s, some, n):
     return replay, plain, ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
 
 
-def first_tow(found, told):
-    """Says how long all tows will take, by the first that ends while others are made: a function for the lines of the
-    program. told: estimate()."""
+def first_tow(found, told, folders):
+    """Says how long all tows will take, by the first that ends while others are made: a function that is called at each
+    line of the program, the first of them before any tow ends. told: estimate(); folders: of the tows."""
     replay, plain, total = told
+    before = None
 
-    def line(text):
-        ended = re.match(r"\[\d+/\d+\] c(\d+)-r001 finished, ([^ ,]+) s", text)
-        if ended and "estimate_by_tow_s" not in found:
-            found["estimate_by_tow_s"] = total * float(ended[2]) / (replay if int(ended[1]) == 1 else plain)
+    def line(_):
+        nonlocal before
+        ended = {i for i, folder in enumerate(folders) if state_of(folder)[0] == FINISHED}
+        before = ended if before is None else before
+        for i in sorted(ended - before if "estimate_by_tow_s" not in found else ())[:1]:
+            with Run(folders[i]) as run:
+                found["estimate_by_tow_s"] = total * run.number("wall_time_s") / (plain if i else replay)
             print(f"by the first tow: {words.amount(found['estimate_by_tow_s'], 's')} in all\n", flush=True)
     return line
 
@@ -422,7 +425,8 @@ def verify(a, w, s, goal, some, n, runs, files, found, told):
     found["left_out"] = [m.left_out for m in runs.members]
     outcomes, by_name = {}, {r["name"]: r for r in found["routes"]}
     for c in some:
-        why = tow(runs, c.name, range(n), c.keys, first_tow(found, told) if c is some[0] else None)
+        why = tow(runs, c.name, range(n), c.keys, first_tow(found, told, [runs.path(c.name, i) for i in range(n)])
+                  if c is some[0] else None)
         if SPENT in why:
             files.write(found)
             raise RunError(folder, f"the budget of {a.budget:g} min is spent before every tow is made",

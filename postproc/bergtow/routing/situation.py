@@ -5,6 +5,7 @@ The floes are those of the run: the field that `bergtow field` writes, and the b
 reads it, floes given by hand and fixed ones included. Nothing of the ice is made in Python.
 """
 import json
+import os
 import subprocess
 from ctypes import byref, c_double
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from bergtow.errors import CASE, USAGE, Refused, RunError
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
-from bergtow.study.runs import errors_in
+from bergtow.study.runs import MESSAGES, messages
 
 import numpy as np
 
@@ -257,9 +258,10 @@ def field(program, case, folder):
     """FOLDER/ice.h5, the floes of a case. Errors: RunError in the program's words."""
     folder.mkdir(parents=True, exist_ok=True)
     out = folder / "ice.h5"
-    code, said = called([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL)
+    code, said = called([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL,
+                        env=os.environ | MESSAGES)
     if code:
-        raise Refused(case, "\n".join(errors_in(said)) or "the field is refused", code)
+        raise Refused(case, messages(said), code, "the field is refused")
     return out
 
 

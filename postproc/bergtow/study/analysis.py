@@ -2,13 +2,14 @@
 """The analyses converge, budget and capability: their options, and the result of each as NAME.json in a folder,
 NAME.png where something can be drawn, a text at the terminal, and a chapter of the report.
 
-The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
+The words of NAME stand in text/NAME.py: content(found), and figure(found) where something can be drawn;
 `found` as read from the file, with None for numbers that are not finite.
 """
 import os
 
 from bergtow import arguments, writing
 from bergtow.errors import RunError
+from bergtow.table import Warned, written
 from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
 from bergtow.text import converge as converge_text
@@ -48,7 +49,7 @@ def keep(name, found, folder, force):
     words, found = KINDS[name][1], writing.plain(found)
     data, *pictures = _files(name, folder)
     writing.write_json(found, data, force)
-    print(words.text(found))
+    print(written(words.content(found)))
     print()
     for picture in pictures:
         writing.save(words.figure(found), picture, force)
@@ -67,9 +68,9 @@ def also(folders):
 
 
 def chapter(name, found):
-    """{"heading", "markdown", "figure"} of the result of a command, for a report; figure is a function without
+    """{"heading", "parts", "figure"} of the result of a command, for a report; figure is a function without
     arguments, or None. found["doubt"]: why the result does not belong to the subject of the report."""
     heading, words = KINDS[name]
     draw = getattr(words, "figure", None)
-    warned = f"WARNING: {found['doubt'][0].upper()}{found['doubt'][1:]}.\n\n" if found.get("doubt") else ""
-    return {"heading": heading, "markdown": warned + words.text(found, True), "figure": draw and (lambda: draw(found))}
+    warned = [[Warned(f"{found['doubt'][0].upper()}{found['doubt'][1:]}.")]] if found.get("doubt") else []
+    return {"heading": heading, "parts": warned + words.content(found), "figure": draw and (lambda: draw(found))}

@@ -202,7 +202,8 @@ def perform(a):
         if isinstance(n := keys.get("samples"), int) and n < stat_budget.LEAST:
             raise RunError(a.study, f"has {n} samples, too few for a budget", f"take {stat_budget.LEAST} or more", CASE)
     converge = read_converge(a.converge, folder)
-    sys.stderr.write(run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)[1])
+    said = run_members(program_path(), a.study, folder, a.set, a.jobs, 60 * a.budget)[1]
+    sys.stderr.writelines(f"bergtow: {message}\n" for message in said)
     e = Members(folder)
     found = of_all(e, a.of or those_there(e), converge)
     analysis.keep("budget", found, folder, a.force)

@@ -28,7 +28,7 @@ from bergtow.result.run import Run, case_value, parse_case, within
 from bergtow.stats import mean as stat_mean
 from bergtow.study import analysis, bracket, domain_width
 from bergtow.study.case_file import files, section
-from bergtow.study.runs import SPENT, CaseRuns, checked, code_of, locked
+from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 
 import numpy as np
 
@@ -149,8 +149,9 @@ class Search:
         for i, w in zip(numbers, why):
             if w == SPENT:
                 return False
-            if code_of(w) == at_least.ENDED:  # which tows it ends depends on their loads
-                raise RunError(self.runs.path(name, i), w, "without it the limit would be that of the other tows", CASE)
+            if w and w.code == at_least.ENDED:  # which tows it ends depends on their loads
+                raise RunError(self.runs.path(name, i), str(w), "without it the limit would be that of the other tows",
+                               CASE)
             if w:
                 failed.append(w)
                 point.failed += 1
@@ -179,7 +180,7 @@ class Search:
             least = next((k for k in ends if ends[k] != {bracket.OPEN}), 1)  # no fewer can decide
             sure = next((k for k in ends if bracket.OPEN not in ends[k]), s.most)
             if not self.add(c, value, max(1, min(max(least, min(self.runs.jobs, sure)), s.most - p.n))):
-                c.why = SPENT
+                c.why = SPENT.text
                 return
 
     def fill(self, c, points, fields):

@@ -205,7 +205,7 @@ def compare(study, kind, base_name, base_values, name, values, margin):
            "same_ice": kind.same_ice or any(key.startswith("ice.extent.") for key in base_values)}
     for n in FIELDS:
         if not (study.there(base_name, n, base_values) and (kind.own or study.there(name, n, values))):
-            return row | {"why": SPENT}
+            return row | {"why": SPENT.text, "code": SPENT.code}
         base = study.measured(base_name, range(n), kind.own or kind.measure)
         other = study.measured(base_name if kind.own else name, range(n), kind.measure)
         if not (np.isfinite(base).all() and np.isfinite(other).all()):
@@ -289,7 +289,7 @@ def window(study, margin):
     else:
         row["why"] = f"{FIELDS[-1]} fields scatter too much"
     if row["judged"] == "open":
-        row.setdefault("why", SPENT)
+        row.setdefault("why", SPENT.text)
     row["recommended"] = {"none": row["from"], "matters": row["to"], "open": None}[row["judged"]]
     return [row]
 
@@ -328,7 +328,7 @@ def varied(study, kinds, margin, tries, end):
                 found[kind.name] = vary(study, kind, margin, tries)
             except RunError as error:
                 found[kind.name] = [{"name": kind.name, "key": kind.key, "judged": "open", "why": error.reason}]
-        waiting = [kind for kind in waiting if found[kind.name][-1].get("why") == SPENT]
+        waiting = [kind for kind in waiting if found[kind.name][-1].get("code") == SPENT.code]
     study.end = end
     return found
 

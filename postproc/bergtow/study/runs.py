@@ -12,7 +12,6 @@ the folder.
 import ctypes
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -24,30 +23,24 @@ from pathlib import Path
 
 from bergtow import _library
 from bergtow._calls import called
-from bergtow.errors import CASE, USAGE, Refused, RunError
+from bergtow.errors import CASE, USAGE, Message, Refused, RunError
 from bergtow.result import integrity
 from bergtow.result.run import Run
 
 import numpy as np
 import yaml
 
-DONE, STOPPED, SPENT = 0, 6, "the budget is spent"  # exit codes of the program; a run that met its limit
+DONE, STOPPED = 0, 6  # exit codes of the program
+SPENT = Message("the budget is spent", "budget")  # of a run that met its limit
 WAITING, FINISHED, FAILED = range(3)  # bt_member_state
-WARNING = "bergtow: warning:"  # in front of a message of the program
+MESSAGES = {"BERGTOW_MESSAGES": "json"}  # as messages() reads them
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 FIRST_SEED = 1000  # of the fields
 
 
-def errors_in(said):
-    """The errors among the messages of the program, without its name."""
-    return [line.removeprefix("bergtow: ") for line in said.strip().splitlines()
-            if not line.startswith(WARNING)]
-
-
-def code_of(why):
-    """The code in brackets behind an error of the program, None where it has none."""
-    found = re.search(r" \[(\w+)\]$", why or "", re.MULTILINE)
-    return found and found[1]
+def messages(said):
+    """The messages of the program; what others write there, such as MPI, is an error without a code."""
+    return [Message(**json.loads(line)) if line[0] == "{" else Message(line) for line in said.splitlines() if line]
 
 
 def stopped_by_limit(code, took, limit):
@@ -72,11 +65,11 @@ def locked(folder):
 
 
 def state_of(folder):
-    """(state, exit code, why) of a member, as the program has it (bergtow/ensemble.h)."""
+    """(state, exit code, Message why) of a member, as the program has it (bergtow/ensemble.h)."""
     code, texts = ctypes.c_int(), [ctypes.c_void_p(), ctypes.c_void_p()]
     state = _library.library().bt_ensemble_state(os.fsencode(folder), ctypes.byref(code), *map(ctypes.byref, texts))
     failure, why = (_library.take_text(text.value) if text.value else "" for text in texts)
-    return state, code.value, (why.splitlines() or [f"exit code {code.value}"])[0] + (failure and f" [{failure}]")
+    return state, code.value, Message((why.splitlines() or [f"exit code {code.value}"])[0], failure or None)
 
 
 @dataclass
@@ -165,19 +158,19 @@ class CaseRuns:
             _, said = run_members(self.program, study, self.home(name), [], self.jobs, self.last - began, not line,
                                   more, line, pass_fds=[self.lock] if self.lock >= 0 else [])
         except Refused as error:
-            code = code_of(error.reason)
-            if code == "other_study":
+            codes = {message.code for message in error.errors}
+            if "other_study" in codes:
                 shutil.rmtree(self.home(name))
-            elif code == "one_field":
+            elif "one_field" in codes:
                 self._alike.add(name)
             else:
                 self.fail(name, n, error)
                 return
             self.call(name, n, values, line)
             return
-        for text in said.splitlines():
-            if text.startswith(WARNING):
-                self.tell((name, text), f"{self.home(name)}: {text.removeprefix(WARNING).strip()}")
+        for message in said:
+            if message.warning:
+                self.tell((name, message), f"{self.home(name)}: {message.text}")
         self._ends[name] = [self.outcome(name, i) for i in range(n)]
         there = [i for i, why in enumerate(self._ends[name]) if why is None]
         if new := len({self.path(name, i) for i in there if before[i] != FINISHED}):
@@ -186,7 +179,7 @@ class CaseRuns:
 
     def fail(self, name, n, error):
         """The program refuses a case with these values: each of its runs has failed."""
-        why = error.reason.splitlines()[0]
+        why = error.errors[0]
         self._ends[name] = [why] * n
         self.failed |= {self.path(name, i): (why, error.status) for i in range(n)}
 
@@ -259,7 +252,7 @@ def ensemble_made(folder):
 
 def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(), line=None, **options):
     """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
-    long as it takes): whether all have settled, finished or failed, and the messages of the program. more: words of the
+    long as it takes): whether all have settled, finished or failed, and the Messages of the program. more: words of the
     call; line and options: as of called(). Errors: RunError where the program refuses the study; a member that fails
     is none, and the others are gathered as ever."""
     call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs), *more]
@@ -268,16 +261,16 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
     if np.isfinite(limit):
         call += ["--max-wall", str(limit)]
     before, began = ensemble_made(folder), time.monotonic()
-    code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | ONE_THREAD, **options)
+    code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | MESSAGES | ONE_THREAD, **options)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
-        raise Refused(study, "\n".join(errors_in(said)) or f"bergtow ensemble ended with exit code {code}", code)
-    return not stopped_by_limit(code, time.monotonic() - began, limit), said
+        raise Refused(study, messages(said), code, f"bergtow ensemble ended with exit code {code}")
+    return not stopped_by_limit(code, time.monotonic() - began, limit), messages(said)
 
 
 def checked(binary, case, sets, *words):
     """What `bergtow check` prints of a case with keys replaced. Errors: RunError in the program's words."""
     done = subprocess.run([str(binary), "check", str(case), *words, *(w for t in sets for w in ("--set", t))],
-                          capture_output=True, text=True)
+                          capture_output=True, text=True, env=os.environ | MESSAGES)
     if done.returncode:
-        raise Refused(case, "\n".join(errors_in(done.stderr)) or "the case is refused", done.returncode)
+        raise Refused(case, messages(done.stderr), done.returncode, "the case is refused")
     return done.stdout

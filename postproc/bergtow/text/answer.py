@@ -3,7 +3,7 @@
 back from answer.json, where what is not finite is None."""
 import math
 
-from bergtow.table import designed, level, number, short, table
+from bergtow.table import Table, designed, level, number, short, written
 from bergtow.text import loads as loads_text
 
 KNOT = 1852 / 3600
@@ -196,8 +196,8 @@ WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
 
 
-def sentence(answer, traced=False):
-    """The answer in one paragraph; traced: each part with the rows that its numbers are from."""
+def sentence(answer):
+    """The answer in one paragraph."""
     out = []
     for part in answer["sentence"]:
         text = WORDS[part["code"]](part["values"], answer)
@@ -205,8 +205,6 @@ def sentence(answer, traced=False):
             out[-1] = f"{out[-1][:-1]} and {text}."
         else:
             out.append(f"{text}.")
-        if traced and part["rows"]:
-            out[-1] = f"{out[-1][:-1]} [{', '.join(part['rows'])}]."
     return " ".join(out)
 
 
@@ -234,7 +232,7 @@ def _behind(row):
     return ", ".join(said) or "–"
 
 
-def load_cases(a, markdown):
+def load_cases(a):
     top = (a["design"] or {}).get("row")
     lower = any("share_below" in c["values"] for c in a["load_cases"])
     rows = [[CASES[c["id"]] + (" *" if c["id"] == top else "" if c["in_design"] else " †"), kn(c["n"]),
@@ -242,13 +240,13 @@ def load_cases(a, markdown):
                  f" of {c['values']['n_tows']} ‡" if "share_below" in c["values"] else ""),
              {"runs": f"{c['runs']} runs", "ensemble": f"{c['runs']} fields",
               "closed_form": "closed form"}[c["by"]], _behind(c)] for c in a["load_cases"]]
-    return table(["load case", "kN", "95 % interval", "kind", "by", "with"], rows, markdown) + \
-        ("\n\n* design value" if top else "") + \
-        ("; † with assumed values, not in it" if any(not c["in_design"] for c in a["load_cases"]) else "") + \
-        ("; ‡ of so few runs it is a lower bound, not a design value" if lower else "")
+    marks = ["* design value"] * bool(top)
+    marks += ["† with assumed values, not in it"] * any(not c["in_design"] for c in a["load_cases"])
+    marks += ["‡ of so few runs it is a lower bound, not a design value"] * lower
+    return [Table(["load case", "kN", "95 % interval", "kind", "by", "with"], rows), *[["; ".join(marks)]] * bool(marks)]
 
 
-def parts(a, markdown):
+def parts(a):
     rows = []
     for c in a["conditions"]:
         value = c["value"]["n"]
@@ -257,23 +255,23 @@ def parts(a, markdown):
                  for k, p in enumerate(x for x in c["parts"] if known(x["n"]) and value and abs(x["n"]) >= 0.0005
                                        * abs(value))]
         rows.append(["", KINDS[c["value"]["kind"]], kn(value), "100 %" if known(value) else "–"])
-    return table(["condition", "part", "kN", "share"], rows, markdown)
+    return [Table(["condition", "part", "kN", "share"], rows)]
 
 
-def assumed(a, markdown):
+def assumed(a):
     rows = [[r["key"], f"{r['at']} ({r['low']} to {r['high']})", kn(r["n_low"]), kn(r["n_high"]),
              kn(r["n_per_tenth"]), "closed form" if r["by"] == "analytic" else f"{r['fields']} common fields",
              r["distribution"] or REASONS.get(r["reason"], "none stated"), r["source"]] for r in a["assumed"]]
     note = NOT_COMBINED.get(a["band"]["why_not_combined"])
     head = ["assumed", "value (range)", "change at the low end, kN", "at the high end, kN", "for a tenth, kN", "by",
             "distribution", "source"]
-    return table(head, rows, markdown) + (f"\n\nNo single figure for fields and ranges: {note}." if note else "")
+    return [Table(head, rows), *[[f"No single figure for fields and ranges: {note}."]] * bool(note)]
 
 
-def speeds(a, markdown):
+def speeds(a):
     rows = [[speed(s["speed_m_s"]), kn(s["needs_n"]), ends(s["needs_n"], s["interval_95"]) or "–", KINDS[s["kind"]],
              kn(s["has_n"]), s["feasible"].replace("_", " ")] for s in a["speeds"]]
-    return table(["speed", "needs, kN", "95 % interval", "kind", "vessel has, kN", "feasible"], rows, markdown)
+    return [Table(["speed", "needs, kN", "95 % interval", "kind", "vessel has, kN", "feasible"], rows)]
 
 
 def plan(p):
@@ -287,22 +285,25 @@ def plan(p):
             "(Estimates: the program's own of its speed, and of how soon the ice in contact is other ice.)")
 
 
-def took(a, markdown):
+def took(a):
     c = a["cost"]
     rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
             ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
             ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
-    return table(["what", "took"], rows, markdown)
+    return [Table(["what", "took"], rows)]
 
 
-def text(answer, markdown=False):
+def tables(answer):
+    """[(heading, parts)] of all but what it took."""
+    return [(HEADINGS[name], make(answer)) for name, key, make in (
+        ("load_cases", "load_cases", load_cases), ("parts", "conditions", parts), ("assumed", "assumed", assumed),
+        ("speeds", "speeds", speeds)) if answer[key]]
+
+
+def text(answer):
     """The sentence and all tables."""
-    out = [sentence(answer, traced=markdown)]
-    for name, make in (("load_cases", load_cases), ("parts", parts), ("assumed", assumed), ("speeds", speeds),
-                       ("plan", took)):
-        if name == "plan" or answer[{"parts": "conditions"}.get(name, name)]:
-            out.append(f"{'## ' if markdown else ''}{HEADINGS[name]}\n\n{make(answer, markdown)}")
-    return "\n\n".join(out)
+    return written([[sentence(answer)], *(part for heading, some in (*tables(answer), (HEADINGS["plan"], took(answer)))
+                                          for part in ([heading], *some))])
 
 
 def remarks(answer):
@@ -318,7 +319,7 @@ def remarks(answer):
 
 
 def warnings(answer):
-    """Those of the statistics, as bergtow statistics has them: "WARNING: ..."."""
+    """Those of the statistics, as bergtow statistics has them."""
     return loads_text.warnings({"conditions": [
         {"label": c["label"], "design": {"tow": {"value": c["value"]["n"] or 0.0}, "warnings": c["warnings"]}}
         for c in answer["conditions"]]})

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The uncertainty budget of bergtow budget as one table and one picture."""
+"""The uncertainty budget of bergtow budget as one table, in parts of bergtow/table.py, and one picture."""
 from bergtow.result.members import listed
-from bergtow.table import number, quantity, scale, table
+from bergtow.table import Table, Warned, number, quantity, scale
 from bergtow.text.converge import percent
 
 import numpy as np
@@ -126,18 +126,18 @@ def warnings(found):
                    "with it once.")
     if builds := found.get("builds"):
         out.append(builds)
-    return [f"WARNING: {line}" for line in out]
+    return [[Warned(line)] for line in out]
 
 
-def text(found, markdown=False):
+def content(found):
     """The table of each number, one below the other."""
-    return "\n\n".join(_text(one, markdown) for one in (found, *found.get("more", [])))
+    return [part for one in (found, *found.get("more", [])) for part in _content(one)]
 
 
-def _text(found, markdown):
+def _content(found):
     head = ["part", "standard deviation", "of the mean", "share of the variance", "Sobol, first order", "total",
             "range and source"]
-    return "\n\n".join([*warnings(found), table(head, rows(found), markdown), notes(found)])
+    return [*warnings(found), Table(head, rows(found)), [notes(found)]]
 
 
 def figure(found):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What bergtow capability found, as tables and as a picture."""
+"""What bergtow capability found, as parts of bergtow/table.py and as a picture."""
 from bergtow.result.members import reading
-from bergtow.table import number, quantity, scale, short, table
+from bergtow.table import Table, Warned, number, quantity, scale, short
 
 import numpy as np
 
@@ -25,14 +25,14 @@ def condition(found, c):
     return c["label"].removeprefix(f"{found['for']} ")
 
 
-def limits(found, markdown=False):
+def limits(found):
     head = [found["for"] or "case", "makes it at", "does not at", "limit about", "runs", "verdict"]
     rows = []
     for c in found["conditions"]:
         verdict = ": ".join(w for w in ("resolved" if c["resolved"] else "not resolved", c["why"]) if w)
         ends = [value(found, c[k]) for k in ("makes_it", "does_not", "estimate")]
         rows.append([condition(found, c), *ends, str(c["runs"]), verdict])
-    return table(head, rows, markdown)
+    return Table(head, rows)
 
 
 def least_of(values):
@@ -40,7 +40,7 @@ def least_of(values):
     return min((x for x in values if x is not None and x < 0), default=0.0)
 
 
-def curve(found, markdown=False):
+def curve(found):
     head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted",
             "speed, m/s (95 %)", "mean tow force", "largest tension: mean", "of all"]
     rows = []
@@ -54,7 +54,7 @@ def curve(found, markdown=False):
                          str(p["failed"]), str(p["parted"]),
                          number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
                          force(max(tension, default=None))])
-    return table(head, rows, markdown)
+    return Table(head, rows)
 
 
 def meaning(found):
@@ -84,9 +84,9 @@ def narrow(found):
         return ""
     values = sorted({v for v, _, _ in few})
     at = value(found, values[0]) + (f" to {value(found, values[-1])}" if len(values) > 1 else "")
-    return (f"WARNING: at {at} the domain is narrow for its ice ({min(w for _, w, _ in few):.3g} body widths; up to "
-            f"{max(n for _, _, n in few):.3g} are asked for): walls or periodic images carry part of the resistance, "
-            "and tows stop too early there; make domain.width larger.")
+    return Warned(f"at {at} the domain is narrow for its ice ({min(w for _, w, _ in few):.3g} body widths; up to "
+                  f"{max(n for _, _, n in few):.3g} are asked for): walls or periodic images carry part of the "
+                  "resistance, and tows stop too early there; make domain.width larger.")
 
 
 def wider(found):
@@ -100,9 +100,8 @@ def wider(found):
             "carry part of the resistance (--keep-width leaves it).")
 
 
-def text(found, markdown=False):
-    return "\n\n".join(part for part in (limits(found, markdown), narrow(found), wider(found), meaning(found),
-                                         curve(found, markdown)) if part)
+def content(found):
+    return [limits(found), *([line] for line in (narrow(found), wider(found), meaning(found)) if line), curve(found)]
 
 
 def _numbers(values):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The verdicts of bergtow converge, a line each, or as a table of the report."""
-from bergtow.table import number, table
+"""The verdicts of bergtow converge, as parts of bergtow/table.py."""
+from bergtow.table import Table, Warned, number
 
 WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
 
@@ -54,18 +54,18 @@ def cells(row):
 
 
 def doubtful(found):
-    """A line on windows of the case that are not those of a steady tow; "" without one."""
+    """[[a line on windows of the case that are not those of a steady tow]]; [] without one."""
     verdicts = found.get("verdicts") or {}
     some = [f"{verdicts[kind]} {kind}" for kind in ("not steady", "too short") if verdicts.get(kind)]
     if not some:
-        return ""
-    return (f"WARNING: of the {sum(verdicts.values())} tows of the case as it is, {' and '.join(some)}: an effect on "
-            "their mean is one on the mean of that stretch of time.\n\n")
+        return []
+    return [[Warned(f"of the {sum(verdicts.values())} tows of the case as it is, {' and '.join(some)}: an effect on "
+                    "their mean is one on the mean of that stretch of time.")]]
 
 
-def text(found, markdown=False):
+def content(found):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
     note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what "
             "it is of the error that other ice for each value would leave. What is below "
             f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
-    return doubtful(found) + table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note
+    return [*doubtful(found), Table(head, [cells(row) for row in found["rows"]]), [note]]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The statistics of an ensemble as tables of text or Markdown."""
+"""The statistics of an ensemble, section by section, in parts of bergtow/table.py."""
 import numpy as np
 
 from bergtow.result.members import listed
-from bergtow.table import FAR, number, pair, scale, table
+from bergtow.table import FAR, Table, number, pair, scale, written
 from bergtow.text import converge as converge_text
 from bergtow.text import loads as loads_text
 
@@ -29,7 +29,7 @@ def unit_of(s):
     return scale([np.median(means)] if means else [], "N")
 
 
-def means(s, markdown):
+def means(s):
     factor, unit = unit_of(s)
     head = [
         "condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
@@ -67,15 +67,12 @@ def means(s, markdown):
     drifting = [
         f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"
     ]
-    if drifting:
-        note += (
-            "\n\nNOT STEADY over all fields: the mean of the fields still changes within the window, by more than one "
-            "run can see. "
-            + "; ".join(drifting) + ". Begin the window later, or run longer.")
-    return table(head, rows, markdown) + "\n\n" + note
+    unsteady = ("NOT STEADY over all fields: the mean of the fields still changes within the window, by more than one "
+                "run can see. " + "; ".join(drifting) + ". Begin the window later, or run longer.")
+    return [Table(head, rows), [note], *[[unsteady]] * bool(drifting)]
 
 
-def estimates(s, markdown):
+def estimates(s):
     factor, unit = unit_of(s)
     labels = {name: e["label"] for c in s["conditions"] for name, e in c["estimates"].items()}
     head = ["condition", f"simulated, {unit}", *labels.values()]
@@ -94,10 +91,10 @@ def estimates(s, markdown):
     note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
             "* outside the range the estimate is meant for. –: no value there. The estimates were not made for each "
             "other's conditions and can differ tenfold; none has been checked against a measured tow here.")
-    return table(head, rows, markdown) + "\n\n" + " ".join([note, *on_top])
+    return [Table(head, rows), [" ".join([note, *on_top])]]
 
 
-def fits(s, markdown):
+def fits(s):
     # of few fields no means are fitted
     of_means = any("refused" not in f for c in s["conditions"] for f in c["fits_of_means"][:2])
     head = ["condition", *["means: best fit", "p", "second", "p"] * of_means, "samples: best fit", "p", "second", "p",
@@ -110,17 +107,16 @@ def fits(s, markdown):
                 cells += ["–", "–"] if "refused" in f else [f["name"], number(f["p_value"], 2)]
         share = c["samples"]["not_above_zero"]
         rows.append(cells + [str(c["samples"]["independent"]), f"{100 * share:.0f} %" if np.isfinite(share) else "–"])
-    return (
-        table(head, rows, markdown) +
-        "\n\nBest two by AICc of normal, lognormal, Weibull, gamma and GEV. p: Anderson–Darling with parametric "
-        "bootstrap, small = does not fit. "
-        "Samples: step means of the resistance, two correlation times apart; those above 0 are fitted.")
+    return [Table(head, rows),
+            ["Best two by AICc of normal, lognormal, Weibull, gamma and GEV. p: Anderson–Darling with parametric "
+             "bootstrap, small = does not fit. "
+             "Samples: step means of the resistance, two correlation times apart; those above 0 are fitted."]]
 
 
-def extremes(s, markdown):
+def extremes(s):
     some = [c for c in s["conditions"] if "refused" not in c["extremes"]]
     if not some:
-        return "No peaks: " + s["conditions"][0]["extremes"]["refused"] + "."
+        return [["No peaks: " + s["conditions"][0]["extremes"]["refused"] + "."]]
     hours = [
         level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
         for level in c["extremes"][kind].get("levels", [])
@@ -166,16 +162,15 @@ def extremes(s, markdown):
         "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest "
         f"peak seen. No bound: the upper end is more than {FAR:g} times the level."
     )
-    return table(head, rows, markdown) + "\n\n" + "\n".join(
-        [text, *loads_text.cut_note(short), *(f"No fit for {r}." for r in sorted(refused))])
+    return [Table(head, rows), [text, *loads_text.cut_note(short), *(f"No fit for {r}." for r in sorted(refused))]]
 
 
-def sensitivity(s, markdown):
+def sensitivity(s):
     x = s["sensitivity"]
     if "refused" in x:
-        return f"No sensitivity: {x['refused']}."
+        return [[f"No sensitivity: {x['refused']}."]]
     if len(set(x["ranks"]).union(x["sobol"].get("indices", ()))) == 1:
-        return "One parameter was varied: there is nothing to share out."
+        return [["One parameter was varied: there is nothing to share out."]]
     kinds = (("mean", x["sobol"]), ("logarithm", x["sobol_of_logarithm"]))
     given = [(of, k["indices"]) for of, k in kinds if "refused" not in k]
     names = set(x["ranks"]).union(*(i for _, i in given))
@@ -207,24 +202,17 @@ def sensitivity(s, markdown):
             f"divide the part that it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter "
             f"of the fields and error of the expansion."
         )
-    return table(head, rows, markdown) + "\n\n" + " ".join(notes)
+    return [Table(head, rows), [" ".join(notes)]]
 
 
 def counted(n, noun="member"):
     return f"{n} {noun}{'' if n == 1 else 's'}"
 
 
-def report(s, markdown=False):
-    """Everything, section by section."""
-    mark = "## " if markdown else ""
-    def heading(title):
-        return f"#{mark}{title}" if markdown else title
+def members(s, markdown):
+    """The lines on the members."""
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
-    lines = [
-        f"{mark}{s['title']}", "", heading("Design tow force"), "", loads_text.design(s, markdown), "",
-        heading("Members"), "",
-        (f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."
-    ]
+    lines = [(f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."]
     if s["waiting"]:
         lines.append(
             f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
@@ -280,12 +268,22 @@ def report(s, markdown=False):
     ]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
-    if s["convergence"]:
-        lines += ["", heading("Convergence"), "", converge_text.text(s["convergence"], markdown)]
-    for title, part in (("Loads", loads_text.signals), ("Quantiles of loads", loads_text.quantiles),
-                        ("Return levels of loads", loads_text.returns),
-                        ("Mean ice resistance", means), ("Comparison with published estimates", estimates),
-                        ("Distributions", fits), ("Peaks of collisions", extremes),
-                        ("Sensitivity of the mean ice resistance", sensitivity)):
-        lines += ["", heading(title), "", part(s, markdown)]
-    return "\n".join(lines)
+    return lines
+
+
+def sections(s, markdown):
+    """{heading: parts}; markdown: not for a terminal, so without the options to take."""
+    return {"Design tow force": loads_text.design(s), "Members": [members(s, markdown)],
+            **({"Convergence": converge_text.content(s["convergence"])} if s["convergence"] else {}),
+            "Loads": loads_text.signals(s), "Quantiles of loads": loads_text.quantiles(s),
+            "Return levels of loads": loads_text.returns(s, markdown), "Mean ice resistance": means(s),
+            "Comparison with published estimates": estimates(s), "Distributions": fits(s),
+            "Peaks of collisions": extremes(s), "Sensitivity of the mean ice resistance": sensitivity(s)}
+
+
+def report(s, markdown=False):
+    """All sections as text."""
+    def heading(text, level):
+        return ["#" * level * markdown + " " * markdown + text]
+    return written([heading(s["title"], 2), *(part for title, some in sections(s, markdown).items()
+                                              for part in (heading(title, 3), *some))], markdown)

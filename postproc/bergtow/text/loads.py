@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The design statement and the statistics of loads as tables of text or Markdown."""
+"""The design statement and the statistics of loads, as parts of bergtow/table.py."""
 from itertools import zip_longest
 
 import numpy as np
@@ -7,7 +7,7 @@ import numpy as np
 from bergtow import table as text_table
 from bergtow.result.members import worded
 from bergtow.stats import load as stat_load
-from bergtow.table import hours_text, number, pair, quantity, scale, table
+from bergtow.table import Table, Warned, hours_text, marked, number, pair, quantity, scale
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 SHOWN = 5, 50, 95, 99  # quantiles in a table, %
@@ -44,11 +44,12 @@ def ends(d, factor):
     return pair((low, text_table.bound(d["value"], high)), factor)
 
 
-def design(s, markdown):
+def design(s):
     """The design statement: a row a condition, the conditions that it holds for, and the warnings."""
     some = _towed(s)
     if not some:
-        return "No design tow force. " + "\n".join(warnings(s))
+        first, *more = map(marked, warnings(s) or [""])
+        return [[f"No design tow force. {first}", *more]]
     found = [c["design"]["tow"] for c in some]
     factor, unit = scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
     lines = any(c["design"]["tension"] for c in some)
@@ -69,7 +70,7 @@ def design(s, markdown):
         f"warnings name. * beyond the hours simulated: extrapolated by the tail."
     ]
     notes += [text for text in (steps(s), holds_for(s)) if text]
-    return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
+    return [Table(head, rows), notes + warnings(s)]
 
 
 def steps(s):
@@ -121,7 +122,7 @@ def _governs(c):
 
 
 def warnings(s):
-    """"WARNING: problem: condition (amount); condition", each problem once."""
+    """"Problem: condition (amount); condition", each problem once."""
     found, every = {}, len(s["conditions"])
     for c in sorted(s["conditions"], key=_governs):
         for w in c["design"]["warnings"]:
@@ -131,10 +132,10 @@ def warnings(s):
         details = {detail for _, detail in where}
         if len(where) == every and len(details) == 1:
             detail = details.pop()
-            out.append(f"WARNING: {sentence(what)}{f' ({detail})' if detail else ''}.")
+            out.append(Warned(f"{sentence(what)}{f' ({detail})' if detail else ''}."))
         else:
             some = [label + (f" ({detail})" if detail else "") for label, detail in where]
-            out.append(f"WARNING: {sentence(what)}: {several(some)}.")
+            out.append(Warned(f"{sentence(what)}: {several(some)}."))
     return out
 
 
@@ -166,7 +167,7 @@ def _unit(s, name):
     return factor, unit, some[0]
 
 
-def signals(s, markdown):
+def signals(s):
     """Mean, standard deviation and largest value of every load."""
     head = ["condition", "load", "mean", "95 %", "sd", "95 %", "largest", "in the start", "unit", "over", "hours"]
     rows = []
@@ -179,11 +180,11 @@ def signals(s, markdown):
                     f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
     if not rows:
-        return "\n".join([nothing(s), *left_out(s)])
+        return [[nothing(s), *left_out(s)]]
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
             "that means differ a little from those of the whole window. In the start: the largest of the means that "
             "begin before the window, which is in no other number. 95 %: interval over fields.")
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *left_out(s), *conversions(s), *panel_lines(s)])
+    return [Table(head, rows, 1), [note, *left_out(s), *conversions(s), *panel_lines(s)]]
 
 
 def nothing(s):
@@ -216,7 +217,7 @@ def estimate(found, factor):
     return number(found["value"] / factor), pair(found["interval_95"], factor)
 
 
-def quantiles(s, markdown):
+def quantiles(s):
     """Quantiles of every load with their intervals."""
     rows = []
     for name in names(s):
@@ -226,9 +227,9 @@ def quantiles(s, markdown):
             return [first["label"], *(v if ends == "–" else f"{v} ({ends})" for v, ends in cells), unit]
         rows += _rows_of(s, name, cells)
     if not rows:
-        return nothing(s)
-    return table(["condition", "load", *(f"{q} % of the time below" for q in SHOWN), "unit"], rows, markdown) + \
-        "\n\nOf the same moving mean. Brackets: 95 %, over fields."
+        return [[nothing(s)]]
+    return [Table(["condition", "load", *(f"{q} % of the time below" for q in SHOWN), "unit"], rows, 1),
+            ["Of the same moving mean. Brackets: 95 %, over fields."]]
 
 
 def conversions(s):
@@ -280,7 +281,7 @@ def returns(s, markdown):
         refused = sorted({x[kind]["refused"] for c in s["conditions"] for x in c["loads"].values() for kind in NAMES
                           if "refused" in x[kind]})
         more = f"; and {len(refused) - 1} more reasons" if len(refused) > 1 else ""
-        return "No return levels" + (f": {refused[0].partition(';')[0]}{more}." if refused else ".")
+        return [["No return levels" + (f": {refused[0].partition(';')[0]}{more}." if refused else ".")]]
     head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
     rows, refused, short = [], {}, []
     for name in names(s):
@@ -310,7 +311,7 @@ def returns(s, markdown):
     # what to do about it is for a terminal
     said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
             for (load, tail), some in refused.items())
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *cut_note(short), *said])
+    return [Table(head, rows, 1), [note, *cut_note(short), *said]]
 
 
 def level(found, factor):
