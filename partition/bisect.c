@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recursive coordinate bisection: split along the longer side where the weight divides as the parts do, and again.
+// Recursive coordinate bisection: split across the longer side, with the weight in proportion to the parts, and repeat.
 // (Berger & Bokhari 1987, IEEE Trans. Comput. C-36.) Needs no graph and cannot fail: the fallback behind METIS.
 #include "partition/cut.h"
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The cut of a cell graph: groups contracted, heavy vertices set apart, ways to cut it compared, labels kept close to
-// the old.
+// The cut of a cell graph: groups contracted, heavy vertices set apart, cuts compared, labels kept close to the old.
 //
-//   1. Every group becomes one vertex; edges between the same two vertices are added up.
-//   2. While the heaviest vertex weighs a share (what is left / parts left) or more, it gets a part of its own. What
-//      remains is divided into the other parts, and balance is judged on those: the vertex cannot be divided, and
+//   1. Every group becomes one vertex; parallel edges are summed.
+//   2. While the heaviest vertex weighs a share (weight left / parts left) or more, it gets its own part. The rest
+//      is divided into the other parts, and balance is judged on those: the vertex cannot be divided, and
 //      METIS, given one, misses the balance of all others.
 //   3. Three cuts: the labels before, METIS, and coordinate bisection, which costs a tenth of METIS, cannot fail and
 //      has the smaller cut where the field is even; each refined (refine.c). Of those in balance the smallest edge cut
@@ -21,11 +20,11 @@
 
 #include "bergtow/base.h"
 
-static const double KEEP = 1.25;  // what the old labels may be worse by
-// imbalances within this factor of the best count as equal when none is within the tolerance
+static const double KEEP = 1.25;  // factor by which the old labels may be worse
+// imbalances within this factor of the best count as equal if none is within the tolerance
 static const double CLOSE = 1.1;
 
-// A graph that owns its arrays, and where the vertices of the larger graph went (−1 nowhere).
+// A graph that owns its arrays, and the map of the vertices of the larger graph to its own (−1 = none).
 typedef struct owned {
     bt_graph g;
     int *start, *to, *of;
@@ -43,7 +42,7 @@ static void owned_free(owned *o)
     free(o->at);
 }
 
-// The graph of the vertices of `graph` mapped by of [graph->n] onto n vertices: weights and edges added up, loops
+// The graph of the vertices of `graph` mapped by of [graph->n] onto n vertices: weights and edges summed, loops
 // dropped.
 static owned mapped(const bt_graph *graph, int n, int *of)
 {
@@ -86,7 +85,7 @@ static owned mapped(const bt_graph *graph, int n, int *of)
     return o;
 }
 
-// Numbers the vertices left when each group is one, in the order of their first member.
+// Number the vertices of the contracted graph, in the order of their first member.
 static int contracted_numbers(const bt_graph *graph, int *of)
 {
     int n = 0, top = -1;
@@ -118,7 +117,7 @@ static int heaviest_first(const void *a, const void *b)
     return (p->vertex > q->vertex) - (p->vertex < q->vertex);
 }
 
-// Number of heavy vertices, the first ones of order; rest: weight of the others.
+// Number of heavy vertices, which are the first of `order`; rest: weight of the others.
 static int set_apart(const bt_graph *graph, int n_parts, heavy *order, int64_t *rest)
 {
     *rest = 0;
@@ -137,7 +136,7 @@ static int set_apart(const bt_graph *graph, int n_parts, heavy *order, int64_t *
 typedef struct trial {
     int *part;
     bt_cut_method method;
-    double excess; // heaviest part of more than one vertex against the share, less 1
+    double excess; // heaviest part of more than one vertex / share − 1
     int64_t cut;
     int n_empty;
 } trial;
@@ -178,8 +177,8 @@ static const trial *better_of(const trial *attempt, int n, double tolerance)
     return kept && (double)kept->cut <= KEEP * (double)best->cut ? kept : best;
 }
 
-// The label that most of a contracted vertex's weight had before, −1 for none; then that of the neighbour it shares
-// most with. false if there were no labels before to speak of: a part had none.
+// The previous label of most of a contracted vertex's weight; if there is none, that of the neighbour with the heaviest
+// edge. false if the previous labels are useless: a part had no vertex.
 static bool labels_before(const bt_graph *graph, const bt_graph *whole, const int *of, const int *before, int n_parts,
                           int *part)
 {
@@ -219,7 +218,7 @@ static bool labels_before(const bt_graph *graph, const bt_graph *whole, const in
     return good;
 }
 
-// A cut of the light vertices by METIS or bisection, a part each for the heavy ones.
+// Cut the light vertices by METIS or bisection; each heavy one gets its own part.
 static bool cut_anew(const bt_graph *graph, const owned *light, int n_heavy, const heavy *order, int n_parts,
                      double tolerance, trial *attempt)
 {
@@ -280,7 +279,7 @@ static void relabel(const bt_graph *graph, int n_parts, const int *before, int *
     free(taken);
 }
 
-// Labels of the contracted graph c, of which whole is the original.
+// Label the contracted graph c; whole: the original graph.
 static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n_parts, double tolerance,
                                     const int *before, int *part)
 {
@@ -302,7 +301,7 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
     trial attempt[3];
     for (int i = 0; i < 3; i++) attempt[i].part = bt_alloc((size_t)graph->n, sizeof *attempt[i].part);
     const trial *best = attempt;
-    if (n_light <= rest_parts) { // every vertex a part of its own
+    if (n_light <= rest_parts) { // every vertex gets its own part
         for (int v = 0; v < graph->n; v++) attempt[0].part[v] = v;
         attempt[0].method = BT_CUT_NONE;
     } else {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The map of the cells: which rank owns which, who holds the bodies of one, and how the map is cut anew.
+// The map of the cells: owners, holders of the bodies of a cell, and renewal of the map.
 #include "partition/division.h"
 
 #include <math.h>
@@ -8,13 +8,13 @@
 
 #include "partition/cut.h"
 
-#define TOLERANCE 0.01 // asked of the cut
-/// What a sweep costs two ranks and not one, s: exchanges of four phases, and a sum; the rest of a step is as much as
-/// so many sweeps.
+#define TOLERANCE 0.01 // imbalance accepted from the cut
+/// Extra cost of a sweep with two ranks, s: exchanges of four phases, and a sum; the rest of a step costs as much as
+/// REST sweeps.
 #define EXCHANGES 40e-6
 #define REST 5
-#define STAYS 1.25 // times what another division must be better by: each change moves the bodies
-/// Bodies that one rank takes at most: some gigabytes.
+#define STAYS 1.25 // factor by which another division must be better: each change moves the bodies
+/// Largest number of bodies for a single rank: some gigabytes.
 enum { MOST_UNDIVIDED = 2000000 };
 
 int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y)
@@ -72,7 +72,7 @@ double bt_division_large_path(const bt_world *world)
     return most;
 }
 
-/// Cells that large movable bodies may meet floes of, until they have moved by two floes.
+/// Mark the cells whose floes large movable bodies may meet before they have moved by two floes.
 static void mark_under(bt_world *world)
 {
     const bt_cells *cells = world->cells;
@@ -92,7 +92,7 @@ static void mark_under(bt_world *world)
     }
 }
 
-/// Owners of the new box from the map before: the rank of the place, or of the nearest place there was.
+/// Owners in the new box from the previous map: the rank of the place, or of the nearest place in that map.
 static int *carry_over(const bt_world *world, const bt_domain *before)
 {
     const bt_cells *cells = world->cells;
@@ -108,7 +108,7 @@ static int *carry_over(const bt_world *world, const bt_domain *before)
     return owner;
 }
 
-/// Work counted since the last check, on the places of the new box: a cut that is due now is made from it.
+/// Work counted since the last check, on the places of the new box, for a cut that is due now.
 static double *carry_work(const bt_world *world, const bt_domain *before)
 {
     const bt_cells *cells = world->cells;
@@ -123,7 +123,7 @@ static double *carry_work(const bt_world *world, const bt_domain *before)
     return work;
 }
 
-/// Work of every cell of the box, over the ranks: what was counted, or the number of bodies.
+/// Work of every cell of the box, over the ranks: as counted, or from the number of bodies.
 static int64_t *gather_work(bt_world *world)
 {
     const bt_domain *domain = world->domain;
@@ -135,7 +135,7 @@ static int64_t *gather_work(bt_world *world)
         const int64_t p = bt_division_place(world, bodies->cell[i][0], bodies->cell[i][1]);
         if (p >= 0) work[p] += domain->distributed ? (int64_t)(BT_WORK_AT_REST * 1e9) : 1;
     }
-    if (!domain->distributed) return work; // every rank has counted them all
+    if (!domain->distributed) return work; // every rank has counted all bodies
     for (size_t p = 0; p < n; p++)
         work[p] += (int64_t)(1e9 * domain->work[p] / (double)(domain->steps > 0 ? domain->steps : 1));
     MPI_Allreduce(MPI_IN_PLACE, work, (int)n, MPI_INT64_T, MPI_SUM, domain->comm->mpi);
@@ -146,13 +146,13 @@ bool bt_division_is_for_one(const bt_world *world, double work)
 {
     const bt_domain *domain = world->domain;
     if (domain->comm->divides || world->bodies.n_global > MOST_UNDIVIDED) return false;
-    if (domain->steps == 0) return !domain->distributed; // nothing is known of it before the first step
+    if (domain->steps == 0) return !domain->distributed; // unknown before the first step
     const double saved = work * (1 - 1.0 / domain->comm->size);
     const double lost = EXCHANGES * (REST + (double)domain->sweeps / (double)domain->steps);
     return saved * (domain->undivided ? 1 / STAYS : STAYS) < lost;
 }
 
-/// The graph of the cells: edges to the eight neighbours, weighted with what a cut there makes the ranks hold twice.
+/// Cut the graph of the cells: edges to the eight neighbours, weighted with the bodies held twice if cut there.
 static void cut_map(bt_world *world)
 {
     const bt_cells *cells = world->cells;
@@ -210,7 +210,7 @@ static void cut_map(bt_world *world)
     MPI_Bcast(domain->owner, n, MPI_INT, 0, domain->comm->mpi);
     MPI_Bcast(&domain->stats.cut, 1, MPI_DOUBLE, 0, domain->comm->mpi);
     MPI_Bcast(&fresh, 1, MPI_DOUBLE, 0, domain->comm->mpi);
-    if (domain->distributed && !domain->undivided) { // the first division knew no work yet
+    if (domain->distributed && !domain->undivided) { // the first division did not know the work
         domain->stats.repartition_imbalance += fresh;
         domain->stats.worst_repartition_imbalance = bt_max(domain->stats.worst_repartition_imbalance, fresh);
     }
@@ -234,7 +234,7 @@ void bt_division_map(bt_world *world, bool cut)
     if (cut || !domain->distributed) {
         cut_map(world);
         memset(domain->work, 0, (size_t)domain->n_x * (size_t)domain->n_y * sizeof *domain->work);
-        // only now: where floes drift through the cells, labels are renewed more often than the balance is looked at
+        // only now: if floes drift through the cells, labels are renewed more often than the balance is checked
         domain->steps = domain->sweeps = 0;
     }
     domain->due = false;

@@ -7,17 +7,17 @@
 #include "partition/domain.h"
 #include "space/pairs.h"
 
-/// What is exchanged with one other rank.
+/// Data exchanged with one other rank.
 typedef struct bt_link {
     int rank;
-    // bodies that this rank's cells of a phase may change and the other holds, and the reverse; both sides list them in
+    // bodies that this rank's cells of a phase may change and the other rank holds, and the reverse; both list them in
     // the same order
     bt_idx *send[BT_PHASES], *receive[BT_PHASES];   ///< [n_...] indices of bodies
     bt_idx n_send[BT_PHASES], n_receive[BT_PHASES];
-    // of these, the ones that contacts of this step touch: at the front of chosen lists
+    // those of these that contacts of this step touch
     bt_idx *send_now[BT_PHASES], *receive_now[BT_PHASES];
     bt_idx n_send_now[BT_PHASES], n_receive_now[BT_PHASES];
-    double *out, *in;                               ///< [3 × longest list] values on the way
+    double *out, *in;                               ///< [3 × longest list] values in transit
     uint8_t *flags_out, *flags_in;                  ///< [sum of the lists] touched or not
     bt_idx n_flags_out, n_flags_in;
     // cells of which the other must know a value, and the reverse
@@ -29,19 +29,19 @@ typedef struct bt_link {
 
 struct bt_domain {
     const bt_comm *comm;
-    bool distributed;        ///< bodies are where the map says; before that every rank holds all
+    bool distributed;        ///< bodies are distributed by the map; before that every rank holds all
     bool due;                ///< a new division is due
     bool undivided;          ///< rank 0 has all cells
     // the map: owner of every cell of the box
     int *owner;              ///< [n_y][n_x] rank
     uint8_t *under;          ///< [n_y][n_x] 1 = near a large movable body: its rank holds the cell too
     int32_t low_x, low_y, n_x, n_y;
-    double side_x, side_y;   ///< of the cells it was made for, m
+    double side_x, side_y;   ///< of the cells for which it was made, m
     int large_owner;         ///< rank that owns the large movable bodies
     double large_path;       ///< path of the large movable bodies when the division was made, m
-    /// way of the water through cells that do not move with it (periodic directions), since then, m
+    /// displacement of the water through cells that do not move with it (periodic directions), since then, m
     double drift;
-    uint8_t *owned;          ///< [n bodies] this rank answers for the body
+    uint8_t *owned;          ///< [n bodies] this rank owns the body
     bt_idx cap_owned;
     // links
     bt_link *link;
@@ -52,21 +52,21 @@ struct bt_domain {
     // work since the last check
     double *work;            ///< [n_y][n_x] of this rank's cells, s, modelled
     int64_t steps;           ///< since then
-    int64_t sweeps;          ///< in them
-    double exchange_s;       ///< wall time in exchanges since asked
+    int64_t sweeps;          ///< in these steps
+    double exchange_s;       ///< wall time in exchanges since the last query
     bt_domain_stats stats;
 };
 
-/// Work of a body at rest, s: what a cell counts for before anything has been measured (partition/README.md).
+/// Work of a body at rest, s: the weight of cells before anything has been counted (partition/README.md).
 #define BT_WORK_AT_REST 2e-9
 
 /// Place of cell (x, y) in the map, −1 outside.
 int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y);
 
-/// Would one rank alone be faster, by the modelled work of a step on all ranks, s?
+/// Would one rank alone be faster? work: modelled work of a step on all ranks, s.
 bool bt_division_is_for_one(const bt_world *world, double work);
 
-/// Longest path of a large movable body, m; −1 = there is none.
+/// Longest path of a large movable body, m; −1 if there is none.
 double bt_division_large_path(const bt_world *world);
 
 /// Rank that owns cell (x, y) of the map; −1 outside.
@@ -76,15 +76,15 @@ enum { BT_MAX_SHARERS = 5 };
 /// Ranks that hold the bodies of cell (x, y), each once; returns their number.
 int bt_division_sharers(const bt_world *world, int32_t x, int32_t y, int rank[BT_MAX_SHARERS]);
 
-/// Cell of the phase that touches the bodies of cell (x, y); false when there is none.
+/// The cell of the phase that touches the bodies of cell (x, y); false if there is none.
 bool bt_division_toucher(const bt_world *world, int phase, int32_t x, int32_t y, int32_t out[2]);
 
 void bt_halo_free(bt_domain *domain);
 
-/// Collective. Ends the run when bodies are lost or doubled.
+/// Collective. End the run if bodies are lost or duplicate.
 void bt_domain_check(bt_world *world);
 
-/// Collective. A map for the cells as they are now: renewed from the one before, or cut anew.
+/// Collective. Make a map for the present cells: renewed from the previous one, or (cut) cut anew.
 void bt_division_map(bt_world *world, bool cut);
 
 #endif

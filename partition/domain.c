@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The division of a world among ranks as the program sees it: sums over the ranks, the measure of balance.
+// The division of a world among ranks, as used by the program: sums over the ranks, the measure of balance.
 //
-// Work of a cell, modelled from counts rather than timed, so that a run can be repeated: what a contact, a pair and a
-// body cost in a step. Timing single cells costs more than it tells, and noise would move cells to and fro.
+// The work of a cell is modelled from counts and the costs of a contact, a pair and a body in a step, not timed, so
+// that a run is reproducible. Timing single cells costs more than it tells, and noise would move cells to and fro.
 #include "partition/domain.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 
 #include "partition/division.h"
 
-#define IMBALANCE 0.05 // of the work, above which cells are divided anew
+#define IMBALANCE 0.05 // of the work; above it cells are divided anew
 enum { CHECK_STEPS = 10 };
 // Seconds, measured on one core (see partition/README.md): only their ratios matter.
 #define CONTACT_SWEEP 30e-9
@@ -164,7 +164,7 @@ void bt_domain_note(bt_world *world)
     bt_domain *domain = world->domain;
     if (!domain) return;
     const bt_cells *cells = world->cells;
-    int64_t large = 0; // the large bodies' own work is done where they are
+    int64_t large = 0; // the work of large bodies is done by their owner
     while (large < (int64_t)domain->n_x * domain->n_y - 1 && !domain->under[large]) large++;
     for (bt_idx k = 0; k < cells->n; k++) {
         bt_cell *cell = &cells->cell[k];

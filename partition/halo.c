@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What ranks exchange: velocities of shared bodies after each phase, values of cells, and what only some of them know.
+// Exchanges between ranks: velocities of shared bodies after each phase, values of cells, and data known only to some.
 //
 // Lists. A body of cell t is touched in phase p by one cell, T_p(t), whose rank sends its velocity to all others that
-// hold t. Both sides go through the cells they hold in the same order, so they make the same lists without
-// communication. Of these bodies few have a contact in a given step: after the detection the sender says which (one
-// byte each), and only those travel in the sweeps.
+// hold t. Both sides traverse the cells that they hold in the same order, so they make the same lists without
+// communication. Few of these bodies have a contact in a given step: after the detection the sender marks them (one
+// byte each), and only these are sent in the sweeps.
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,7 +58,7 @@ static bool is_under(const bt_domain *domain, const bt_cell *cell)
     return domain->under[(int64_t)(cell->y - domain->low_y) * domain->n_x + cell->x - domain->low_x];
 }
 
-/// Lists of bodies for the cells that this rank holds.
+/// Make the lists of bodies for the cells that this rank holds.
 static void list_bodies(bt_world *world)
 {
     bt_domain *domain = world->domain;
@@ -89,9 +89,9 @@ static void list_bodies(bt_world *world)
     }
 }
 
-/// Does rank r hold a cell beside (x, y)? It then owns one from (x − 2, y − 2) to (x + 1, y + 1), whose bounds depend
-/// on the speed there, or has floes there that a large body may move; and what it sweeps depends on how far (x, y) has
-/// converged.
+/// Mark the ranks that hold a cell next to (x, y). Such a rank owns a cell from (x − 2, y − 2) to (x + 1, y + 1), whose
+/// bounds depend on the speed there, or has floes there that a large body may move; and its sweeps depend on the
+/// convergence in (x, y).
 static void near_ranks(const bt_world *world, int32_t x, int32_t y, uint8_t *near)
 {
     const bt_cells *cells = world->cells;
@@ -105,7 +105,7 @@ static void near_ranks(const bt_world *world, int32_t x, int32_t y, uint8_t *nea
         }
 }
 
-/// Lists of cells of which a value is sent: at the border of the map's parts only.
+/// Lists of cells whose value is sent: only at the borders of the parts of the map.
 static void list_sent(bt_world *world)
 {
     bt_domain *domain = world->domain;
@@ -151,7 +151,7 @@ static void mark_owned(bt_world *world)
         const bool own = k < cells->n - 1 ? cell->own : domain->comm->rank == 0;
         for (bt_idx i = cell->first; i < cell->end; i++) domain->owned[i] = own;
         if (k < cells->n - 1) held[own] += cell->end - cell->first;
-        // Whoever holds a body of the block waits for what the cell does to it.
+        // Every rank that holds a body of the block waits for the changes by the cell.
         const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
         cell->border = k == cells->n - 1 && !domain->undivided;
         for (int j = 0; j < 4 && cell->own && k < cells->n - 1; j++) {
@@ -167,7 +167,7 @@ static void mark_owned(bt_world *world)
     domain->stats.halo = bt_sum_value(&sums[1]) > 0 ? bt_sum_value(&sums[0]) / bt_sum_value(&sums[1]) : 0;
 }
 
-/// The links for the cells as they are now.
+/// Make the links for the present cells.
 static void make_links(bt_world *world)
 {
     bt_domain *domain = world->domain;

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
 // METIS behind a guard: k-way cut of a weighted graph (Karypis & Kumar 1998, J. Parallel Distrib. Comput. 48).
 //
-// What METIS 5.1 does unguarded, each met in a trial on Debian 12:
-//   - one part: division by zero (SIGFPE). The caller keeps that away.
+// Behaviour of METIS 5.1 without guards, each item observed on Debian 12:
+//   - one part: division by zero (SIGFPE). The caller avoids that.
 //   - weights that add up to 2³¹ or more, or all zero: METIS_OK with every vertex in one part. Weights are scaled so
 //     that their sum stays below 2³⁰, nonzero ones to at least 1.
-//   - few vertices a part: empty parts under METIS_OK. Every part is counted.
-//   - contiguous parts asked of a graph that is not connected: an error. Contiguity is not asked for.
+//   - few vertices per part: empty parts under METIS_OK. Every part is checked.
+//   - contiguous parts of a disconnected graph: an error. Contiguity is not requested.
 //   - it sets its own handlers of SIGTERM and SIGABRT and afterwards puts the caller's back as one-shot
 //     ones (SA_RESETHAND); the actions are saved and restored here.
 //   - its handler of SIGTERM jumps out of whatever METIS was doing: the caller never learns of the signal, and a jump
-//     out of malloc leaves the heap locked (seen: a hang in the free that follows). So SIGTERM is blocked meanwhile and
-//     comes after. METIS raises it itself only for arguments that cannot occur here. In another thread the handler
-//     would jump into nowhere: see cut.h. Rejected: to let it return METIS_ERROR and raise the signal again.
+//     out of malloc leaves the heap locked (seen: a hang in the next free). So SIGTERM is blocked meanwhile and
+//     delivered later. METIS raises it itself only for arguments that cannot occur here. In another thread the handler
+//     would jump to an invalid place: see cut.h. Rejected: letting it return METIS_ERROR and raising the signal again.
 #include "partition/cut.h"
 
 #include <limits.h>
@@ -24,7 +24,7 @@
 
 enum { SUM_MAX = 1 << 30 };
 
-// Divisor that brings the sum of n weights down to SUM_MAX, what rounding up to 1 adds included.
+// Divisor that brings the sum of n weights down to SUM_MAX, including the rounding up to 1.
 static int64_t divisor_of(int64_t sum, int64_t n)
 {
     int64_t room = SUM_MAX > 2 * n ? SUM_MAX - n : SUM_MAX / 2;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bodies and contact memory to the ranks that own or hold them.
+// Migration of bodies and contact memory to the ranks that own or hold them.
 //
 // Every owned body is sent, complete, to all ranks that hold its cell under the new map; ghosts are dropped first and
 // come back the same way. So after a migration every copy of a body is that of its owner.
@@ -10,7 +10,7 @@
 #include "partition/division.h"
 #include "partition/domain.h"
 
-/// Bytes for every rank.
+/// Bytes to send to every rank.
 typedef struct {
     char **data;  ///< [size]
     size_t *n, *cap;
@@ -43,7 +43,7 @@ static void free_parcels(parcels *outgoing)
 
 enum { PIECE = 1 << 30 };
 
-/// Collective. What all others have for this rank, one after the other; the caller frees.
+/// Collective. Exchange parcels; returns the bytes for this rank from all others, to be freed by the caller.
 static char *deliver(const bt_comm *comm, parcels *outgoing, int tag, size_t *n_in)
 {
     uint64_t *out = bt_alloc((size_t)comm->size, sizeof *out), *in = bt_alloc((size_t)comm->size, sizeof *in);
@@ -98,7 +98,7 @@ static void pack(const bt_bodies *bodies, bt_idx i, parcels *outgoing, int rank)
         add(outgoing, rank, vertices_of(bodies, k, first), (size_t)n * bt_vertex_fields[k].size);
 }
 
-/// Append the bodies of a delivery.
+/// Append the bodies of a received parcel.
 static void unpack(bt_bodies *bodies, const char *data, size_t n_bytes)
 {
     size_t at = 0;
@@ -124,7 +124,7 @@ static void unpack(bt_bodies *bodies, const char *data, size_t n_bytes)
     }
 }
 
-/// Give back the memory of bodies that have gone.
+/// Give back the memory of bodies that have left.
 static void shrink(bt_bodies *bodies)
 {
     const bt_idx cap = bodies->n + bodies->n / 8 + 16;
@@ -179,7 +179,7 @@ static void move_bodies(bt_world *world)
     shrink(bodies);
 }
 
-// --- for the moment --------------------------------------------------------------------------------------------------
+// --- temporary copies ------------------------------------------------------------------------------------------------
 
 /// Is floe i within `reach` of a large floe that moves?
 static bool near_large(const bt_world *world, bt_idx i, double reach)
@@ -216,7 +216,7 @@ void bt_domain_around(const bt_world *world, const int rings[2], double reach, b
             }
         int holder[BT_MAX_SHARERS];
         const int n = bt_division_sharers(world, cell->x, cell->y, holder);
-        bool held = false; // by the rank that owns the large bodies
+        bool held = false; // needed by the rank that owns the large bodies
         for (int h = 0; h < n; h++) to[holder[h]] = 0, held = held || holder[h] == 0;
         for (bt_idx i = cell->first; i < cell->end; i++)
             for (int r = 0; r < domain->comm->size; r++)
@@ -273,7 +273,7 @@ static int solver_of(const bt_world *world, bt_idx a, bt_idx b)
     return bt_division_owner(world, at[0], at[1]);
 }
 
-/// Records by the rank they go to; those that stay are kept in memory [*n].
+/// Sort records by destination rank; those that stay are kept in memory [*n].
 static void sort_memory(const bt_world *world, bt_memory *memory, int64_t *n, parcels *outgoing)
 {
     const bt_domain *domain = world->domain;

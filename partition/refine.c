@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Shifts vertices between neighbour parts: first for balance, then for a smaller cut.
 //
-// Balance. The heaviest part is to lose weight, but its neighbours may be full themselves. So a search from neighbour
-// to neighbour finds the nearest parts lighter than a share, and one vertex is shifted along every link of the way
-// there (diffusion along a shortest path). A shift counts only if every part on its way then weighs less than the
-// heaviest did: the sorted loads fall, so it ends. Rejected: moving vertices only from a part to a lighter neighbour;
-// with some ten cells a part it stops with slopes of one cell a part over the whole field.
-// Cut. A vertex goes to the neighbour part that it has more edges with, as long as that stays within the limit
+// Balance. The heaviest part must lose weight, but its neighbours may be full themselves. So a search from neighbour to
+// neighbour finds the nearest parts lighter than a share, and one vertex is shifted along every link of the path there
+// (diffusion along a shortest path). A shift is accepted only if every part on its path then weighs less than the
+// heaviest did: the sorted loads decrease, so it terminates. Rejected: moving vertices only from a part to a lighter
+// neighbour; with some ten cells per part it stops with slopes of one cell per part over the whole field.
+// Cut. A vertex moves to the neighbouring part with which it has more edges, as long as that stays within the limit
 // (the greedy pass of Karypis & Kumar 1998).
 #include "partition/cut.h"
 
@@ -15,8 +15,8 @@
 #include "bergtow/base.h"
 
 enum {
-    ENDS_TRIED = 32, // light parts tried as the end of one way
-    SHIFTS = 64,     // a part, at most
+    ENDS_TRIED = 32, // light parts tried as the end of one path
+    SHIFTS = 64,     // per part, at most
     CUT_PASSES = 8,  // over all vertices; later ones found next to nothing in trials
 };
 
@@ -27,9 +27,9 @@ typedef struct parts {
     int64_t *load;           // [n]
     int *count;              // [n] vertices
     int *head, *next, *prev; // [n], [g->n], [g->n]: vertices of a part as a list
-    int *from, *queue;       // [n]: part before on the way from the heaviest (−1 not reached), parts reached in order
+    int *from, *queue;       // [n]: previous part on the path from the heaviest (−1: none), parts reached in order
     int64_t *link;           // [n] scratch: edges of one vertex with each part, 0 outside of use
-    bool *stuck;             // [n] nothing could be shifted away since it last changed
+    bool *stuck;             // [n] nothing could be shifted away since its last change
 } parts;
 
 static void list_add(parts *lists, int v)
@@ -60,9 +60,9 @@ static void shift(parts *lists, int v, int b)
     list_add(lists, v);
 }
 
-// Vertex of a to give to its neighbour b, −1 if none: one that brings a within the limit (and, where b is the end of
-// the way, keeps b within it) before others, and of those the one that lowers the cut most. With `nearest` the one
-// whose weight is nearest to what a has too much: the first rule may offer nothing but a berg's cells.
+// Vertex of a to give to its neighbour b, −1 if none: preferably one that brings a within the limit (and, if b is the
+// end of the path, keeps b within it), and among these the vertex that lowers the cut most. With `nearest` the vertex
+// whose weight is nearest to the excess of a: the first rule may offer only a berg's cells.
 static int vertex_to_give(const parts *lists, int a, int b, bool end, bool nearest)
 {
     const bt_graph *graph = lists->g;
@@ -87,7 +87,7 @@ static int vertex_to_give(const parts *lists, int a, int b, bool end, bool neare
     return best;
 }
 
-// Shift one vertex along every link of the way from `heavy` to `end`; undone and false if that does not help.
+// Shift one vertex along every link of the path from `heavy` to `end`; if that does not help, undo it and return false.
 static bool shift_along(parts *lists, int heavy, int end, bool nearest)
 {
     int n_way = 0, *way = bt_alloc((size_t)lists->n, sizeof *way), *given = bt_alloc((size_t)lists->n, sizeof *given);
@@ -151,7 +151,7 @@ static void balance(parts *lists)
     }
 }
 
-// Part that v would do better in, −1 if none.
+// Part that would suit v better, −1 if none.
 static int better_part(parts *lists, int v)
 {
     const bt_graph *graph = lists->g;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What one rank knows and all must: large bodies after the solve, islands over ranks, largest values; and the checks of
-// a division.
+// Data that all ranks need from one: large bodies after the solve, islands across ranks, largest values; and the checks
+// of a division.
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +29,7 @@ void bt_domain_settle(bt_world *world, bt_vel *shift)
                 else *from[c] = x[n];
             }
         }
-        if (n == 0) break; // no large body can be moved: nothing that one rank knows alone
+        if (n == 0) break; // no large body can be moved: nothing to share
         for (int k = 0; world->tow && k < BT_MAX_BRANCHES; k++, n++) {
             if (pass == 0) x[n] = world->tow->branch[k].lambda;
             else world->tow->branch[k].lambda = x[n];
@@ -39,7 +39,7 @@ void bt_domain_settle(bt_world *world, bt_vel *shift)
     free(x);
 }
 
-/// Collective. Records of `size` bytes from all ranks; the caller frees.
+/// Collective. Gather records of `size` bytes from all ranks; the caller frees.
 static void *gather(const bt_comm *comm, const void *mine, size_t n, size_t size, size_t *n_all)
 {
     int *count = bt_alloc((size_t)comm->size, sizeof *count), *first = bt_alloc((size_t)comm->size + 1, sizeof *first);
@@ -100,7 +100,7 @@ void bt_domain_largest(const bt_world *world, double *x)
 
 // --- islands ---------------------------------------------------------------------------------------------------------
 
-/// An island here and the body that may join it to one elsewhere.
+/// An island here and a body that may join it to an island elsewhere.
 typedef struct { bt_gid body, name; } membership;
 
 static int by_body(const void *p, const void *q)
@@ -150,7 +150,7 @@ void bt_domain_join_names(const bt_world *world, bt_gid *name)
     for (size_t k = 1; k < n_all; k++) {
         if (all[k].body != all[k - 1].body) continue;
         const size_t p = root(up, find(names, m, all[k - 1].name)), q = root(up, find(names, m, all[k].name));
-        up[p > q ? p : q] = p < q ? p : q; // the least name is the island's
+        up[p > q ? p : q] = p < q ? p : q; // the least name becomes the name of the island
     }
     for (bt_idx i = 0; i < bodies->n; i++) {
         const size_t k = find(names, m, name[i]);
@@ -173,7 +173,7 @@ void bt_domain_add_by_name(const bt_world *world, const bt_idx *up, const bt_gid
 {
     if (!world->domain) return;
     const bt_bodies *bodies = &world->bodies;
-    // Islands that may have a part elsewhere: those with a shared body.
+    // Islands that may extend to other ranks: those with a shared body.
     uint8_t *reaches = bt_alloc((size_t)bodies->n, 1);
     for (bt_idx i = 0; i < bodies->n; i++) {
         if (bodies->motion[i] != BT_DYNAMIC || !shared(world, i)) continue;
@@ -181,7 +181,7 @@ void bt_domain_add_by_name(const bt_world *world, const bt_idx *up, const bt_gid
         while (up[r] != r) r = up[r];
         reaches[r] = 1;
     }
-    // Two islands here may be one through another rank: a name can stand twice in one rank's list.
+    // Two islands here may be joined through another rank: a name can occur twice in one rank's list.
     named_sum *mine = bt_alloc((size_t)bodies->n, sizeof *mine);
     size_t n = 0, n_all;
     for (bt_idx i = 0; i < bodies->n; i++)
@@ -208,8 +208,7 @@ void bt_domain_add_by_name(const bt_world *world, const bt_idx *up, const bt_gid
 
 // --- checks ----------------------------------------------------------------------------------------------------------
 
-/// Collective. Ends the run, after rank 0 has reported why: a rank that leaves at once would take it down in the middle
-/// of its message.
+/// Collective. End the run after rank 0 has reported why: a rank that exits at once would cut its message short.
 static _Noreturn void end_all(const bt_comm *comm, bt_errors *err)
 {
     bt_comm_errors(comm, err);
@@ -219,7 +218,7 @@ static _Noreturn void end_all(const bt_comm *comm, bt_errors *err)
     bt_comm_abort(BT_ERR_NUMERIC);
 }
 
-/// Every body owned once: by their number and the sum of their mixed gids; when that fails, by name.
+/// Check that every body is owned once: by their number and the sum of their mixed gids; if that fails, by name.
 void bt_domain_check(bt_world *world)
 {
     const bt_domain *domain = world->domain;
@@ -268,7 +267,7 @@ static int by_copy(const void *p, const void *q)
     return (a->state > b->state) - (a->state < b->state);
 }
 
-/// Least gid of a body that stands in the wrong cell here, or under the wrong name; INT64_MAX = none.
+/// Least gid of a body here in the wrong cell or under the wrong name; INT64_MAX = none.
 static bt_gid misplaced(const bt_world *world)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -284,8 +283,7 @@ static bt_gid misplaced(const bt_world *world)
     return bad;
 }
 
-/// Collective. Least gid of a body that is not the same on all ranks that must hold it, or that some of them does not
-/// hold; −1 = none.
+/// Collective. Least gid of a body that differs between the ranks that must hold it, or is missing on one; −1 = none.
 static bt_gid find_fault(const bt_world *world)
 {
     const bt_domain *domain = world->domain;
@@ -326,7 +324,7 @@ static bt_gid find_fault(const bt_world *world)
     }
     free(mine);
     free(all);
-    // As a maximum of doubles: exact below 2⁵³, and a name needs no more.
+    // As a maximum of doubles: exact below 2⁵³, enough for a gid.
     double least = -(double)bad;
     bt_comm_reduce(domain->comm, NULL, 0, &least, 1, NULL, 0);
     return least > -(double)INT64_MAX ? (bt_gid)-least : -1;

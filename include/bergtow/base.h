@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Identifiers, status codes and the list of messages that every fallible function appends to.
 //
-// Units, in all headers: SI, and radians. A coefficient, a ratio or a share (friction, restitution, C_w, tolerance, μ,
-// κ) is a plain number and has no unit beside it; whatever has a dimension does.
+// Units, in all headers: SI, and radians. Quantities with a dimension are documented with their unit; coefficients,
+// ratios and shares (friction, restitution, C_w, tolerance, μ, κ) have none.
 #ifndef BERGTOW_BASE_H
 #define BERGTOW_BASE_H
 
@@ -35,35 +35,35 @@ typedef enum {
 typedef struct bt_errors {
     char **text;
     size_t n, cap;
-    struct bt_note *note; ///< [n] what each is for a script
+    struct bt_note *note; ///< [n] code and values of each, for scripts
 } bt_errors;
 
-/// A message for a script: its code, which stays when the text changes, and the values in it, as a JSON object.
+/// A message for scripts: its code, which stays the same when the text changes, and its values as a JSON object.
 typedef struct bt_note {
     char *code;   ///< NULL = none
-    char *values; ///< NULL = none; of warnings alone
+    char *values; ///< NULL = none; only for warnings
 } bt_note;
 
 /// Append a message (printf-style). Aborts only when out of memory.
 void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 /// The same with a list of arguments.
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
-/// Append a message. Errors: returns the status that it is given.
+/// Append a message. Errors: returns the given status.
 bt_status bt_fail(bt_errors *err, bt_status status, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
-/// The code of the last message. Codes of errors: no_solution, of guard.no_solution (src/run/guard.h); other_study, the
-/// folder of an ensemble holds another one; one_field, no seed changes the ice of a study with several fields.
+/// Set the code of the last message. Codes of errors: no_solution, by guard.no_solution (src/run/guard.h); other_study,
+/// the folder of an ensemble holds another study; one_field, no seed changes the ice of a study with several fields.
 void bt_errors_code(bt_errors *err, const char *code);
-/// Print every message on stderr, one a line, prefixed "bergtow: ", with its code in brackets behind it; where the
+/// Print every message on stderr, one per line, prefixed "bergtow: ", followed by its code in brackets; if the
 /// environment has BERGTOW_MESSAGES=json, as an object {"warning", "code", "text"} for programs.
 void bt_errors_print(const bt_errors *err);
 /// Print a message that begins with "warning: ".
 void bt_errors_warn(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 /// Release the messages; the list is empty then.
 void bt_errors_free(bt_errors *err);
-/// All messages of `from` behind those of `to`; from is empty then.
+/// Append all messages of `from` to those of `to`; `from` is then empty.
 void bt_errors_move(bt_errors *to, bt_errors *from);
 
-/// Ending of a noun that n counts.
+/// Plural ending of a noun for the number n.
 static inline const char *bt_plural(int64_t n)
 {
     return n == 1 ? "" : "s";
@@ -75,33 +75,31 @@ void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the ol
 void *bt_alloc_aligned(size_t n, size_t size);     ///< zeroed, 64-byte aligned, release with free()
 void *bt_alloc_unset(size_t n, size_t size);       ///< the same, not zeroed
 
-/// Called before memory that has run out ends the program, with a message on stderr otherwise: for a program that
-/// wants to say so itself, or to save what is its own. It cannot be averted: report must not call this library.
-/// NULL = the message goes to stderr.
+/// Set a function to be called when memory has run out, before the program ends: to report it, or to save the caller's
+/// own data. The end cannot be averted, and report must not call this library. NULL = a message on stderr.
 void bt_on_out_of_memory(void (*report)(const char *message, void *user), void *user);
 
-/// A text of any length that is written as a file is; without memory for it the program ends as in bt_alloc.
+/// A text of any length, written like a file; if memory runs out the program ends as in bt_alloc.
 typedef struct bt_text {
-    FILE *out; ///< to here
+    FILE *out; ///< write to this stream
     char *text;
     size_t size;
     void *locale;
 } bt_text;
-/// Open text->out, to write to. Until bt_text_end numbers have a decimal point in this thread, whatever its locale.
+/// Open text->out for writing. Until bt_text_end, numbers have a decimal point in this thread, whatever its locale.
 void bt_text_begin(bt_text *text);
 /// Close it. Returns the text, which the caller frees.
 char *bt_text_end(bt_text *text);
 
 /// Copy of a text; the caller frees it.
 char *bt_text_copy(const char *text);
-/// A text as printf makes it, with a decimal point in its numbers; the caller frees it.
+/// A printf-style text, with a decimal point in numbers; the caller frees it.
 char *bt_text_of(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 
 /// Wall clock in seconds from an arbitrary origin (CLOCK_MONOTONIC).
 double bt_clock(void);
 
-/// The smaller and the larger of two; b where one of them is NaN. fmin and fmax are calls, and
-/// return the number there.
+/// The smaller and the larger of two; b if either is NaN. fmin and fmax are function calls, and return the number.
 static inline double bt_min(double a, double b) { return a < b ? a : b; }
 /// See bt_min.
 static inline double bt_max(double a, double b) { return a > b ? a : b; }

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
 // The bodies of a world.
 //
-// Data layout. A body has a hot part, all that sweeps touch (velocity, 32 bytes, in every sweep; inverse inertia, 16
-// bytes, where contacts are not in batches, and when batches are packed), a warm part used once a step (pose, rotated
-// outline, travelled path), and a cold part (mass, drag, polygon in its own frame), read a few times a step at most.
-// Each member is an array of its own over the bodies in storage order, which is the order of the cells (cells.h):
-// neighbours in space are neighbours in memory.
-// Every reference between bodies is a bt_idx into that order and changes when bodies change their cell; the name of a
-// body that stays is its global id (gid), and every order that the result depends on follows from gids and cells, never
-// from storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large
-// bodies (walls and the towed body among them).
+// Data layout. A body has a hot part, read by sweeps (velocity, 32 bytes, in every sweep; inverse inertia, 16 bytes, if
+// contacts are not in batches, and when batches are packed), a warm part used once per step (pose, rotated outline,
+// travelled path), and a cold part (mass, drag, polygon in its own frame), read at most a few times per step. Each
+// member is a separate array over the bodies in storage order, which is the order of the cells (cells.h): neighbours in
+// space are neighbours in memory.
+// Every reference between bodies is a bt_idx into that order and changes when bodies change their cell; the permanent
+// name of a body is its global id (gid). Every order on which the result depends follows from gids and cells, never
+// from storage or rank. A rank holds the bodies of its cells, those of neighbouring cells (ghosts), and all large
+// bodies (including walls and the towed body).
 //
 // Generated floes have the lowest gids, from 0 on. Ids for the pieces of floes that split, floes given by hand, the
-// towed body and walls follow: a pair (a, b) is kept with gid[a] < gid[b], and takes friction and restitution from b,
-// the body with the higher gid (so the towed body's and a wall's own coefficients prevail over the ice's).
+// towed body and walls follow: a pair (a, b) has gid[a] < gid[b], and takes friction and restitution from b, so that
+// the coefficients of the towed body and of walls prevail over those of ice.
 #ifndef BERGTOW_BODY_H
 #define BERGTOW_BODY_H
 
@@ -36,10 +36,10 @@ typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, ra
 typedef struct bt_inv { double m, i; } bt_inv;
 typedef struct bt_pose { double x, y, yaw; } bt_pose;          ///< m, m, rad
 
-/// Where a floe of a moving window belongs (window.h).
+/// Home of a floe of a moving window (window.h).
 typedef struct bt_home {
     double x, y, yaw; ///< pose in the field as made, m, m, rad
-    int32_t copy;     ///< which repetition of that place, in lengths of the period along x
+    int32_t copy;     ///< number of its repetition, in periods along x
 } bt_home;
 
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
@@ -52,37 +52,37 @@ typedef struct bt_drag {
     double tangential;  ///< share τ of the flow along a side in the moment of form drag (forces.h)
 } bt_drag;
 
-/// What of a floe's drag its neighbours leave (src/force/exposure.h), each from 0 to 1 = all of it.
+/// Shares of a floe's drag that its neighbours leave (src/force/exposure.h), from 0 to 1.
 typedef struct bt_exposure {
-    double skin;        ///< share of its area that water and air see
-    double water_form;  ///< of the form drag along its edges, in the water
+    double skin;        ///< share of its area exposed to water and air
+    double water_form;  ///< share of the form drag along its edges, in the water
     double air_form;    ///< the same in the air
 } bt_exposure;
 
-/// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its
-/// own: contacts are found between parts, and act on the body. Rejected: parts as bodies that follow a parent.
-/// Everything that counts, sorts, moves, hashes or writes bodies would have to tell the two apart; this way only the
-/// pair search and the narrow phase know.
+/// A body's vertices are its outline, followed, if that is not convex, by its convex parts, each a separate polygon:
+/// contacts are found between parts, and act on the body. Rejected: parts as bodies that follow a parent. All code that
+/// counts, sorts, moves, hashes or writes bodies would have to distinguish the two; now only the pair search and the
+/// narrow phase do.
 typedef struct bt_mark {
     uint8_t count;  ///< at the first vertex of the outline or a part: its number of vertices; 0 elsewhere
-    uint8_t corner; ///< vertex of the outline that stands here
-    uint8_t next;   ///< of the outline: the vertex after this one on its convex hull; itself where it lies in a bay
+    uint8_t corner; ///< the vertex of the outline that this is
+    uint8_t next;   ///< of the outline: the next vertex on its convex hull; itself if it lies in a bay
 } bt_mark;
 
-/// What bt_world_add needs of a body.
+/// Definition of a body for bt_world_add.
 typedef struct bt_body_def {
     bt_motion motion;
     bool large;             ///< in no cell, on every rank, tested against all floes near its outline
     int n_vertices;
     const double *vertices; ///< [n_vertices][2] m, anticlockwise, centroid at the origin; convex without parts
-    const bt_parts *parts;  ///< of an outline that is not convex (bt_outline_split), or NULL
+    const bt_parts *parts;  ///< parts of an outline that is not convex (bt_outline_split), or NULL
     double x, y, yaw;       ///< m, m, rad
     double vx, vy, yaw_rate;///< m/s, m/s, rad/s
     /// M = m(1+C_m), kg, I(1+C_I), kg m²; ignored unless dynamic, but kept for the inertia force
     double mass, inertia;
-    double added;           ///< m C_m, the part of the mass that Coriolis and the slope of the sea do not act on, kg
+    double added;           ///< m C_m, the part of the mass not subject to Coriolis and the slope of the sea, kg
     double friction, restitution;
-    double thickness;       ///< of ice, m; 0 = no ice: it is never crushed (crush.h)
+    double thickness;       ///< of ice, m; 0 = not ice: it is never crushed (crush.h)
     bt_drag drag;
 } bt_body_def;
 
@@ -93,8 +93,8 @@ typedef struct bt_bodies {
     bt_inv *inv;          ///< [n]
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
-    double *outline;      ///< [offset[n]][2] vertices, also those of parts, turned by yaw, relative to the centroid, m
-    /// [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
+    double *outline;      ///< [offset[n]][2] vertices, also of parts, rotated by yaw, relative to the centroid, m
+    /// [n] length of path of the fastest point of the outline relative to the water, m (only grows)
     double *path;
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
@@ -107,41 +107,40 @@ typedef struct bt_bodies {
     double *radius;       ///< [n] m
     double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
-    double *share;        ///< [n] m/M, the body without its added mass over the whole
+    double *share;        ///< [n] m/M, mass without over mass with added mass
     double *friction, *restitution; ///< [n]
-    double *thickness;    ///< [n] of ice, m; 0 = no ice
+    double *thickness;    ///< [n] of ice, m; 0 = not ice
     bt_drag *drag;        ///< [n]
-    bt_exposure *exposure; ///< [n] state: as it was last looked at
+    bt_exposure *exposure; ///< [n] state: as last evaluated
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no cell
-    /// [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set
-    /// by code that changes a pose or velocity itself
+    /// [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. Must be
+    /// set by code that changes a pose or velocity directly
     uint8_t *disturbed;
     int32_t (*cell)[2];   ///< [n] coordinates of its cell, see cells.h
-    /// [n] periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+    /// [n] periods along x to add to the wrapped pose for the unwrapped place; counted in every periodic world
     int32_t *lap;
     bt_home *home;        ///< [n] with a moving window, otherwise NULL
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank, or no body
-    /// [n_global] 1 = no body has this id, on any rank: of a floe that has split, or of no piece yet
+    /// [n_global] 1 = no body has this id on any rank: the floe has split, or the piece does not exist yet
     uint8_t *gone;
     bt_gid n_global;      ///< ids
-    bt_gid n_kept;        ///< of them, how many were kept for pieces of floes (step/splitting.h)
+    bt_gid n_kept;        ///< of these, ids reserved for pieces of floes (step/splitting.h)
     bt_gid cap_global;
 } bt_bodies;
 
 /// Number of vertices of the outline of body i.
 static inline int bt_body_corners(const bt_bodies *bodies, bt_idx i) { return bodies->mark[bodies->offset[i]].count; }
 
-/// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline
-/// itself, if that is convex.
+/// First convex polygon of body i, by its first vertex within the body: 0, the outline itself, if convex.
 static inline int bt_part_first(const bt_bodies *bodies, bt_idx i)
 {
     const int n = bt_body_corners(bodies, i);
     return bodies->offset[i] + n < bodies->offset[i + 1] ? n : 0;
 }
 
-/// The one after it, −1 = none.
+/// The next convex polygon, −1 = none.
 static inline int bt_part_next(const bt_bodies *bodies, bt_idx i, int part)
 {
     const int next = part + bodies->mark[bodies->offset[i] + part].count;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A case: everything a run depends on, as read from the YAML file, in SI units and radians.
 //
-// The schema table in src/case/schema.c is the one place that names each key with its unit, default, range and one
+// The schema table in src/case/schema.c is the only place that defines each key with its unit, default, range and one
 // sentence of documentation; it drives parsing, --set, --list-keys and case.resolved.yml. This header only
 // holds the values. Choices are indices into the name lists of the schema.
 #ifndef BERGTOW_CASE_H
@@ -31,7 +31,7 @@ typedef enum {
     BT_BODY_RECTANGLE,
     BT_BODY_SHIP,
     BT_BODY_POLYGON,
-    BT_BODY_ABSENT ///< shapes that a program adds (bergtow/shape.h) follow
+    BT_BODY_ABSENT ///< added shapes (bergtow/shape.h) follow
 } bt_body_shape;
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE, BT_TOW_THRUST } bt_tow_mode; // none, speed, line, thrust
 // numbers, steel-wire, polypropylene, dyneema
@@ -66,20 +66,20 @@ typedef struct bt_floe_def {
     double *vertices;          ///< [n_vertices][2] m, shape: polygon
     int n_vertices;
     double x, y, yaw;          ///< m, m, rad
-    double vx, vy, yaw_rate;   ///< at time zero, m/s, m/s, rad/s; NaN: as ice.start has it
+    double vx, vy, yaw_rate;   ///< at time zero, m/s, m/s, rad/s; NaN: by ice.start
     double thickness;          ///< m
     bool fixed;                ///< infinite mass, at rest
-    int line;                  ///< where in the case file it stands, for messages
+    int line;                  ///< line in the case file, for messages
 } bt_floe_def;
 
 
-enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
+enum { BT_EXTRA_KEYS = 32 }; ///< most added keys
 
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
     char *text;       ///< the file's text; with a base, those of all its files as YAML documents; with overrides, a
                       ///< last document {"set": {key: value}}
-    char *floes_path; ///< file that lists the floes, where it is a base of this one, for messages; else NULL
+    char *floes_path; ///< base file that lists the floes, for messages; NULL if none
     struct {
         char *title;
         double dt;           ///< Δt, s
@@ -94,12 +94,12 @@ typedef struct bt_case {
         double wall_friction;  ///< Coulomb coefficient ice–wall
         double wall_restitution;
         double ends_closing, sides_closing; ///< inward speed of each wall, m/s
-        double ahead;          ///< from the body to the end ahead of the tow, kept where the ends are moving, m
+        double ahead;          ///< from the body to the end ahead of the tow, for moving ends, m
     } domain;
     struct {
         double concentration;           ///< area fraction in the ice region less the body's footprint, 0..0.95
         double x_min, x_max, y_min, y_max; ///< ice region, m; default the whole domain
-        /// region that the field is made for before it is cut to the ice region, m; NaN: that end of the ice region
+        /// region of the field before it is cut to the ice region, m; NaN: that end of the ice region
         double extent_x_min, extent_x_max, extent_y_min, extent_y_max;
         bt_ice_shape shape;
         int64_t sides;                  ///< of shape: polygons
@@ -117,14 +117,14 @@ typedef struct bt_case {
         double restitution;             ///< e
         double crushing_pressure;       ///< Pa; 0 = rigid contact
         double crushing_least;          ///< least contact length / thickness
-        double rafting_kappa;           ///< κ of the line load under which floes raft; 0 = they do not
+        double rafting_kappa;           ///< κ of the line load at which floes raft; 0 = they do not
         struct {
             double toughness;           ///< K, Pa √m; 0 = floes do not split
             double strength;            ///< σ_t of ice without a crack, Pa
             double least_size;          ///< least width of a piece, m
             int64_t generations;        ///< how often a floe and its pieces may split
             double aspect;              ///< largest length / width of a piece
-            int64_t reserve;            ///< pieces that may be added in all; 0 = twice the floes
+            int64_t reserve;            ///< largest total number of pieces; 0 = twice the floes
             double scatter;             ///< Weibull modulus of the strength; 0 = the same for all
         } splitting;
         double added_mass;              ///< C_m
@@ -137,10 +137,10 @@ typedef struct bt_case {
         char *field;                    ///< HDF5 field file instead of a generator, or NULL; relative to the case file
         /// GeoJSON file of outlines instead of a generator, or NULL; relative to the case file
         char *outlines;
-        bt_crs outlines_crs;            ///< what its coordinates are
+        bt_crs outlines_crs;            ///< type of its coordinates
         double origin_lon, origin_lat; ///< place of x = y = 0 on the earth, rad; NaN: the middle of outlines in degrees
-        double origin_east, origin_north; ///< of x = y = 0 in the plane of the outlines, m; NaN: as the keys say
-        bt_nonconvex nonconvex;         ///< what is done with an outline that is not convex
+        double origin_east, origin_north; ///< of x = y = 0 in the plane of the outlines, m; NaN: by the keys
+        bt_nonconvex nonconvex;         ///< treatment of outlines that are not convex
     } ice;
     bt_floe_def *floes;   ///< [n_floes] given by hand
     bt_idx n_floes;
@@ -161,13 +161,13 @@ typedef struct bt_case {
     } body;
     struct {
         bt_tow_mode mode;
-        /// of the body (speed), of the end (line), the vessel's limit (thrust), m/s; the programme's largest
+        /// of the body (speed), of the end (line), the vessel's limit (thrust), m/s; with a programme its largest
         double speed;
         double direction;        ///< heading of the tow at the start from +x towards +y, rad
         double ramp;             ///< time over which the speed rises linearly from 0, s
-        double *programme;       ///< [n_programme][2] time s, speed m/s; none = ramp and speed
+        double *programme;       ///< [n_programme][2] time s, speed m/s; empty = ramp and speed
         int n_programme;
-        double *waypoints;       ///< [n_waypoints][2] m; none = straight on
+        double *waypoints;       ///< [n_waypoints][2] m; empty = straight
         int n_waypoints;
         double turn_radius;      ///< m, of the corners at way-points; 0 = sharp
         double line_length;      ///< L0 unstretched, m
@@ -175,7 +175,7 @@ typedef struct bt_case {
         double line_damping;     ///< c, N s/m
         double hull_x, hull_y;   ///< fastening point, body frame, m; default the foremost point of the waterline
         struct {
-            bt_rope_type type;   ///< a name that gives stiffness and breaking load
+            bt_rope_type type;   ///< rope type that gives stiffness and breaking load
             double diameter;     ///< m, of a named line
             int64_t branches;    ///< 1, or 2: a bridle
             double breaking_load;///< N, 0 = never breaks
@@ -195,21 +195,21 @@ typedef struct bt_case {
         } vessel;
     } tow;
     struct {
-        bt_lead_mode mode;       ///< what the vessel has done to the ice ahead
+        bt_lead_mode mode;       ///< treatment of the ice ahead by the vessel
         double width;            ///< m
-        double length;           ///< of the path from the body's place, m
-        double floe_size;        ///< diameter of the circle of the area of the largest piece, managed, m
+        double length;           ///< of the path, from the body's place, m
+        double floe_size;        ///< managed: equivalent diameter of the largest piece, m
     } lead;
     struct {
         double density;          ///< ρ_w, kg/m³
         double current_x, current_y; ///< U_w, its constant part, m/s
         struct {
-            double major, minor;     ///< semi-axes of the tidal ellipse, m/s; minor > 0 turns from x towards y
+            double major, minor;     ///< semi-axes of the tidal ellipse, m/s; minor > 0 rotates from x towards y
             double inclination;      ///< of the major axis from x towards y, rad
             double period, phase;    ///< s; rad: the current is largest along the major axis at time phase/2π × period
         } tide;
         char *current_table;     ///< CSV file of the current in time, or NULL; relative to the case file
-        bt_table table;          ///< what it holds
+        bt_table table;          ///< its contents
         double latitude;         ///< rad; Coriolis parameter f = 2Ω sin(latitude); 0 = off
         bt_tilt tilt;
         double slope_x, slope_y; ///< ∇η for tilt: slope
@@ -218,13 +218,13 @@ typedef struct bt_case {
         double density;          ///< ρ_a, kg/m³
         double wind_x, wind_y;   ///< U_a, m/s
         char *wind_table;        ///< CSV file of the wind in time, or NULL; relative to the case file
-        bt_table table;          ///< what it holds
+        bt_table table;          ///< its contents
     } air;
     struct {
-        double tolerance;        ///< natural-map residual / reference speed at which a step has converged
+        double tolerance;        ///< natural-map residual / reference speed for convergence
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
-        int64_t inner_sweeps;    ///< sweeps of a cell in its turn
+        int64_t inner_sweeps;    ///< sweeps of a cell before the next cell
         double cell_size;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
         bool plain_schedule;     ///< passes by one thread (space/phases.h)
@@ -233,10 +233,10 @@ typedef struct bt_case {
         int64_t position_sweeps; ///< limit of the position projection
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
-    struct {                     ///< what ends a run, see src/run/guard.h; 0 or false = not looked at
+    struct {                     ///< guards that end a run, see src/run/guard.h; 0 or false = off
         double overlap;          ///< / mean floe size
-        double energy;           ///< / what the case can drive the bodies to
-        int64_t unconverged;     ///< steps in a row
+        double energy;           ///< / the energy to which the case can drive the bodies
+        int64_t unconverged;     ///< consecutive steps
         double no_solution;      ///< share of the steps of the case
         bool escape;             ///< a floe beyond a wall
     } guard;
@@ -244,7 +244,7 @@ typedef struct bt_case {
         bt_impact_conversion conversion; ///< of the impulse of a collision into a force
         double duration;         ///< T_c of a collision, s
         double pressure;         ///< p of crushed ice, Pa
-        bt_corner corner;        ///< which angle the crushed corner has
+        bt_corner corner;        ///< source of the angle of the crushed corner
         double corner_angle;     ///< φ when given, or without a corner, rad
         double least_speed;      ///< approach below this is quasi-static, m/s
         int64_t panels;          ///< pieces of the hull's perimeter
@@ -267,66 +267,65 @@ typedef struct bt_case {
     } estimate;
     struct {
         double mean_force;       ///< measured mean ice resistance, N; NaN = none
-        char *source;            ///< where it was published
+        char *source;            ///< publication
     } reference;
     struct {
         char *client, *project, *author, *document, *revision, *distribution; ///< for the title block of reports
     } report;
-    /// [k] values of keys that were added to the table (bt_keys_add: of force laws, of contact laws and of sections of
-    /// a program), SI, in the order of their addition
+    /// [k] values of added keys (bt_keys_add: of force laws, contact laws and sections of a program), SI, in the order
+    /// of their addition
     double extra[BT_EXTRA_KEYS];
-    int n_extra;                 ///< keys that had been added when it was read: it knows of no others
+    int n_extra;                 ///< number of keys added before it was read; later ones have no value
 } bt_case;
 
-/// What messages call it.
+/// Name of the case in messages.
 static inline const char *bt_case_name(const bt_case *input) { return input->path ? input->path : "case"; }
 
-/// Read and check a case file, with those that it is based on (its key `base`); every error of the files is appended to
-/// err with file, line, key and remedy.
-/// overrides: [n] texts "key=value" that replace the file's values. *input is overwritten, not released before; after
-/// an error, too, it is to be released with bt_case_free. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// Read and check a case file, with its base files (key `base`); every error of the files is appended to err with file,
+/// line, key and remedy.
+/// overrides: [n] texts "key=value" that replace the file's values. *input is overwritten without being released;
+/// release it with bt_case_free, also after an error. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_read(bt_case *input, const char *path, const char *const *overrides, int n, bt_errors *err);
 
-/// The same, with the place at which each override stands: [n] texts "FILE:LINE: " that messages name in place of
-/// "--set ".
+/// The same, with the place of each override: [n] texts "FILE:LINE: " that messages name instead of "--set ".
 bt_status bt_case_read_placed(bt_case *input, const char *path, const char *const *overrides, const char *const *place,
                               int n, bt_errors *err);
 
-/// The same from a text, which path names in messages; files that the text names lie beside path.
+/// The same from a text; path: its name in messages, and the base of relative file names in the text.
 bt_status bt_case_read_text(bt_case *input, const char *path, const char *text, const char *const *overrides,
                             const char *const *place, int n, bt_errors *err);
 
-/// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file
-/// is read.
+/// The same from the text in a checkpoint, with its tables of current and wind: no file is read.
 bt_status bt_case_read_kept(bt_case *input, const char *path, const char *text, const bt_table *current,
                             const bt_table *wind, bt_errors *err);
 
-/// All defaults, for tests and programs that build a case in memory. *input is overwritten, not released before.
+/// Set all defaults, for tests and programs that build a case in memory. *input is overwritten without being released.
 void bt_case_defaults(bt_case *input);
 
-/// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
+/// Check keys against each other, and set defaults that follow from other keys; called by bt_case_read. Errors:
+/// BT_ERR_CASE.
 bt_status bt_case_finish(bt_case *input, bt_errors *err);
 
 /// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *input);
-/// One JSON object {"section.key": value}, in SI units, null where a key has no value. Caller frees.
+/// One JSON object {"section.key": value}, in SI units, null for keys without a value. Caller frees.
 char *bt_case_resolved_json(const bt_case *input);
 #define BT_CASE_RESOLVED_HEAD                                                                                          \
     "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n"
 
-/// The same below comment lines of one's own. Caller frees.
+/// The text of bt_case_resolved below comment lines `head`. Caller frees.
 char *bt_case_text(const bt_case *input, const char *head);
 
 /// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/case/froude.c):
-/// the twin moves alike in times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for
+/// the twin has the same motion, with times sqrt(ratio) as long. Errors: BT_ERR_CASE for values out of range and for
 /// keys that name files of numbers with a dimension.
 bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err);
 
-/// The twin as a case file, below comments that say what was scaled how, and what is not similar. Caller frees.
+/// The twin as a case file, below comments on the scaling and on what is not similar. Caller frees.
 char *bt_case_scaled_text(const bt_case *twin, double ratio);
 
 /// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count, 0
-/// without body and for an outline that is refused.
+/// without a body and for an invalid outline.
 int bt_case_waterline(const bt_case *input, double *v);
 
 /// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count.
@@ -338,30 +337,30 @@ double bt_case_body_mass(const bt_case *input);
 /// Is space periodic between two such boundaries? A moving window is, along x (window.h).
 static inline bool bt_bound_wraps(bt_bound b) { return b == BT_BOUND_PERIODIC || b == BT_BOUND_MOVING; }
 
-/// +1 when the tow goes towards +x, −1 towards −x: where the moving window goes.
+/// Direction of the tow and of a moving window: +1 towards +x, −1 towards −x.
 double bt_case_tow_sign(const bt_case *input);
 
-/// A velocity at time zero of a case as a number: 0 where it is left to free drift.
+/// A velocity at time zero as a number: 0 if it is left to free drift.
 static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }
 
 /// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
 int64_t bt_case_steps(const bt_case *input);
 
-/// The window of the statistics begins there or later: output.window_start, or the end of the ramp, and where that is
-/// short for a body on its line, two periods later, but halfway to the end of the run at most, s.
+/// Earliest start of the window of the statistics, s: output.window_start, or the end of the ramp, plus two periods if
+/// the ramp is short for a body on its line, but at most halfway to the end of the run.
 double bt_case_earliest_window(const bt_case *input);
 
 /// Reference speed of the solver tolerance, m/s (> 0).
 double bt_case_reference_speed(const bt_case *input);
 
-/// Release what a case holds; `input` itself is the caller's.
+/// Release the contents of a case; the caller owns `input` itself.
 void bt_case_free(bt_case *input);
 
 /// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream (FILE *).
 void bt_case_list_keys(void *stream);
 
-/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows),
-/// unit, range, choices and meaning; numbers of the range in the unit of a number written without one.
+/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or its rule), unit, range,
+/// choices and meaning; the range is in the unit that a number without a unit has.
 void bt_case_list_keys_json(void *stream);
 
 #ifdef __cplusplus

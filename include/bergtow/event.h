@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What happened when: a short list of single events of a run, the same on all ranks.
+// A short list of single events of a run, the same on all ranks.
 //
-// For things that happen now and then (a line breaks, a way-point is passed), not in every step. The list grows only;
-// it is part of the output, not of the state: what an event changes is kept where it acts.
+// For rare occurrences (a line breaks, a way-point is passed), not for every step. The list only grows; it is part of
+// the output, not of the state: the effects of an event are stored elsewhere.
 #ifndef BERGTOW_EVENT_H
 #define BERGTOW_EVENT_H
 
@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-/// Appended to, never renumbered: the numbers stand in result.h5.
+/// Append only, never renumber: result.h5 contains the numbers.
 typedef enum {
     BT_EVENT_LINE_BROKEN, ///< subject: branch from 1; value: tension, N
     BT_EVENT_ADRIFT,      ///< the last branch broke: the body drifts; subject: 0; value: speed of the body, m/s
@@ -32,9 +32,9 @@ typedef struct bt_events {
     int64_t n, cap;
 } bt_events;
 
-/// Append an event: the end of its step, s, its kind, and what the kind says of subject and value.
+/// Append an event: the end of its step, s, its kind, and subject and value as defined by the kind.
 void bt_events_add(bt_events *events, double time, bt_event_kind kind, int64_t subject, double value);
-/// Release the events; the list is empty then.
+/// Release the events; the list is then empty.
 void bt_events_free(bt_events *events);
 
 /// "line_broken", ...: BT_EVENT_KINDS names.

@@ -14,24 +14,24 @@ extern "C" {
 
 /// An added key: always a real number.
 typedef struct bt_law_key {
-    const char *name;          ///< after the name of the law or section: the key is NAME.name
+    const char *name;          ///< the key is NAME.name, with NAME of the law or section
     /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m",
     /// "Pa m^0.5"; "" = a plain number
     const char *unit;
-    /// "0 N", "[0, 1e9]": the law should do nothing by its presets. The range is least and most of a number that is
-    /// written without a unit; such a number is in `unit`, but in degrees (a second) for rad (rad/s)
+    /// "0 N", "[0, 1e9]": with its presets the law should do nothing. The range is that of a number written without a
+    /// unit, which is in `unit`, but in degrees (per second) for rad (rad/s)
     const char *preset, *range;
     const char *doc;           ///< one sentence
 } bt_law_key;
 
 /// Add keys SECTION.name, before any case is read and from one thread; laws do so by their own registration. They are
-/// read, checked, listed by --list-keys, written to the resolved case and scaled as all others. False where some were
-/// refused: reason and remedy in err. The texts must stay where they are. A program can add BT_EXTRA_KEYS keys, those
-/// of laws included.
+/// read, checked, listed by --list-keys, written to the resolved case and scaled like all others. False if any was
+/// rejected: reason and remedy in err. The texts must remain valid. A program can add BT_EXTRA_KEYS keys, including
+/// those of laws.
 bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err);
 
-/// own [n]: value of the k-th in SI units. The keys have been added (bt_keys_add) before `input` was read; anything
-/// else is undefined.
+/// Get the values of added keys, own [n], in SI units. The keys must have been added (bt_keys_add) before `input` was
+/// read; otherwise the result is undefined.
 void bt_keys_get(const bt_case *input, const char *section, const bt_law_key *keys, int n, double *own);
 
 #ifdef __cplusplus

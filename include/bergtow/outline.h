@@ -9,22 +9,22 @@
 extern "C" {
 #endif
 
-enum { BT_MAX_PART_VERTICES = 3 * BT_MAX_VERTICES }; ///< of all parts of one outline: n + 2 (n − 3) at most
+enum { BT_MAX_PART_VERTICES = 3 * BT_MAX_VERTICES }; ///< of all parts of one outline: at most n + 2 (n − 3)
 
 /// Convex parts of a simple polygon.
 typedef struct bt_parts {
     int n;                                ///< parts
     int count[BT_MAX_VERTICES];           ///< [n] vertices of each part
     int n_vertices;                       ///< of all parts
-    /// [n_vertices] vertex of the outline that stands there, part after part, anticlockwise
+    /// [n_vertices] vertices as indices into the outline, part after part, anticlockwise
     uint8_t corner[BT_MAX_PART_VERTICES];
 } bt_parts;
 
 /// Drop neighbouring vertices that coincide, and vertices in the middle of a straight line, in place; returns how many
-/// stay. A vertex is on the line when it lies within 1e-9 of the extent.
+/// remain. A vertex is on the line if it lies within 1e-9 of the extent.
 int bt_outline_clean(int n, double *v);
 
-/// Twice the signed area, m²; negative when the vertices run clockwise.
+/// Twice the signed area, m²; negative if the vertices run clockwise.
 double bt_outline_area2(int n, const double *v);
 
 /// Why an outline cannot be a floe, convex or not, or NULL: too few or many vertices, not finite, zero area, clockwise,
@@ -34,19 +34,20 @@ const char *bt_outline_fault(int n, const double *v);
 /// Do the edges of a ring of any length cross or touch each other (other than neighbours at their common vertex)?
 bool bt_outline_crosses(int n, const double *v);
 
-/// True when a sound outline is convex (to the tolerance of bt_shape_fault).
+/// Is a valid outline convex (to the tolerance of bt_shape_fault)?
 bool bt_outline_convex(int n, const double *v);
 
-/// Cut a sound outline into convex parts: ears (those of the best shape first), then every diagonal taken out again
-/// whose removal leaves a convex polygon [Hertel & Mehlhorn 1983, LNCS 158: at most four times the least number of
-/// parts]. False when rounding leaves no ear.
+/// Cut a valid outline into convex parts: cut ears (best shape first), then remove every diagonal whose removal leaves
+/// a convex polygon [Hertel & Mehlhorn 1983, LNCS 158: at most four times the least number of parts]. False if rounding
+/// leaves no ear.
 bool bt_outline_split(int n, const double *v, bt_parts *parts);
 
-/// North and east of (lon0, lat0) in metres of a place (lon, lat), all in radians, on the WGS84 ellipsoid. Azimuthal
-/// equidistant for a small area: the direction is that of the place seen from the origin (e, n: its chord's components
+/// Project a place (lon, lat) to metres north and east of (lon0, lat0), angles in radians, on the WGS84 ellipsoid.
+/// Azimuthal equidistant for a small area: the direction is that of the place seen from the origin (e, n: its chord's
+/// components
 ///     east and north), the distance the arc over the chord c,
 ///     (east, north) = (e, n)/√(e² + n²) · c (1 + c²/(24 R²)),   R² = M N, the radii of curvature at the origin.
-/// No latitude is special, nor the 180th meridian. Against geodesics, from 60° to 89° N: within 1 mm at 10 km, 2 cm at
+/// Poles and the 180th meridian are not singular. Error against geodesics, from 60° to 89° N: 1 mm at 10 km, 2 cm at
 /// 100 km.
 void bt_outline_project(double lon, double lat, double lon0, double lat0, double *north, double *east);
 

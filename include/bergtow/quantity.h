@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Quantities: the numbers that a run keeps of every step, each registered once, with all that a reader needs to know of
-// it.
+// Quantities: the numbers that a run keeps of every step, each registered once, with all that a reader needs.
 //
 // A registered quantity is
 //     a series            /series/NAME of result.h5, with units, description, merge, applies, role, label as attributes
@@ -19,13 +18,13 @@
 extern "C" {
 #endif
 
-enum { BT_MAX_ADDED = 32 }; ///< quantities beside the program's own
+enum { BT_MAX_ADDED = 32 }; ///< most quantities besides the program's own
 
 /// How steps merge into an entry of the series, and those of the window into the summary.
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep;
 enum { BT_KEEP_KINDS = BT_KEEP_SUM + 1 };
 
-/// What a run must have for a number to mean anything. Where it has not, the number is NaN, and nowhere else.
+/// The feature that a run must have for a number to be defined. Without it the number is NaN; with it, never.
 typedef enum {
     BT_APPLIES_ALWAYS, BT_APPLIES_BODY, BT_APPLIES_LINE, BT_APPLIES_BRIDLE, BT_APPLIES_VESSEL, BT_APPLIES_IMPACTS,
     BT_APPLIES_WINDOW, BT_APPLIES_KINDS
@@ -36,9 +35,9 @@ typedef enum {
     BT_ROLE_NONE,
     /// a force against the tow that the momentum balance of the towed body adds up (tow and inertia included)
     BT_ROLE_BALANCE,
-    BT_ROLE_FORCE,      ///< a force on the towed body against the tow that is part of another
+    BT_ROLE_FORCE,      ///< a force on the towed body against the tow that is part of another force
     BT_ROLE_LOAD,       ///< a load of the line or the vessel
-    BT_ROLE_DIAGNOSTIC, ///< a panel of its own beside those of the contact solver
+    BT_ROLE_DIAGNOSTIC, ///< a separate panel beside those of the contact solver
     BT_ROLE_KINDS
 } bt_role;
 
@@ -55,38 +54,37 @@ typedef struct bt_quantity {
     bt_keep keep;
     bt_applies applies;
     bt_role role;
-    /// key of its reduction in summary.json, NULL = none; of a registered one it is made of name and units
+    /// key of its reduction in summary.json, NULL = none; for a registered one made from name and units
     const char *summary;
     // one of the next two
-    /// From what every rank holds: the towed body, the tow, the numbers of the step. After the step; on every rank,
+    /// From data on every rank: the towed body, the tow, the numbers of the step. Called after the step, on every rank,
     /// with the same result.
     double (*of_world)(const bt_world *world, const void *context);
-    /// The share of one floe that can move: of fixed floes, walls and the towed body nothing is asked. The sum over all
-    /// is exact: the same bits on any number of ranks and threads.
+    /// The contribution of one movable floe; not called for fixed floes, walls and the towed body. The sum over all is
+    /// exact: the same bits on any number of ranks and threads.
     double (*of_floe)(const bt_world *world, bt_idx floe, const void *context);
     const void *context;     ///< of the functions
-    size_t offset;           ///< of its place in bt_sample; set for a registered one
+    size_t offset;           ///< in bt_sample; set by registration
 } bt_quantity;
 
-/// Add a quantity; it is recorded in runs that begin later. It is copied; its texts and context must outlive every run.
-/// Errors: BT_ERR_USAGE, with the reason in err: a name that is taken or none, no unit, no sentence, no function, no
-/// room.
+/// Add a quantity, to be recorded in runs that begin later. It is copied; its texts and context must outlive every run.
+/// Errors: BT_ERR_USAGE, with the reason in err: a missing or used name, no unit, no sentence, no function, no room.
 bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err);
 
-/// How many series there are: the program's own, then those registered.
+/// Number of series: the program's own, then the registered ones.
 int bt_n_series(void);
-/// The k-th of them from 0, in the order of the file.
+/// The k-th series, from 0, in the order of the file.
 const bt_quantity *bt_series(int k);
-/// By name, NULL where there is none.
+/// A series by name, NULL if there is none.
 const bt_quantity *bt_series_find(const char *name);
 
-/// How many of them are registered beside the program's own: the last ones.
+/// Number of registered series, the last ones.
 int bt_n_added(void);
 /// The k-th of these, from 0.
 const bt_quantity *bt_added(int k);
 
-/// "tow - drag - Coriolis - tilt - ... - inertia": what the ice resistance is by the balance of the towed body, in the
-/// labels of the series whose role is BT_ROLE_BALANCE. Made anew whenever quantities are added; not from two threads.
+/// "tow - drag - Coriolis - tilt - ... - inertia": the ice resistance by the balance of the towed body, in the labels
+/// of the series with role BT_ROLE_BALANCE. Made anew whenever quantities are added; not thread-safe.
 const char *bt_balance_words(void);
 
 #ifdef __cplusplus

@@ -27,21 +27,20 @@ typedef struct bt_moments {
 /// Area, centroid and moments by exact integration over the triangle fan (∫r³ by closed form per triangle).
 bt_moments bt_shape_moments(int n, const double *v);
 
-/// The same without ∫ r³ dA, which stays 0: two asinh an edge are two thirds of the work, and only drag asks for it.
+/// The same without ∫ r³ dA, which stays 0: its two asinh per edge are two thirds of the work, and only drag needs it.
 bt_moments bt_shape_extent(int n, const double *v);
 
-/// Area and centroid alone, to the same bits; the others stay 0.
+/// Only area and centroid, to the same bits; the others stay 0.
 bt_moments bt_shape_centroid(int n, const double *v);
 
 /// Why a polygon cannot be a body, or NULL: too few or many vertices, clockwise, not convex, zero area,
 /// repeated vertices. The text is a static string that completes "... is refused: ".
 const char *bt_shape_fault(int n, const double *v);
 
-/// True when a polygon is faulty by more than rounding can have made of a sound outline that was centred, shrunk or
-/// cut: a looser test than bt_shape_fault.
+/// Is a polygon faulty beyond the rounding of a valid outline when centred, shrunk or cut? Looser than bt_shape_fault.
 bool bt_shape_broken(int n, const double *v);
 
-/// Move the centroid to the origin, in place; returns what bt_shape_extent found before the move.
+/// Move the centroid to the origin, in place; returns the result of bt_shape_extent before the move.
 bt_moments bt_shape_centre(int n, double *v);
 
 /// Width across the direction (ux, uy) (unit vector, body frame): extent of the projection on its normal, m.
@@ -53,16 +52,16 @@ void bt_shape_regular(int n, double area, double *v);
 /// Convex hull (anticlockwise, no collinear points) of n points, in place; returns its number of vertices.
 int bt_shape_hull(int n, double *v);
 
-/// Clip a convex polygon to the half-plane nx·x + ny·y <= d. out holds up to n+1 vertices; returns their number
-/// (0 when nothing is left).
+/// Clip a convex polygon to the half-plane nx·x + ny·y <= d. out holds up to n+1 vertices; returns their number (0 if
+/// nothing is left).
 int bt_shape_clip(int n, const double *v, double nx, double ny, double d, double *out);
 
 /// Names of shapes, in the order of bt_body_shape (bergtow/case.h).
 #define BT_SHAPE_NAMES "disc", "square", "rectangle", "ship"
 
-/// A named waterline of length l (x) and width w (y), m, centred, bow on +x, into v: [2*BT_MAX_VERTICES]. "disc"
+/// Write a named waterline of length l (x) and width w (y), m, centred, bow on +x, to v: [2*BT_MAX_VERTICES]. "disc"
 /// (64-gon of the area of the ellipse l×w), "square" (side l), "rectangle", "ship" (raked bow over a quarter of the
-/// length, transom of 0.7 w). Returns the number of vertices, 0 when the name is unknown.
+/// length, transom of 0.7 w). Returns the number of vertices, 0 if the name is unknown.
 int bt_shape_named(const char *name, double l, double w, double *v);
 
 /// A waterline of length l (x) and width w (y), m, bow on +x, convex and anticlockwise, about any origin: it is moved
@@ -72,8 +71,8 @@ typedef int (*bt_shape_outline)(double l, double w, double *v);
 enum { BT_MAX_ADDED_SHAPES = 4 };
 
 /// Add a shape of the towed body, `body.shape: NAME`, before a case is read and from one thread; how:
-/// docs/how-to-add-a-body-shape.md. Name and function must stay where they are. Errors: BT_ERR_USAGE with reason and
-/// remedy: a name that is taken or none, no convex outline of 2 × 1 m, no room.
+/// docs/how-to-add-a-body-shape.md. Name and function must remain valid. Errors: BT_ERR_USAGE with reason and remedy: a
+/// missing or used name, no convex outline of 2 × 1 m, no room.
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A study: one base case, what is varied, and how many fields of each condition. Read from a YAML file.
+// A study: a base case, the values to vary, and the number of fields of each condition. Read from a YAML file.
 //
 //     title: resistance against concentration
 //     report: {client: ..., project: ..., author: ..., revision: A}   # title block of the report
@@ -22,19 +22,19 @@
 //                                          # numbered: the same, and the seeds are seed, seed + 1, ...
 //     ranks: 1                             # MPI ranks that work on one member
 //
-// A key is decided once: not under two of parameters, variants and with, and under `with` for values of one parameter
-// alone; otherwise a member would run with one value and be recorded with another.
+// A key may be set only once: not under two of parameters, variants and with, and under `with` for values of only one
+// parameter; otherwise a member would run with one value and be recorded with another.
 //
 // The keys, with defaults and ranges: src/case/study_keys.c, bergtow --list-keys. Members write no frames unless the
 // study sets output.frame_interval: eighty members of 300,000 floes with the frames of a single run would fill 630 GB.
 //
-// A range is a distribution, which a Latin hypercube draws from: uniform between its ends; triangular, its peak in the
-// middle; normal, with 95 % between its ends and nothing beyond three standard deviations; each on the linear scale or,
-// with scale log, of the logarithm. The source stands in ensemble.h5 and in the reports.
+// A range is a distribution from which a Latin hypercube draws: uniform between its ends; triangular, with its peak in
+// the middle; normal, with 95 % between its ends and nothing beyond three standard deviations; each on the linear scale
+// or, with scale log, of the logarithm. The source is recorded in ensemble.h5 and in the reports.
 //
 // A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows
-// from (seed, condition, repeat) alone (with common and numbered fields from (seed, repeat)), so more repeats may be
-// asked for later without changing a member.
+// from (seed, condition, repeat) alone (with common and numbered fields from (seed, repeat)), so repeats can be added
+// later without changing a member.
 #ifndef BERGTOW_STUDY_H
 #define BERGTOW_STUDY_H
 
@@ -51,25 +51,25 @@ typedef enum { BT_UNIFORM, BT_TRIANGULAR, BT_NORMAL } bt_distribution;
 
 enum { BT_MAX_PARAMETERS = 32, BT_MAX_MEMBERS = 100000 };
 
-/// What is varied. A value is the text that --set takes.
+/// A parameter to vary. A value is a text as for --set.
 typedef struct bt_study_parameter {
     char *name;          ///< case key, or "variant"
-    char *at;            ///< where it stands, "FILE:LINE: "
+    char *at;            ///< its place, "FILE:LINE: "
     int key;             ///< index into the keys of a case, −1 = the variants
     bool continuous;     ///< a range: a Latin hypercube draws from all of it
     bool logarithmic;
     bt_distribution distribution; ///< of a range, in a Latin hypercube
     double from, to;     ///< of a range, SI
-    char *source;        ///< of a range: where it is from; or NULL
+    char *source;        ///< of a range: its source; or NULL
     int n;               ///< values of a list, or of a range in a grid
     char **value;        ///< [n] texts; of the variants: their names
-    int64_t *stratum;    ///< [n_conditions] place of each condition in a Latin hypercube; NULL in a grid
+    int64_t *stratum;    ///< [n_conditions] stratum of each condition in a Latin hypercube; NULL in a grid
 } bt_study_parameter;
 
 typedef struct bt_study_variant {
     char *name;
     char **set;          ///< [n_set] "key=value"
-    char **at;           ///< [n_set] where each stands
+    char **at;           ///< [n_set] place of each
     int n_set;
     int axis;            ///< the parameter with this value
 } bt_study_variant;
@@ -80,7 +80,7 @@ typedef struct bt_study {
     char *base_name;     ///< as written
     char *base;          ///< path of the base case
     char **set;          ///< [n_set] "key=value"
-    char **set_at;       ///< [n_set] where each stands, "FILE:LINE: "
+    char **set_at;       ///< [n_set] place of each, "FILE:LINE: "
     int n_set;
     bt_study_parameter parameter[BT_MAX_PARAMETERS];
     int n_parameters;
@@ -101,7 +101,7 @@ typedef struct bt_member {
     int64_t seed;              ///< ice.seed
     int n_set;
     char **set;                ///< [n_set] overrides of the base
-    const char **at;           ///< [n_set] where each stands in the study, "FILE:LINE: ", or NULL; texts of the study
+    const char **at;           ///< [n_set] place of each in the study, "FILE:LINE: ", or NULL; texts of the study
     char *value[BT_MAX_PARAMETERS]; ///< text of each parameter
 } bt_member;
 
@@ -109,40 +109,40 @@ typedef struct bt_member {
 /// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_study_read(bt_study *study, const char *path, bt_errors *err);
 
-/// Values in place of those that the study or its base says, [n] "key=value", for all members. It is another study
-/// then. Errors: BT_ERR_CASE, also for a key that the study varies.
+/// Replace values of the study or its base, [n] "key=value", for all members. It is then another study. Errors:
+/// BT_ERR_CASE, also for a key that the study varies.
 bt_status bt_study_override(bt_study *study, const char *const *set, int n, bt_errors *err);
 
-/// Release what a study holds.
+/// Release the contents of a study.
 void bt_study_free(bt_study *study);
 
-/// The distribution of a parameter in words, "" for one without; the caller frees it.
+/// The distribution of a parameter in words, "" if it has none; the caller frees it.
 char *bt_study_distribution(const bt_study_parameter *parameter);
 
-/// Are there ranks enough for a member? Errors: BT_ERR_CASE.
+/// Are there enough ranks for a member? Errors: BT_ERR_CASE.
 bt_status bt_study_fits(const bt_study *study, int ranks, bt_errors *err);
 
-/// Members of a study: its conditions times its repeats.
+/// Number of members of a study: its conditions times its repeats.
 static inline int64_t bt_study_n_members(const bt_study *study) { return study->n_conditions * study->repeats; }
 
 /// Member m of 0 ... n − 1: repeats of condition 0 first, then those of condition 1. Release with bt_member_free.
 void bt_study_member(const bt_study *study, int64_t m, bt_member *out);
-/// Release what a member holds.
+/// Release the contents of a member.
 void bt_member_free(bt_member *member);
 
-/// The case of a member: the base with its overrides, and named by the title of the study, its condition and its field
-/// unless the study sets run.title; messages name where in the study these stand. Errors:
+/// The case of a member: the base with its overrides, titled by the study, its condition and its field unless the study
+/// sets run.title; messages give their places in the study. Errors:
 /// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_member_case(const bt_study *study, const bt_member *member, bt_case *input, bt_errors *err);
 
-/// The base with `set` alone. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// The base with only `set`. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_study_base_case(const bt_study *study, bt_case *input, bt_errors *err);
 
-/// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base
-/// case resolved. Two studies with the same text have the same members. Caller frees. NULL with a message when the base
-/// cannot be read.
+/// Everything that determines a member, without the number of repeats: the study's text as parsed and the resolved base
+/// case. Two studies with the same text have the same members. Caller frees. NULL with a message if the base is
+/// unreadable.
 char *bt_study_resolved(const bt_study *study, bt_errors *err);
-/// Are two such texts the same but for their comments, the meanings of keys in the words of a version of the program?
+/// Are two such texts equal apart from comments, which describe keys and may differ between program versions?
 bool bt_study_resolved_alike(const char *a, const char *b);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Everything that one time step works on: constants (params.h), bodies (body.h), and what the layers make of them.
+// All data of a time step: constants (params.h), bodies (body.h), and the data of the layers.
 #ifndef BERGTOW_WORLD_H
 #define BERGTOW_WORLD_H
 
@@ -24,7 +24,7 @@ struct bt_environment;
 struct bt_forces;
 struct bt_splitting;
 
-/// Where the wall time of a run goes: X(name, what is in it).
+/// Phases of the wall time of a run: X(name, contents).
 #define BT_WALL_PHASES(X)                                                                                              \
     X(detect, "labels and storage of bodies, margins, the detection of contacts")                                      \
     X(colour, "the order of the cells by their colours, and their distribution to threads")                            \
@@ -45,33 +45,33 @@ typedef struct bt_phases {
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
-    int64_t n_points;        ///< contact points handed to the solver
-    int64_t n_active;        ///< floes in cells that were looked at (the others rest)
+    int64_t n_points;        ///< contact points passed to the solver
+    int64_t n_active;        ///< floes in active cells (the others rest)
     int64_t sweeps, position_sweeps;
     int64_t position_updates; ///< of contacts by the sweeps of the position projection
-    bool projected;          ///< the position projection came to its end, or there was nothing to do
+    bool projected;          ///< the position projection converged, or had nothing to do
     int64_t contact_updates;    ///< of contacts by the sweeps
     int64_t contact_moves;      ///< of contacts by momentum between sweeps
-    int64_t residual_checks; ///< of contacts by residual passes, and by velocities formed anew for them
-    int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
+    int64_t residual_checks; ///< residuals of contacts, and velocities formed anew for them
+    int64_t repeats;         ///< repeated detections and solves because the solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed
-    int64_t misjudged;       ///< rows at the end of pairs that pass, and pairs that meet without (contact/contacts.h)
+    int64_t misjudged;       ///< remaining rows of pairs that pass, and meeting pairs without rows (contact/contacts.h)
     double residual, residual_rms; ///< natural-map residual: max-norm and root mean square over the rows, m/s
     bool converged;
-    bool locked;             ///< it did not, and some bodies cannot give way to any load (src/solve/islands.h)
-    bool no_load;            ///< of these, some press on the towed body: its load has no bound
+    bool locked;             ///< it did not, and some bodies are locked (src/solve/islands.h)
+    bool no_load;            ///< some of these touch the towed body: its load is unbounded
     double overlap;          ///< deepest overlap at the start of the step, m
-    bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
+    bool restitution_cut;    ///< rebounds would have added energy somewhere, and were reduced
     double contact_work;     ///< J
-    bool added_energy;       ///< it is more than 0 by more than the residual and rounding explain
+    bool added_energy;       ///< contact_work exceeds 0 by more than residual and rounding explain
     /// numbers of the program's contact laws, in their order (src/contact/law.h): series, with units and meaning there
     double laws[BT_MAX_LAW_NUMBERS];
-    double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of laws that were added
+    double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of added laws
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
-    bt_phases phases;        ///< where its wall time went; `output` is not of the step
-    bt_phases shared;        ///< of it, in passes that several threads share
-    double in_team;          ///< of the phase under way
+    bt_phases phases;        ///< wall time by phase; `output` is not part of the step
+    bt_phases shared;        ///< the part in passes shared by several threads
+    double in_team;          ///< the same for the present phase
 } bt_step_stats;
 
 typedef struct bt_world {
@@ -80,25 +80,25 @@ typedef struct bt_world {
     struct bt_cells *cells;
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
-    struct bt_window *window;///< NULL = the domain stands still
-    struct bt_undisturbed *undisturbed; ///< NULL = no body is towed (step/window.h)
-    struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
-    struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
+    struct bt_window *window;///< NULL = the domain is fixed
+    struct bt_undisturbed *undisturbed; ///< NULL = no towed body (step/window.h)
+    struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = constant, as in par
+    struct bt_forces *forces; ///< parameters of the force laws, and their impulses on the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
-    const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
+    const struct bt_exchange *exchange; ///< operations of the division for space (exchange.h), NULL with it
     struct bt_shore *shore;  ///< fixed bodies that lie against each other (space/shore.h), NULL = none
-    struct bt_splitting *splitting; ///< floes that split (step/splitting.h), NULL = none does
-    struct bt_impacts *impacts; ///< loads of the towed body by collisions and without (impact.h), NULL = as a whole
+    struct bt_splitting *splitting; ///< splitting of floes (step/splitting.h), NULL = floes do not split
+    struct bt_impacts *impacts; ///< loads of the towed body: collisions and the rest (impact.h), NULL = not separated
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
-    bt_events events;        ///< what happened when, the same on all ranks
+    bt_events events;        ///< the same on all ranks
     double drift_x, drift_y; ///< displacement of the water since time zero, m
     bt_step_stats stats;
 } bt_world;
 
-/// An empty world; release with bt_world_free. The constants of the step are copied.
+/// Create an empty world; release with bt_world_free. The constants of the step are copied.
 bt_world *bt_world_create(const bt_params *par);
-/// Release a world and all that it holds. NULL is ignored.
+/// Release a world and its contents. NULL is ignored.
 void bt_world_free(bt_world *world);
 
 /// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition
@@ -106,7 +106,7 @@ void bt_world_free(bt_world *world);
 /// bt_outline_fault) accepts; mass and inertia > 0 of a dynamic body; a world that is not yet distributed to ranks.
 bt_gid bt_world_add(bt_world *world, const bt_body_def *def);
 
-/// Where body gid is stored on this rank now, −1 = not here.
+/// Index of body gid in the present storage of this rank, −1 = not here.
 static inline bt_idx bt_world_index(const bt_world *world, bt_gid gid) { return world->bodies.index_of[gid]; }
 
 /// Index of the towed body, −1 = none. Every rank holds it.
@@ -115,18 +115,18 @@ static inline bt_idx bt_world_towed(const bt_world *world)
     return world->towed < 0 ? -1 : world->bodies.index_of[world->towed];
 }
 
-/// Collective. One step Δt: forces, detection, solve, projection, advance; the order stands in src/step/step.c.
+/// Collective. Do one step Δt: forces, detection, solve, projection, advance; see src/step/step.c for the order.
 void bt_world_step(bt_world *world);
 
-/// Bodies in each other at the present poses.
+/// Overlaps of bodies at the present poses.
 typedef struct bt_overlaps {
-    int64_t pairs;        ///< that overlap by more than is allowed
+    int64_t pairs;        ///< pairs that overlap by more than allowed
     double deepest;       ///< of all pairs, m, 0 = none
-    bt_gid a, b;          ///< the pair with it
+    bt_gid a, b;          ///< the pair with the deepest overlap
 } bt_overlaps;
 
-/// Collective. Overlaps that this rank finds at the present poses; pairs deeper than allowed, m, are counted. Labels
-/// and storage may be renewed: indices of bodies change then.
+/// Collective. Find this rank's overlaps at the present poses; pairs deeper than `allowed`, m, are counted. Labels and
+/// storage may be renewed: body indices then change.
 bt_overlaps bt_world_overlaps(bt_world *world, double allowed);
 
 /// Collective. 64-bit hash of the state: poses and velocities by gid, memory of contact laws, step, window, drift of

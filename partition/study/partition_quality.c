@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// How well the cells of a large field can be cut: a table (CSV on stdout) over cell size, number of parts and floes.
+// Quality of cuts of the cells of a large field: a table (CSV on stdout) over cell size, number of parts and floes.
 //
-// The field is not packed: floe centres are a square lattice with jitter at the asked concentration, which has the
-// counts and their scatter. Floes of diameter d, spacing s = d √(π / 4 / 0.8), jitter ± 0.3 s in x and y. Contacts are
-// pairs with centres nearer than 1.05 d. Work of a cell = its floes + 2 contact points × its contacts × (wake: 4). A
-// berg of 100 m in the middle takes the floes under it away and joins the cells that it touches; its wake is 10 berg
+// The field is not packed: floe centres are a square lattice with jitter at the given concentration, which has
+// realistic counts and scatter. Floes of diameter d, spacing s = d √(π / 4 / 0.8), jitter ± 0.3 s in x and y. Contacts
+// are pairs with centres nearer than 1.05 d. Work of a cell = its floes + 2 contact points × its contacts × (wake: 4).
+// A berg of 100 m in the middle removes the floes under it and joins the cells that it touches; its wake is 10 berg
 // lengths long and 2 wide.
 //
 // Cell T = (i, j) solves the contacts within its 2 × 2 block {T, T+x, T+y, T+x+y}; so its owner holds the floes of the
@@ -13,10 +13,10 @@
 //   phase_imbalance  Σ over the four colours (parity of i, j) of the heaviest part's work in it / mean work of a part −
 //                    1: if every rank waited for all others after each colour
 //   halo             ghost floes / own floes of a part, mean over parts and largest
-//   neighbours       parts that hold floes which this part holds too
+//   neighbours       parts that hold floes also held by this part
 //   sent             floe velocities a part sends in one sweep if every floe is touched in each colour it can be:
 //                    own or ghost floes of each cell, times the other parts that hold them
-//   moved            share of the work that changes its part when the berg has moved on by one cell
+//   moved            share of the work that changes its part when the berg has moved by one cell
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Storage of the bodies: growth, outlines and parts of a new one.
+// Storage of the bodies: growth, and outlines and parts of a new body.
 #include "body/bodies.h"
 #include "base/elementary.h"
 #include "geometry/polygons.h"
@@ -69,7 +69,7 @@ void bt_bodies_make_homes(bt_bodies *bodies)
     bodies->home = bt_alloc_aligned((size_t)bodies->cap, sizeof *bodies->home);
 }
 
-/// Marks and lengths of the n vertices of one polygon, from `first` on.
+/// Set the marks and edge lengths of the n vertices of one polygon, from `first` on.
 static void close_polygon(bt_bodies *bodies, int64_t first, int n)
 {
     for (int k = 0; k < n; k++) {
@@ -80,7 +80,7 @@ static void close_polygon(bt_bodies *bodies, int64_t first, int n)
     bodies->mark[first].count = (uint8_t)n;
 }
 
-/// The convex hull of the outline of body i: its vertices are those that the hull of a copy has kept.
+/// Mark the convex hull of the outline of body i: the vertices left in the hull of a copy.
 static void mark_hull(bt_bodies *bodies, bt_idx i, int n, bool convex)
 {
     bt_mark *mark = bodies->mark + bodies->offset[i];
@@ -103,7 +103,7 @@ static void mark_hull(bt_bodies *bodies, bt_idx i, int n, bool convex)
     mark[last].next = (uint8_t)first;
 }
 
-/// The outline of a new body i, and its parts.
+/// Add the outline of a new body i, and its parts.
 static void add_polygons(bt_bodies *bodies, bt_idx i, const bt_body_def *def)
 {
     int64_t at = bodies->offset[i];
@@ -123,7 +123,7 @@ static void add_polygons(bt_bodies *bodies, bt_idx i, const bt_body_def *def)
     }
 }
 
-/// Ids up to n_global + n have a place in index_of.
+/// Make room in index_of for ids below n_global + n.
 static void make_ids(bt_bodies *bodies, bt_gid n)
 {
     if (bodies->n_global + n <= bodies->cap_global) return;

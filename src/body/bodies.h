@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The arrays of bodies (bergtow/body.h): storage, outlines, kinematics. Knows nothing of cells, contacts or ranks.
+// The arrays of bodies (bergtow/body.h): storage, outlines, kinematics. Independent of cells, contacts and ranks.
 #ifndef BERGTOW_BODIES_H
 #define BERGTOW_BODIES_H
 
@@ -7,58 +7,57 @@
 
 #include "bergtow/world.h"
 
-/// Arrays over the bodies, one row an array: what sorting, migration and storage of bodies go through.
+/// Arrays over the bodies, one row per array, for sorting, migration and storage of bodies.
 typedef struct bt_body_field {
     size_t array; ///< offset of the pointer in bt_bodies
-    size_t size;  ///< bytes a body
+    size_t size;  ///< bytes per body
 } bt_body_field;
 extern const bt_body_field bt_body_fields[];
-/// How many there are: the last one, the homes, only where these bodies have them.
+/// Number of these arrays; the last, the homes, counts only if these bodies have homes.
 int bt_bodies_n_fields(const bt_bodies *bodies);
 
-/// Arrays over the vertices of the bodies; size: bytes a vertex.
+/// Arrays over the vertices of the bodies; size: bytes per vertex.
 extern const bt_body_field bt_vertex_fields[];
 extern const int bt_n_vertex_fields;
 
-/// All of the drag.
+/// The exposure of a body with its whole drag.
 extern const bt_exposure bt_exposed;
 
-/// Room for n bodies and n_vertices vertices.
+/// Make room for n bodies and n_vertices vertices.
 void bt_bodies_reserve(bt_bodies *bodies, bt_idx n, int64_t n_vertices);
 void bt_bodies_free(bt_bodies *bodies);
 
-/// Room for the homes of all bodies, 0, before they are distributed to ranks.
+/// Allocate the homes of all bodies, set to 0, before bodies are distributed to ranks.
 void bt_bodies_make_homes(bt_bodies *bodies);
 
 /// Add a body (bt_world_add); returns its gid. Before bodies are distributed to ranks.
 bt_gid bt_bodies_add(bt_bodies *bodies, const bt_body_def *def);
-/// Keep the next n ids for bodies that are put there later.
+/// Reserve the next n ids for bodies added later by bt_bodies_put.
 void bt_bodies_skip(bt_bodies *bodies, bt_gid n);
-/// A body at the end of the storage, with an id that no body here has; returns it.
+/// Append a body with an id that no body here has; returns its index.
 bt_idx bt_bodies_put(bt_bodies *bodies, const bt_body_def *def, bt_gid gid);
-/// Leave out the bodies that keep [n] does not say, and close the gaps: the others stay in their order. index_of is not
-/// brought up to date.
+/// Remove the bodies whose keep[n] is 0, and close the gaps: the others stay in order. index_of is not updated.
 void bt_bodies_compact(bt_bodies *bodies, const uint8_t *keep);
 
-/// Outline of body i turned by its yaw (after a change of pose).
+/// Rotate the outline of body i by its yaw (after a change of pose).
 void bt_bodies_turn(bt_bodies *bodies, bt_idx i);
 
-/// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
+/// Speed of the fastest point of body i at velocity v relative to the water, m/s.
 static inline double bt_bodies_speed(const bt_world *world, bt_idx i, const bt_vel *v)
 {
     const double x = v->x - world->par.water_u, y = v->y - world->par.water_v;
     return sqrt(x * x + y * y) + world->bodies.radius[i] * fabs(v->w);
 }
 
-/// Is v the velocity of the water, to the last bit, without turning?
+/// Is v exactly the velocity of the water, without rotation?
 static inline bool bt_bodies_drift(const bt_world *world, const bt_vel *v)
 {
     return v->x == world->par.water_u && v->y == world->par.water_v && v->w == 0;
 }
 
-/// Depth to which body i overlaps with polygons, m; <= 0: it does not. They have n vertices, with their marks, and with
-/// their places relative to a centroid from which that of i is (dx, dy), m, as bt_bodies has them: an outline, with its
-/// parts after it.
+/// Depth by which body i overlaps a set of polygons, m; <= 0: no overlap. The polygons have n vertices with marks,
+/// stored as in bt_bodies: an outline, followed by its parts, relative to a centroid from which that of i is at (dx,
+/// dy), m.
 double bt_bodies_depth(const bt_bodies *bodies, bt_idx i, const bt_mark *mark, const double *vertex, int64_t n,
                        double dx, double dy);
 
@@ -89,19 +88,19 @@ static inline double bt_pair_restitution(const bt_bodies *bodies, bt_idx i, bt_i
     return bodies->restitution[j];
 }
 
-/// x brought into the period from `low`; *laps grows by the periods that were taken off. 0 = not periodic.
+/// x wrapped into the period that starts at `low`; *laps grows by the periods taken off. period 0: not periodic.
 static inline double bt_into_period(double x, double low, double period, int32_t *laps)
 {
     if (!(period > 0) || (x >= low && x < low + period)) return x;
     const double turns = floor((x - low) / period);
-    if (!(fabs(turns) < 1e9)) return x; // no number, or as good as none: guards end such a run
+    if (!(fabs(turns) < 1e9)) return x; // NaN or absurd: guards end such a run
     x -= turns * period;
     *laps += (int32_t)turns;
     if (x >= low + period) x -= period, ++*laps; // rounding
     return x;
 }
 
-/// |d| up to 1.5 periods.
+/// Nearest image of a distance d, for |d| up to 1.5 periods.
 static inline double bt_nearest_image(double d, double period)
 {
     if (period > 0) {

@@ -52,7 +52,7 @@ static bt_law_contact contact_of(const bt_world *world, int law, const bt_cell *
     bt_law_contact x = {.w = world, .a = contact->a, .b = contact->b, .own = own_of(&world->par, law), .n = contact->n};
     const bool *closes = cell->laws->limits[j].closes;
     for (int i = 0; i < contact->n; i++) x.gap[i] = cell->gaps[j].gap[i], x.closes[i] = closes[i];
-    // ran = ra × n, which changes along the tangent by the distance
+    // ran = ra × n: its difference between the points is their distance along the tangent
     if (closes[0] && closes[1]) x.length = fabs(contact->ran[1] - contact->ran[0]);
     if (record >= 0) memcpy(x.value, cell->laws->memory[record].value, sizeof x.value);
     return x;

@@ -15,7 +15,7 @@ void bt_cells_make_room(bt_cell *cell, size_t bytes)
     cell->contacts = bt_alloc_unset(cell->contact_bytes, 1);
 }
 
-/// The contacts into memory of their own.
+/// Move the contacts to newly allocated memory.
 static void move_contacts(bt_cell *cell, size_t bytes)
 {
     bt_contact *contacts = bt_alloc_unset(bytes, 1);
@@ -32,7 +32,7 @@ void *bt_cells_after_contacts(bt_cell *cell, size_t bytes)
     return (char *)cell->contacts + own;
 }
 
-/// Only the contacts stay.
+/// Give back the memory beyond the contacts.
 static void rest(bt_cell *cell)
 {
     const size_t bytes = (size_t)cell->n_contacts * sizeof *cell->contacts;
@@ -71,7 +71,7 @@ void bt_cells_empty(bt_cells *cells)
     cells->n = 0;
 }
 
-// --- what the contacts were ------------------------------------------------------------------------------------------
+// --- previous contacts -----------------------------------------------------------------------------------------------
 
 int bt_memory_by_names(const void *p, const void *q)
 {
@@ -123,14 +123,14 @@ bt_memory *bt_cells_take_memory(const bt_world *world, int64_t *n)
     return memory;
 }
 
-/// A pair that was in contact into the list of a cell that has had no detection yet.
+/// Append a pair that was in contact to the list of a cell before its first detection.
 static void put_pair(bt_cell *cell, bt_idx a, bt_idx b, const bt_memory *memory)
 {
     bt_pair_search *search = &cell->search;
     if (search->n_pairs == search->cap_pairs) {
         cell->cap_contacts = search->cap_pairs = search->cap_pairs ? 2 * search->cap_pairs : 16;
         search->pairs = bt_realloc(search->pairs, (size_t)search->cap_pairs, sizeof *search->pairs);
-        // not aligned: no room here
+        // not aligned, and without room behind them
         cell->contacts = bt_realloc(cell->contacts, (size_t)search->cap_pairs, sizeof *cell->contacts);
         cell->gaps = bt_realloc(cell->gaps, (size_t)search->cap_pairs, sizeof *cell->gaps);
     }
@@ -151,7 +151,7 @@ static void put_memory(bt_world *world, bt_memory *memory, int64_t n)
     if (n > 0) qsort(memory, (size_t)n, sizeof *memory, bt_memory_by_names);
     for (int64_t k = 0; k < n; k++) {
         const bt_idx a = bt_world_index(world, memory[k].a), b = bt_world_index(world, memory[k].b);
-        // a floe that has shot so far away from a large body that its rank does not hold it any more
+        // the floe has shot so far from a large body that this rank no longer holds it
         if (a < 0 || b < 0) continue;
         bt_cell *cell = &cells->cell[bt_cells_of_pair(world, a, b)];
         if (memory[k].law != 0) bt_cells_remember(cell, &memory[k]);
@@ -159,9 +159,8 @@ static void put_memory(bt_world *world, bt_memory *memory, int64_t n)
     }
 }
 
-/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the
-/// margin they had (the last solution may be one that did not converge). No cell has both in its block, and no rank may
-/// hold both.
+/// Drop pairs that cannot touch under the new labels: floes that have shot apart within one step by more than their
+/// margin (the last solve may not have converged). No cell has both in its block, and perhaps no rank holds both.
 static void drop_parted(const bt_world *world, bt_memory *memory, int64_t *n)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -174,8 +173,7 @@ static void drop_parted(const bt_world *world, bt_memory *memory, int64_t *n)
     *n = kept;
 }
 
-/// Bodies to their ranks and places under the labels they have, and cells around them with this memory, which is
-/// released.
+/// Move bodies to their ranks and places under the present labels, and make cells with this memory, which is released.
 static void place(bt_world *world, bt_memory *memory, int64_t n)
 {
     bt_cells *cells = world->cells;
@@ -188,7 +186,7 @@ static void place(bt_world *world, bt_memory *memory, int64_t n)
     cells->labelled = true;
 }
 
-/// New cells and labels, for this memory, which is released.
+/// Make new cells and labels, and fill in this memory, which is released.
 static void renew(bt_world *world, double margin, bt_memory *memory, int64_t n)
 {
     bt_cells_choose(world, margin);
@@ -205,7 +203,7 @@ static void relabel(bt_world *world, double margin)
     renew(world, margin, memory, n);
 }
 
-/// New owners of the cells there are.
+/// Give the existing cells new owners.
 static void hand_on(bt_world *world)
 {
     int64_t n;
@@ -228,7 +226,7 @@ void bt_cells_begin(bt_world *world)
 {
     bt_cells *cells = world->cells;
     if (!cells->labelled || cells->relabel) {
-        // it has a place of its own, whatever its size
+        // always stored as a large body, whatever its size
         if (world->towed >= 0) world->bodies.large[bt_world_towed(world)] = 1;
         relabel(world, world->par.slop);
     } else if (world->exchange && world->exchange->due(world)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bounds of the contacts from their geometry, and what crushing leaves behind; equations in contact/crush.h.
+// Bounds of the contacts from their geometry, and the records of crushed depths; equations in contact/crush.h.
 #include "contact/crush.h"
 #include "case/warning.h"
 
@@ -13,8 +13,8 @@
 
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01
-#define NEAR 0.5 // of the way at which the overlap was looked at: nearer by than this, it is looked at again
-#define MOST_DEPTH 0.3 // of the mean floe size: beyond, outlines that stay as they were are no model
+#define NEAR 0.5 // of the penetration at which the overlap was evaluated: if it ends below this share, evaluate again
+#define MOST_DEPTH 0.3 // of the mean floe size: deeper, unchanged outlines are no longer a valid model
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
 
@@ -89,7 +89,7 @@ static bool applies(const bt_world *world, bt_idx a, bt_idx b) { return thicknes
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-enum { UNSEEN = 2 }; // value[UNSEEN + i]: 1 = point i was not found when the record was written: as deep as before
+enum { UNSEEN = 2 }; // value[UNSEEN + i]: 1 = point i was not found when the record was written, and kept its depth
 
 static bool keeps(const bt_world *world, bt_memory *memory) { return bt_law_near(world, memory); }
 
@@ -111,9 +111,9 @@ static int by_bodies(const void *p, const void *q)
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
-/// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on
-/// from part to part is sliding. So is a point that comes back into sight: meanwhile they may have crushed each other
-/// deeper under another name.
+/// Depth of each point from the earlier crushing of the two bodies, in these parts or in others: contact that moves
+/// from part to part is sliding. So is a point that is found again: meanwhile they may have crushed each other deeper
+/// at another feature.
 static void inherit(const bt_cell *cell, const bt_memory *names, const bt_manifold *manifold, bt_limit *limit)
 {
     if (cell->laws->n_memory == 0) return;
@@ -140,7 +140,7 @@ static void inherit(const bt_cell *cell, const bt_memory *names, const bt_manifo
 
 // --- geometry --------------------------------------------------------------------------------------------------------
 
-/// Force F(y) of the ice on one point that goes in by y, two lines, and its work E(y).
+/// Force F(y) of the ice on one point at penetration y, piecewise linear in two pieces, and its work E(y).
 typedef struct {
     double touch, ramp;        ///< F = touch + ramp y up to `kink`, m; N, N/m
     double kink;
@@ -154,10 +154,10 @@ static double work_to(const resistance *ice, double y)
                           : ice->work + y * (ice->force + 0.5 * ice->slope * y);
 }
 
-/// Of lengths at the depths `slop` and `way`, and areas of the overlap there; line: p h.
+/// From the lengths and areas of the overlap at the depths `slop` and `way`; line: p h, N/m.
 ///
-/// ∫ l = l(0) y + c y^q has l(0), l(way) and the area right; q = 2: a corner, 3/2: a disc, 1: an edge, flush at once.
-/// Two lines that have l(0), and l and its slope at the way, have the area right if they meet at (1 − 1/q) way.
+/// ∫ l = l(0) y + c y^q matches l(0), l(way) and the area; q = 2: a corner, 3/2: a disc, 1: an edge, flush at once. Two
+/// lines that match l(0), and l and its slope at y = way, match the area if they meet at (1 − 1/q) way.
 static resistance resistance_of(const double length[2], const double area[2], double least, double line, double slop,
                                 double way)
 {
@@ -178,13 +178,13 @@ static resistance resistance_of(const double length[2], const double area[2], do
     return ice;
 }
 
-/// Ends of a lone collision, of both points at once, in turns: how far each goes in, m/s, and whether that is a stop.
+/// End of a collision of this pair alone, both points in turn: the penetration of each per time step, m/s, 0 = stopped.
 static void collide(const bt_mass *m, const bt_hit hit[2], const double place[2], const resistance ice[2], int n,
                     double dt, double in[2])
 {
     enum { TURNS = 2 };
     double impulse[2] = {0};
-    // Where both are driven in alike the impulses are as the lengths.
+    // If both penetrate alike, the impulses are in the ratio of the lengths.
     for (int i = 0; i < n; i++) {
         const double all = m->w[i] + (n > 1 && ice[i].mean > 0 ? m->w12 * ice[1 - i].mean / ice[i].mean : 0);
         const double w = all > 0.1 * m->w[i] ? all : m->w[i], free = hit[i].before + w * hit[i].load;
@@ -200,7 +200,7 @@ static void collide(const bt_mass *m, const bt_hit hit[2], const double place[2]
         }
 }
 
-/// Approaches before the step, and the loads: W load = what the free velocities have more.
+/// Approaches at the start of the step, and the loads: W load = the gain in approach up to the free velocities.
 static void approach_of(const bt_world *world, const bt_contact *contact, const bt_mass *m, bt_hit hit[2])
 {
     const bt_bodies *bodies = &world->bodies;
@@ -216,14 +216,14 @@ static void approach_of(const bt_world *world, const bt_contact *contact, const 
     }
 }
 
-/// The same of the ice, over a step.
+/// The resistance of the ice, in units of impulse over a step.
 static void take_resistance(bt_hit *hit, const resistance *ice, double dt)
 {
     hit->touch = dt * ice->touch, hit->ramp = dt * dt * ice->ramp, hit->kink = ice->kink / dt;
     hit->force = dt * ice->force, hit->slope = dt * dt * ice->slope, hit->work = ice->work;
 }
 
-/// Work of crushing is the energy lost. What the loads give is borne without a way.
+/// Bound of a hit: the work of crushing equals the energy lost. The loads' share is borne without penetration.
 static void bound_hit(bt_limit *limit, int i, const bt_hit *hit, double place, double most)
 {
     limit->flat[i] = bt_min(limit->flat[i], bt_max(0, hit->load * (hit->before - place) / (hit->before + place)));
@@ -231,7 +231,7 @@ static void bound_hit(bt_limit *limit, int i, const bt_hit *hit, double place, d
     limit->rise->hit[i] = *hit;
 }
 
-/// The mean force over the way.
+/// Bound of a push: the mean force over the penetration.
 static void bound_push(bt_limit *limit, int i, const resistance *ice, double way, double dt)
 {
     const double flat = dt * ice->touch;
@@ -253,7 +253,7 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     const double line = own[BT_CRUSH_PRESSURE] * h, slop = world->par.slop;
     const bt_mass mass = bt_mass_of(contact, bodies->inv);
     const bt_memory names = bt_law_names(world, pair, BT_LAW_CRUSHING);
-    // then its edges bear no more than this, and give way as they do when they raft
+    // then its edges bear no more than the rafting load, and give way by rafting
     const bool rafts = limit->record[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(cell, &names, manifold, limit);
     for (int i = 0; i < manifold->n_points; i++) gaps->gap[i] += limit->rise->depth[i];
@@ -294,7 +294,7 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
         way = deep;
     }
     for (int i = 0; i < manifold->n_points; i++) {
-        // Loads beyond the limit drive the point in ever faster: no stop to find the energy of.
+        // Loads beyond the limit drive the point in ever faster: it never stops, and there is no energy to match.
         if (strikes[i] && hits[i].load * hits[i].before < bt_hit_work(&hits[i], hits[i].before - place[i]))
             bound_hit(limit, i, &hits[i], place[i], dt * ice[i].mean);
         else bound_push(limit, i, &ice[i], free_way, dt);
@@ -315,7 +315,7 @@ static void give_way(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *nu
     bt_sum_add(&number[CRUSHING], 1);
 }
 
-/// Where there is room, and the record does not have that feature yet.
+/// Add a depth to the record if there is room and the feature is not in it yet.
 static void keep_depth(bt_memory *memory, uint32_t feature, double depth, bool unseen)
 {
     for (int i = 0; i < memory->n_points; i++)
@@ -338,7 +338,7 @@ static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
     if (deepest == 0) return;
     const uint32_t *feature = cell->gaps[j].feature;
     bt_memory memory = bt_law_names(world, &cell->search.pairs[contact->pair], BT_LAW_CRUSHING);
-    // What is crushed or touches; then crushed points that were not found, as deep as before; then the rest.
+    // First points that are crushed or touch; then crushed points not found, with old depths; then the rest.
     for (int i = 0; i < contact->n; i++)
         if (limit->rise->depth[i] > 0 || cell->gaps[j].gap[i] <= 0)
             keep_depth(&memory, feature[i], limit->rise->depth[i], false);

@@ -1,67 +1,66 @@
 // SPDX-License-Identifier: MIT
-// Crushing-limited contact: ice bears no more than a pressure, and what cannot be borne is crushed.
+// Crushing-limited contact: ice bears at most a given pressure, and is crushed where the load would be higher.
 //
 // The normal impulse of contact point i in a step is bounded, and with it the friction cone |λ_t| <= μ Σ λ_i:
 //     0 <= λ_i <= p h Δt ℓ_i,   w_i > 0 only if λ_i = 0,   w_i < 0 only if λ_i is at its bound
 // p: ice.crushing.pressure, h: thickness of the thinner floe of the pair (of the floe, on the towed body or a wall), ℓ:
-// contact length. Where the bound holds the bodies go on approaching: that ice is crushed, to the depth d_i += −Δt w_i.
-// Gaps are measured from the crushed surfaces, g + d, so that neither the position projection nor the statistics of
-// overlap take crushed ice for an error, and bodies that part and come back meet where they crushed each other last.
-// The mass of crushed ice stays where it was.
+// contact length. At the bound the bodies keep approaching and crush the ice between them: d_i += −Δt w_i, d: crushed
+// depth. Gaps are measured from the crushed surfaces, g + d, so that neither the position projection nor the statistics
+// of overlap take crushed ice for an error, and bodies that part and come back meet where they crushed each other last.
+// Crushing does not change the mass of a floe.
 //
 // Contact length. ℓ is the width, across the normal, of the overlap of the two outlines as they are when the crushed
-// surfaces touch: the overlapping part for two edges; for a corner of angle φ that was crushed squarely to the depth d,
-// 2 d tan(φ/2); the chord for a disc. Two points share it as the forces at their places that are equivalent to a
-// uniform pressure on it: half each for two edges that lie on each other, nearly all for the end of an edge that has
-// come in tilted; a point that takes no part (bt_closing) has none of it. The overlap is looked at one slop deeper and
-// at the way y that the pair would make, and ℓ at the surface follows from both: nothing for a corner, all of it for
-// edges that lie on each other, which so bear from the first touch. No contact is shorter than ℓ_min = least_length × h
-// (half of it for each of two points), assumed: ice fails under higher pressures on smaller areas, and a corner that
-// has been in a pack is blunt by about its thickness. 0: corners are sharp.
+// surfaces touch: the overlapping part for two edges; for a corner of angle φ crushed squarely to the depth d,
+// 2 d tan(φ/2); for a disc, the chord. Two points share it in the ratio of point forces equivalent to a uniform
+// pressure on it: half each for two flush edges, nearly all for the end of an edge that has come in tilted, nothing for
+// a point that takes no part (bt_closing). The overlap is evaluated one slop deeper and at the penetration y that the
+// pair would reach; ℓ at the surface follows from both: nothing for a corner, all of it for flush edges, which thus
+// bear from the first touch. No contact is shorter than ℓ_min = least_length × h (half of it for each of two points),
+// assumed: ice fails at higher pressures on smaller areas, and a corner that has been in a pack is blunt by about its
+// thickness. 0: corners are sharp.
 //
-// Energy. F = p h ℓ takes E(y) = p h ∫ ℓ dy for the depth y, and ∫ ℓ dy is the area by which the overlap grows: E is
-// exact for every outline at the ways that are looked at. Between them F is two lines (resistance_of). The impulse F Δt
-// of a long step would stop a floe before anything is crushed. So a point that comes in by itself, v1 Δt > gap, bears
-// (contact/hit.h)
+// Energy. F = p h ℓ does the work E(y) = p h ∫ ℓ dy over the depth y, and ∫ ℓ dy is the growth of the overlapped area:
+// E is exact for every outline at the depths where the overlap is evaluated. Between them F is piecewise linear
+// (resistance_of). The impulse F Δt of a long step would stop a floe before anything is crushed. So a point that comes
+// in under its own momentum, v1 Δt > gap, bears (contact/hit.h)
 //     λ <= L(u) = P + 2 (E(y) − P u)/(v1 + u),   y = Δt u − gap
-// u, v1: approach at the end and at the start of the step; P: impulse of the external forces along the row. Then
-// ½ λ (v1 + u), what the contact takes from the bodies, is what crushing costs, in company too: a step that would stop
-// the floe leaves it the speed that takes it to its depth, and the next step takes the square of that share. v1 is the
-// velocity itself and not the free one: loads are not kinetic energy. At u = 0 the point bears P, so that a floe that
-// lies against others does not creep. L never exceeds the mean force over the free way times Δt, which it has at a
-// constant speed of crushing, u = v1. A gap to cross first costs nothing.
-// A point that does not come in by itself, or slower than solver.rest_speed, or under loads beyond the limit: the mean
-// force over its way times Δt, from u = 0 on. So also with restitution, where it rebounds as soon as the limit bears
-// that, and where the pair has rafted.
+// u, v1: approach at the end and at the start of the step; P: impulse of the external forces along the row. Then the
+// energy ½ λ (v1 + u) that the contact takes from the bodies is the energy of crushing, with other contacts too: a step
+// that would stop the floe leaves it the share of its speed that takes it to its depth, and the next step takes the
+// energy left, the square of that share. v1 is the velocity itself and not the free one: loads are not kinetic energy.
+// At u = 0 the point bears P, so that a floe that lies against others does not creep. L never exceeds the mean force
+// over the free way times Δt, which it has at a constant speed of crushing, u = v1. A gap to cross first costs nothing.
+// A point that does not come in under its own momentum, or comes in slower than solver.rest_speed or under loads beyond
+// the limit, bears the mean force over its penetration times Δt, from u = 0 on. The same holds with restitution, where
+// the point rebounds as soon as the limit allows, and for a pair that has rafted.
 // Depth and work, of a floe by itself or in a row, by face, corner or disc, are within 0.1 % for Δt from 2 ms to 5 s.
-// What is left: a point cannot tell in the step of a hit what it bears for others from what stops it. If others press
-// with a share s of the limit, it crushes up to s/(2 − s) v1 Δt more than in small steps.
+// Remaining error: in the step of a hit, a point cannot tell load passed on from others from the load that stops it. If
+// others press with a share s of the limit, it crushes up to s/(2 − s) v1 Δt more than in small steps.
 // Rejected: the line through (0, 0) and the solution of the lone collision, which sweeps like any line: depths of a
-// heavy body that comes in on floes which others hold are off by −28 % (face) and +66 % (corner at 5 s). An implicit
-// length at a share of the way (this law's predecessor): right where the first step stops a corner, −30 % in between,
-// nothing where a gap comes first. Lengths from the corner's angle, or from the clipped points of the manifold: a disc
-// of 32 short edges then bears on one of them at any depth.
+// heavy body that hits floes held by others are off by −28 % (face) and +66 % (corner at 5 s). An implicit length at a
+// share of the way (this law's predecessor): right where the first step stops a corner, −30 % in between, nothing where
+// a gap comes first. Lengths from the corner's angle, or from the clipped points of the manifold: a disc of 32 short
+// edges then bears on one of them at any depth.
 //
 // Memory. A pair keeps its depths, by contact feature, while its gap is at most BT_LAW_MEMORY mean floe sizes; then
 // they are forgotten, and the ice is sharp again (assumed). A point whose feature is new (the corner has slid on to the
-// next edge) has the overlap that is there, at most the pair's deepest crush, as its depth: sliding neither crushes nor
-// brings overlap back. So a depth is blunt ice of this pair alone: a third floe meets the outline as it was.
+// next edge) takes the present overlap, at most the pair's deepest crush, as its depth: sliding neither crushes nor
+// restores overlap. A depth belongs to this pair alone: a third floe meets the original outline.
 //
-// Not done: a record holds two points, so that a crushed corner which was not found is forgotten once the other end has
-// been crushed under two names; its depth then is the overlap that is there, as for a new point.
-// Crushed ice does not pile up, extrude or lose mass; a pressure that falls with the area of contact.
-// Surfaces that were crushed askew stay tilted against each other, and sliding along them changes gaps that the normal
-// rows do not see: such steps leave overlap (up to 2.5 % of a floe in the basin's jams, more between floes in parts),
-// which the position projection takes back in the steps after.
+// Not modelled: a record holds two points, so a crushed corner that was not found is forgotten once two other features
+// of the pair have been crushed; its depth is then the present overlap, as for a new point.
+// Crushed ice does not pile up, extrude or lose mass, and the pressure does not fall with the area of contact.
+// Surfaces that were crushed askew stay tilted against each other, and sliding along them changes gaps without the
+// normal rows noticing: such steps leave overlap (up to 2.5 % of a floe in the basin's jams, more between floes in
+// parts), which the position projection removes in later steps.
 #ifndef BERGTOW_CRUSH_H
 #define BERGTOW_CRUSH_H
 
 #include "contact/law.h"
 
-// The record of bt_crush_law: for each of two contact features a depth, m, and whether it is of an earlier step (1)
-// than the last.
+// The record of bt_crush_law: for each of two contact features a depth, m, and 1 if it is older than the last step.
 
-/// Its numbers of the case: p, Pa, 0 = contacts are rigid; least length of a contact / ice thickness.
+/// Its parameters from the case: p, Pa, 0 = contacts are rigid; least length of a contact / ice thickness.
 enum { BT_CRUSH_PRESSURE, BT_CRUSH_LEAST };
 
 #endif

@@ -23,21 +23,21 @@
 // Contacts of several parts of one floe, or of several pieces of a shore, at one place become one.
 //
 // Parts that share a corner can both touch another floe there: one by the corner, the other by the end of its edge. The
-// normals of the two then differ by the tilt of two nearly parallel edges. The rows are a wedge that is not there: it
-// stops a floe that slides, and with friction the sweeps find no solution at all (seen: a hexagon in two parts, 20,000
-// sweeps, 18 J gained). Normals farther apart than those of edges that face each other squarely (manifold.c) belong to
-// different sides, as in a notch, and stay. Of two points at one place the deeper one stays: the other may be the end
-// of an edge that is cut off at the seam, and above the corner that lies just beyond it.
+// normals of the two then differ by the tilt of two nearly parallel edges. The two rows form a spurious wedge: it stops
+// a sliding floe, and with friction the sweeps find no solution at all (seen: a hexagon in two parts, 20,000 sweeps, 18
+// J gained). Normals farther apart than those of edges that face each other squarely (manifold.c) belong to different
+// sides, as in a notch, and stay. Of two points at one place the deeper stays: the other may be the end of an edge cut
+// off at the seam, above the corner just beyond it.
 
 #define SQUARE 0.98 // cosine, as for reference edges
 #define PLACE 0.01  // of the smaller radius, as for reference edges
 
-/// A contact as the body has it that touches several polygons of one outline.
+/// A contact of a body that touches several polygons of one outline.
 typedef struct {
     bt_manifold *m;
-    bt_gid body;   ///< that one
+    bt_gid body;   ///< the body that touches
     size_t place;  ///< in the list
-    int n_points;  ///< that were found
+    int n_points;  ///< as found
     bool flip;     ///< it is b of the pair
 } touch;
 
@@ -58,7 +58,7 @@ static void drop(bt_manifold *manifold, int i)
     manifold->n_points--;
 }
 
-/// Points that p and q have both: those of q stay, unless that of p is deeper by more than the slop.
+/// Of points that p and q share, keep those of q, unless that of p is deeper by more than the slop.
 static void settle(const bt_world *world, const touch *p, const touch *q)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -78,10 +78,10 @@ static void settle(const bt_world *world, const touch *p, const touch *q)
         }
 }
 
-/// The contacts t[n] of one body with the polygons of one outline.
+/// Remove duplicate points among the contacts t[n] of one body with the polygons of one outline.
 static void unite(const bt_world *world, const touch *t, size_t n)
 {
-    // Edges that lie on each other know more than single points: those go first, whatever their order.
+    // Flush edges say more than single points, so single points are dropped first, whatever their order.
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
             if (i != j && t[i].m->n_points == 1 && (t[j].m->n_points == 2 || (t[j].m->n_points == 1 && j < i)))
@@ -124,10 +124,11 @@ void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n)
 
 // --- detection -------------------------------------------------------------------------------------------------------
 
-/// A speed whose margin is the slop, for bodies that may lie deeper than that at rest.
+/// A speed whose margin is the slop, for bodies at rest that may overlap by more than the slop.
 static double stir(const bt_world *world) { return 0.4 * world->par.slop / world->par.dt; }
 
-/// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
+/// Raise the bounds for a speed s in the cells x0..x1 × y0..y1. Cell T has t in its block or in the ring around it if t
+/// − 2 <= T <= t + 1.
 static void raise(bt_cells *cells, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
     const bool open = !cells->wrap_x && !cells->wrap_y; // then the box of the cells is all there is
@@ -142,16 +143,16 @@ static void raise(bt_cells *cells, int32_t x0, int32_t x1, int32_t y0, int32_t y
         for (int32_t x = x0; x <= x1; x++) {
             const bt_idx k = open ? cells->at[(int64_t)(y - cells->low_y) * cells->n_x + (x - cells->low_x)]
                                   : bt_cells_at(cells, cells->wrap_x == 1 ? 0 : x, cells->wrap_y == 1 ? 0 : y);
-            if (k < 0 || !(s > cells->bound[k])) continue; // a bound above 0 has woken it
+            if (k < 0 || !(s > cells->bound[k])) continue; // if its bound is above 0 it is awake
             bt_cells_wake(cells, k);
             cells->bound[k] = s;
         }
 }
 
-/// Speed s of cell (x, y) into the bounds of the cells it matters to.
+/// Raise the bounds of the cells that the speed s of cell (x, y) affects.
 static void spread(bt_cells *cells, int32_t x, int32_t y, double s) { raise(cells, x, x, y, y, s); }
 
-/// What a large body that moves, or can be moved, asks of the cells under it and beside it.
+/// Raise the bounds of the cells under and beside large bodies that move or can be moved.
 static double spread_large(bt_world *world, const bt_vel *v, const bt_vel *v2)
 {
     bt_cells *cells = world->cells;
@@ -170,7 +171,7 @@ static double spread_large(bt_world *world, const bt_vel *v, const bt_vel *v2)
     return movable ? fastest : 0;
 }
 
-/// Of cell k at both velocities.
+/// Largest speed in cell k at both velocities.
 static void find_speed(bt_world *world, bt_idx k, const void *velocities, bt_totals *none)
 {
     (void)none;
@@ -181,7 +182,7 @@ static void find_speed(bt_world *world, bt_idx k, const void *velocities, bt_tot
     if (k == cells->n - 1) return;
     const bt_idx end = bt_cells_moves(cells, k) ? cells->cell[k].end : cells->cell[k].first;
     for (bt_idx i = cells->cell[k].first; i < end; i++) {
-        // most floes of a cell that moves rest
+        // most floes of a moving cell are at rest
         if (!bt_bodies_drift(world, &v[0][i])) s = bt_max(s, bt_bodies_speed(world, i, &v[0][i]));
         if (v[1] != v[0] && !bt_bodies_drift(world, &v[1][i])) s = bt_max(s, bt_bodies_speed(world, i, &v[1][i]));
         if (world->bodies.disturbed[i]) s = bt_max(s, least);
@@ -213,7 +214,7 @@ double bt_contacts_bound(bt_world *world, const bt_vel *v, const bt_vel *v2, boo
     bt_domain_tell_cells(world, cells->speed, spread);
     const double large = spread_large(world, v, v2);
     bt_cells_sort_busy(cells);
-    // The last cell meets floes anywhere: it is made for the fastest of them all.
+    // The last cell meets floes anywhere: its bound is the speed of the fastest.
     bool movable = false;
     for (bt_idx l = cells->n_in_cells; l < bodies->n; l++) movable = movable || bodies->motion[l] == BT_DYNAMIC;
     fastest = bt_max(fastest, large);
@@ -242,7 +243,7 @@ typedef struct {
     bt_pack_scratch pack;
 } thread_scratch;
 
-/// Contacts that several parts of a floe, or pieces of a shore, have found are one.
+/// Merge contacts found by several parts of a floe, or pieces of a shore.
 static void merge(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch)
 {
     bt_merge_parts(world, scratch->man, scratch->n);
@@ -258,7 +259,7 @@ static void merge(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch
     scratch->n = kept;
 }
 
-/// Contacts that a law makes of pairs with a record, in place of those of the outlines, and after them.
+/// Replace contacts of pairs with a record by those that a law makes, or append these.
 static void replace(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch)
 {
     const size_t n = scratch->n;
@@ -328,8 +329,8 @@ static void wake_body(bt_world *world, bt_idx i)
     bt_cells_wake(cells, k);
 }
 
-/// Cells with bodies that contacts, here or on other ranks, may move; none of a step falls asleep when it is detected
-/// again.
+/// Find the cells with bodies that contacts, here or on other ranks, may move; a second detection in the same step puts
+/// no cell to sleep.
 static void find_awake(bt_world *world)
 {
     bt_cells *cells = world->cells;
@@ -361,9 +362,9 @@ static void mark_touched(const bt_cell *cell, uint8_t bit, uint8_t *touched)
 
 void bt_contacts_detect(bt_world *world, bool again)
 {
-    enum { FEW = 8 }; // a cell takes some ten microseconds
+    enum { FEW = 8 }; // a cell takes about ten microseconds
     bt_cells *cells = world->cells;
-    cells->beside = bt_laws_on(&world->par) ? world->par.slop : 0; // contact/law.h, bt_closing
+    cells->beside = bt_laws_on(&world->par) ? world->par.slop : 0; // contact/law_pair.h, bt_closing
     bt_idx *due = bt_alloc((size_t)cells->n_busy, sizeof *due), n_due = 0;
     for (bt_idx j = 0; j < cells->n_busy; j++) {
         const bt_idx k = cells->busy[j];
@@ -382,7 +383,7 @@ void bt_contacts_detect(bt_world *world, bool again)
         cell->fresh = true;
         due[n_due++] = k;
     }
-    // within a team of the caller the pass is that one thread's, which keeps its number
+    // inside a parallel region of the caller, one thread does the pass and keeps its number
     const int team = omp_get_num_threads(), most = omp_get_max_threads(), threads = team > most ? team : most;
     thread_scratch *scratch = bt_alloc((size_t)threads, sizeof *scratch);
     bt_phases_listed(world, due, n_due, FEW, narrow_phase, &scratch, &(bt_totals){0});
@@ -415,7 +416,7 @@ double bt_contacts_overlap(bt_world *world)
     return deepest;
 }
 
-/// The deeper of two; of equals the one with the lower ids, so that no order of threads is seen.
+/// Keep the deeper of two; of equals the one with the lower ids, so that the order of threads does not matter.
 static void deeper(bt_overlaps *to, const bt_overlaps *overlaps)
 {
     to->pairs += overlaps->pairs;
@@ -452,7 +453,7 @@ bt_overlaps bt_world_overlaps(bt_world *world, double allowed)
     bt_cells_update(world, world->par.slop);
     const bt_cells *cells = world->cells;
     bt_overlaps all = {0};
-    // On lists of its own, a cell at a time: neither the contacts of the step nor the memory for all lists at once.
+    // One cell at a time, on temporary lists: needs neither the step's contacts nor memory for all lists.
 #pragma omp parallel if (BT_MANY(cells->n, BT_FEW_CELLS))
     {
         bt_pair_scratch scratch = {0};

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What a contact point bears that comes in with a speed of its own: crushing takes in a step what the ice has cost.
+// Bound of a contact point that comes in under its own momentum: the energy lost in a step is the work of crushing.
 //
-// In velocities: u the approach at the end of the step, s = u − place what of it goes into the ice (to the depth Δt s),
-// v1 the approach at its start, P the impulse of the external forces along the row. Energy lost in the step, with the
-// work of the loads on the way Δt u, is the work of the ice E:
+// In velocities: u the approach at the end of the step, s = u − place the part of it that penetrates the ice (to the
+// depth Δt s), v1 the approach at its start, P the impulse of the external forces along the row. Energy lost in the
+// step, with the work of the loads on the way Δt u, is the work of the ice E:
 //     ½ λ (v1 + u) − P ½ (v1 + u) + P u = E(s)   or   L(u) = P + 2 (E(s) − P u)/(v1 + u)
 //     E(s) = touch s + ½ ramp s²,  s <= kink;   work + force s + ½ slope s²  beyond
-// It meets λ = (free − u)/W, u without this impulse being `free`, in a quadratic equation.
+// With λ = (free − u)/W, where `free` is u without this impulse, this gives a quadratic equation.
 #ifndef BERGTOW_HIT_H
 #define BERGTOW_HIT_H
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of contact laws, and what is the same for all of them; contact/law.h.
+// The table of contact laws, and the code common to all of them; contact/law.h.
 #include "contact/law.h"
 #include "contact/law_pair.h"
 
@@ -97,12 +97,12 @@ void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
     for (int law = 0; law < BT_ALL_LAWS; law++) limit->record[law] = -1;
     if (manifold->n_points > 0 && world->par.added_laws > 0)
         memcpy(limit->closes, bt_law_closing(world, cell, j, manifold).point, sizeof limit->closes);
-    // The last first: what has rafted is not measured from what was crushed before.
+    // In reverse order: where a pair has rafted, gaps are not measured from crushed surfaces.
     for (int law = BT_ALL_LAWS - 1; manifold->n_points > 0 && law >= BT_LAWS; law--)
         if (bt_law_on(&world->par, law) && bt_added_applies(world, law, manifold->a, manifold->b))
             bt_added_bound(world, law, cell, j, pair);
     for (int law = BT_LAWS - 1; law > BT_LAW_RIGID; law--) {
-        if (manifold->n_points == 0 && !bt_laws[law]->contact) continue; // sheets are of one law alone
+        if (manifold->n_points == 0 && !bt_laws[law]->contact) continue; // sheets obey only the law that makes them
         if (bt_law_on(&world->par, law) && bt_laws[law]->applies(world, manifold->a, manifold->b))
             bt_laws[law]->bound(world, cell, j, pair, manifold);
     }
@@ -110,7 +110,7 @@ void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-/// Sums of the numbers of a law; those of added laws come first.
+/// The sums of a law's numbers; those of added laws precede them.
 static bt_sum *sums_of(bt_totals *totals, int law) { return totals->sum + bt_added_sums() + bt_law_first_number(law); }
 
 static void into_stats(bt_step_stats *st, bt_totals *totals, const double most[BT_LAWS])
@@ -123,7 +123,7 @@ static void into_stats(bt_step_stats *st, bt_totals *totals, const double most[B
     bt_added_stats(st, totals);
 }
 
-/// The law at whose bound point i is; the rigid one where it is at none.
+/// The law whose bound point i has reached; the rigid law if it has reached none.
 static int yields(const bt_contact *contact, const bt_limit *limit, int i)
 {
     if (limit->by[i] >= BT_LAWS && bt_added_gives_way(contact, limit, i, limit->by[i])) return limit->by[i];

@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: MIT
-// Contact laws: a table with one row a law, and what a law may ask for.
+// Contact laws: a table with one row per law.
 //
 // Every pair obeys Signorini's conditions and Coulomb's (solve/solver.h). A law bounds the normal impulse of a contact
-// point from above,
+// point from above
 //     0 <= λ <= L(w),   w > 0 only if λ = 0,   w < 0 only if λ is at its bound
 //
-// (L: an impulse, N s; in bergtow/contact.h a law gives the force L/Δt),
-// and says what gives way there: a pair to which no law applies is rigid, L = ∞. Where several apply the least bound
-// holds, and the law that sets it gives way. The bounds of all laws have one shape, so that there is one update of a
-// contact for all of them (solve/limit.h):
+// (L: an impulse, N s; in bergtow/contact.h a law gives the force L/Δt)
+// and says what yields at the bound: a pair to which no law applies is rigid, L = ∞. If several laws apply, the least
+// bound holds, and its law yields. The bounds of all laws have one form, so that one contact update serves all
+// (solve/limit.h):
 //     L(w) = min(most, max(flat, rise(−w − place))),   rise: a line, or the curve of contact/hit.h
 //
-// Memory. What a law remembers of a pair is one record, bt_memory (space/cells.h), kept in the cell that owns the pair,
-// sorted by (a, b, part, law). It is state: it goes with the pair to other cells and ranks, into checkpoints, and into
-// the hash of the state, whatever the law. What every pair remembers, its impulses of the last step, travels and is
-// saved in the same way as the record of the rigid law.
+// Memory. A law keeps one record per pair, bt_memory (space/cells.h), kept in the cell that owns the pair, sorted by
+// (a, b, part, law). It is state: it goes with the pair to other cells and ranks, into checkpoints, and into the hash
+// of the state, whatever the law. The impulses of the last step, which every pair keeps, travel and are saved in the
+// same way, as the record of the rigid law.
 //
-// In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace what the outlines give
-// (contact/raft.h); the sweeps know bounds only; after them `gives_way` tells which points are at the bound and
-// approach, `give_way` books what that took, and `remember` writes the record.
+// In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace the contacts of the
+// outlines (contact/raft.h); the sweeps know only bounds; after them `gives_way` tells which points are at the bound,
+// `give_way` books the work of those that approach, and `remember` writes the record.
 //
-// A law that bounds the load of points from what their pair remembers is one source file (bergtow/contact.h,
+// A law that bounds the load of points from the record of their pair is one source file (bergtow/contact.h,
 // contact/added.h). One that changes what touches, or whose bound rises with the approach, is one source file with its
 // bt_law, an entry in the list below, its keys in src/case/schema.c, and a test in tests/physics. Series, summary,
-// checkpoints and texts take its numbers from its tables; the sweep is touched by neither.
+// checkpoints and texts take its numbers from its tables; neither kind touches the sweep.
 #ifndef BERGTOW_LAW_H
 #define BERGTOW_LAW_H
 
@@ -34,7 +34,7 @@
 #include "space/phases.h"
 #include "space/cells.h"
 
-/// The program's own, as LAW(name, bt_law); checkpoints store the position in this list, so append new ones.
+/// The program's own laws, as LAW(name, bt_law); checkpoints store the position in this list, so append new ones.
 #define BT_CONTACT_LAWS(LAW) \
     LAW(RIGID, bt_rigid_law) \
     LAW(CRUSHING, bt_crush_law) \
@@ -53,14 +53,14 @@ enum { BT_MAX_LAW_TOTALS = 16 };
 typedef struct bt_law_number {
     const char *name, *units, *description;
     bt_keep keep;     ///< how steps merge
-    bool largest;     ///< what `count` returns, one number of a law at most; else an exact sum
+    bool largest;     ///< the maximum that `count` returns, at most one number per law; else an exact sum
     const char *key;  ///< of the total in summary.json that stands for it
 } bt_law_number;
 
-/// How a run takes the steps together. STEPS: those in which the number is not 0; LAST: what it was in the last step.
+/// How a run combines its steps. STEPS: the number of steps in which it is not 0; LAST: its value in the last step.
 typedef enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS, BT_TOTAL_LAST } bt_total_rule;
 
-/// A running total of a number of a law, in checkpoints and in summary.json. None is renamed: files have the names.
+/// A running total of a number of a law, in checkpoints and in summary.json. Never rename one: files contain the names.
 typedef struct bt_law_total {
     int number;                      ///< of its law
     bt_total_rule rule;
@@ -71,7 +71,7 @@ typedef struct bt_law_total {
 /// A total over a run: whole of BT_TOTAL_STEPS, else real.
 typedef union bt_total_value { double real; int64_t whole; } bt_total_value;
 
-/// The rising part of the bounds of one contact (contact/crush.h): a line, or that of a hit.
+/// The rising part of the bounds of one contact (contact/crush.h): a line, or the curve of a hit.
 typedef struct bt_rise {
     double base[2];  ///< never above flat, N s
     double slope[2]; ///< kg
@@ -79,31 +79,31 @@ typedef struct bt_rise {
     double depth[2]; ///< crushed so far, m
 } bt_rise;
 
-/// Bounds of the points of one contact, and what gives way; all INFINITY (and slope 0) where no law applies.
+/// Bounds of the points of one contact, and the laws that set them; all INFINITY (and slope 0) where no law applies.
 typedef struct bt_limit {
-    double flat[2];  ///< the bound at any approach; flat[0] of sheets: most that their friction bears, N s
+    double flat[2];  ///< the bound at any approach; sheets, flat[0]: the bound of their friction, N s
     double most[2];  ///< N s
-    double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
+    double cap[2];   ///< the least flat bound of rafting and added laws; never below flat, N s
     union {
-        double place[2];  ///< approach that closes the gap, and nothing gives way, m/s
-        double ends[2];   ///< of sheets: most that the ends of their overlap bear, along x and y, N s
+        double place[2];  ///< approach that just closes the gap, m/s
+        double ends[2];   ///< of sheets: the bound of the ends of their overlap, along x and y, N s
     };
-    double grown[2]; ///< by how much the bodies go into each other in this step, m
+    double grown[2]; ///< penetration in this step, m
     bt_rise *rise;   ///< NULL where no law has a rising bound
     int32_t record[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none
     uint8_t by[2];   ///< the law that set cap
-    bool closes[2];  ///< bt_closing by the outlines, for laws that are added
+    bool closes[2];  ///< bt_closing by the outlines, for added laws
 } bt_limit;
 _Static_assert(sizeof(bt_limit) == 120, "one for each contact of ice that rafts");
 
-/// Mean floe sizes by which two bodies may have parted and still remember each other; cells always reach that far.
+/// Gap, in mean floe sizes, up to which a pair keeps its record; cells always reach that far.
 #define BT_LAW_MEMORY 0.1
 
 typedef struct bt_law {
     const char *name;  ///< one word
     const char *keys;  ///< section of the case, NULL = none
     const char *what;  ///< one sentence for people
-    /// own[] from the case: bt_params.law_own. Not of the rigid law, as all that follows
+    /// Set own[] (bt_params.law_own) from the case. The rigid law has neither this nor any member below
     void (*setup)(const bt_case *input, double own[BT_MAX_CONTACT_OWN]);
     bool (*on)(const double *own);
     bool rises; ///< some bounds have a rising part: contacts with them are not swept in batches (src/solve/batch.h)
@@ -111,32 +111,32 @@ typedef struct bt_law {
     int n_numbers;
     const bt_law_total *totals;   ///< [n_totals], in the order of the summary
     int n_totals;
-    /// To this pair?
+    /// Does the law apply to this pair?
     bool (*applies)(const bt_world *world, bt_idx a, bt_idx b);
-    /// What touches instead of the outlines for a pair with the record: an edge, if true, and sheets (contact/raft.h).
-    /// NULL = the outlines.
+    /// Contacts that replace those of the outlines for a pair with a record: an edge, if it returns true, and sheets
+    /// (contact/raft.h). NULL = the outlines.
     bool (*contact)(const bt_world *world, const bt_pair *pair, const bt_memory *memory, bt_manifold *edge,
                     bt_manifold *sheets);
     /// Narrow the bounds of contact j of the cell, made from the manifold of the pair; its gaps become those between
-    /// the surfaces that are left.
+    /// the remaining surfaces.
     void (*bound)(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
-    /// Brings the record up to date with the poses; does it stay?
+    /// Update the record to the poses; false drops it.
     bool (*keeps)(const bt_world *world, bt_memory *memory);
     /// Is point i of the contact at the bound of this law?
     bool (*gives_way)(const bt_contact *contact, const bt_limit *limit, int i);
-    /// It is, and approaches: limits[j].grown[i] has been set.
-    /// number, here and below: [n_numbers] the sums of the law's numbers.
+    /// Called if it is and still approaches; limits[j].grown[i] has been set.
+    /// number, here and below: [n_numbers], the sums of the law's numbers.
     void (*give_way)(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *number);
-    /// After the solve: into the records of the cell.
+    /// After the solve: update the records of the cell.
     void (*remember)(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number);
-    /// A record into the sums; returns what the law wants the largest of. Of all records, also where nothing moves.
+    /// Add a record to the sums; returns the value whose maximum the law reports. For all records, also at rest.
     double (*count)(const bt_world *world, const bt_memory *memory, bt_sum *number);
-    // texts in new memory, or NULL for nothing to say
+    // texts in new memory, or NULL for none
     /// A line of `bergtow check`: what the law means for floes of this thickness and mean size, m.
     char *(*check)(const bt_case *input, double thickness, double size);
-    /// A line of the table at the end of a run: total [n_totals], area of all ice, m².
+    /// A line of the table at the end of a run; total [n_totals]; ice_area: of all ice, m².
     char *(*result)(const bt_case *input, const bt_total_value *total, double ice_area);
-    /// A doubt about these numbers; size: mean of the floes, m.
+    /// Warn of doubtful totals; size: mean of the floes, m.
     void (*warn)(const bt_total_value *total, double size, bt_errors *warnings);
 } bt_law;
 
@@ -145,37 +145,37 @@ BT_CONTACT_LAWS(BT_LAW_DECLARED)
 #undef BT_LAW_DECLARED
 extern const bt_law *const bt_laws[BT_LAWS];
 
-/// Numbers of all laws of the program, one law after the other: those of law `law` from bt_law_first_number(law) on,
-/// of all up to bt_law_first_number(BT_LAWS).
+/// Index of the first number of law `law` when the numbers of all the program's laws are listed law by law; for
+/// BT_LAWS: how many there are.
 int bt_law_first_number(int law);
-/// And their totals.
+/// The same for totals.
 int bt_law_first_total(int law);
-/// Numbers of the laws from a case.
+/// Set the parameters of the laws from a case.
 void bt_laws_setup(const bt_case *input, bt_params *par);
 
-/// Is a law on whose bounds rise?
+/// Is any law on whose bounds have a rising part?
 bool bt_laws_rise(const bt_params *par);
 
 /// Does any law bound contacts in this world?
 bool bt_laws_on(const bt_params *par);
-/// Does the law of this number bound contacts in this world? False where there is none of it.
+/// Does the law with this number bound contacts in this world? False if there is no such law.
 bool bt_law_on(const bt_params *par, int law);
-/// And those of this pair?
+/// And the contacts of this pair?
 bool bt_law_applies(const bt_world *world, int law, bt_idx a, bt_idx b);
 
-/// At the start of a detection: forget what the cell need not remember any more.
+/// At the start of a detection: drop the records that the cell no longer needs.
 void bt_laws_prune(const bt_world *world, bt_cell *cell);
 
-/// Room for the bounds of the contacts of a cell.
+/// Make room for the bounds of the contacts of a cell.
 void bt_laws_reserve(bt_cell *cell);
 
-/// Bounds of contact j of the cell, made from the manifold of the pair.
+/// Set the bounds of contact j of the cell, which was made from this manifold of the pair.
 void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
 
-/// Collective. After the solve: what gives way, into the records; work, numbers and depths into stats.
+/// Collective. After the solve: update the records, and write work, numbers and depths to stats.
 void bt_laws_grow(bt_world *world);
 
-/// A flat bound c of this law on point i, whatever bounds it now, N s.
+/// Apply a flat bound c of this law, N s, to point i, besides its present bounds.
 static inline void bt_law_narrow(bt_limit *limit, int i, double c, int law)
 {
     if (c < limit->cap[i]) limit->cap[i] = c, limit->by[i] = (uint8_t)law;

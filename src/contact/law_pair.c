@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a contact law asks of a pair of bodies: what it remembers of it, which points take part in a step, their work.
+// Services for contact laws: the records of a pair, the points that take part in a step, and their work.
 #include "contact/law_pair.h"
 
 #include <math.h>
@@ -50,8 +50,8 @@ bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, 
                      free = bt_normal_velocity(contact, i, &bodies->vel_free[contact->a],
                                                &bodies->vel_free[contact->b]);
         const double approach = bt_max(0, -bt_min(before, free));
-        // Found whatever the margin, which is at least the slop and the way of two bodies at the highest speed nearby
-        // (space/cells.h, but for its cap): manifold.c looks a slop beyond the nearest point.
+        // These points are found whatever the margin: it is at least the slop, and the distance that two bodies at the
+        // highest speed nearby cover (space/cells.h, except for its cap); and manifold.c looks a slop farther.
         closing.point[i] = gap[i] <= bt_max(world->par.dt * approach, slop) || gap[i] <= closing.gap ||
                            manifold->p[i].gap <= nearest + slop;
         closing.n += closing.point[i];
@@ -90,7 +90,7 @@ double bt_law_share(const bt_manifold *manifold, int i, bt_patch patch, const bt
 
 // Work of the impulses of a contact, from velocities without and with contacts.
 
-/// Velocity without contacts: U*, and for the towed body what the line adds to it.
+/// Velocity without contacts: U*, plus, for the towed body, the change by the line.
 static bt_vel velocity_without_contacts(const bt_world *world, bt_idx i)
 {
     bt_vel v = world->bodies.vel_free[i];

@@ -9,12 +9,12 @@
 // floes lying edge to edge resist turning. Two vertices facing each other get one point with the normal along the
 // line that joins them: there an edge normal would feign a wall in front of a passing corner.
 //
-// Which edges are the best changes seldom, while a full search is half of the work. So a pair keeps them, with how much
-// they lead. For centroids d apart, s_i is n_i·d and a part that depends on the difference of the yaws alone; so a
-// motion by Δd and turns φ changes no s_i by more than |Δd| + |φ| |d| + |φ_a − φ_b| r, and what is first stays so while
-// twice this is less than its lead on the second. Until then these edges are all that is looked at, and the result is
-// that of the full search to the last bit. Rejected: lengths of paths as the bound, which need less memory (floes that
-// are pushed ahead move far, but with each other).
+// The best edges seldom change, while a full search is half of the work. So a pair stores them, with their leads. For
+// centroids d apart, s_i is n_i·d plus a part that depends only on the difference of the yaws; so a motion by Δd and
+// turns φ changes no s_i by more than |Δd| + |φ| |d| + |φ_a − φ_b| r, and the first edge stays first while twice this
+// is less than its lead over the second. Until then only these edges are tested, and the result equals that of the full
+// search to the last bit. Rejected: path lengths as the bound, which need less memory (floes that are pushed ahead move
+// far, but with each other).
 //
 // Rejected: GJK with a contact patch (more code, and iterative on a problem that has at most a dozen vertices).
 #include <math.h>
@@ -28,7 +28,7 @@
 #include "base/elementary.h"
 
 #define UNIT (2 * BT_PI / 65536) // rad, of bt_axes.turn
-#define ROUNDED 5                // of them: less than two a body by rounding, and all other rounding
+#define ROUNDED 5                // in UNITs: less than two per body from rounding the turn, and all other rounding
 #define AROUND 50                // ties around the best within which separations are exact: they bound leads
 
 typedef struct {
@@ -41,13 +41,13 @@ typedef struct {
 static polygon polygon_of(const bt_bodies *bodies, bt_idx i, int part, double x, double y)
 {
     int64_t first = bodies->offset[i] + part;
-    // The whole of a convex body without a look at its marks: they would be one more line of memory in every pair.
+    // A convex body is taken whole without reading its marks, which would cost one more cache line per pair.
     const int count = part == 0 ? (int)(bodies->offset[i + 1] - first) : bodies->mark[first].count;
     return (polygon){bodies->outline + 2 * first, bodies->per_length + first, count, x, y};
 }
 
-/// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a
-/// floe's memory.
+/// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: storing them would take a quarter
+/// of a floe's memory.
 BT_INLINE void edge_normal(const polygon *shape, int i, double *nx, double *ny)
 {
     const double *v = shape->v + 2 * i, *next = shape->v + 2 * (i + 1 < shape->count ? i + 1 : 0);
@@ -58,9 +58,9 @@ BT_INLINE void edge_normal(const polygon *shape, int i, double *nx, double *ny)
 /// An edge: how far it separates the other polygon from its own, and its outward unit normal.
 typedef struct { double s, nx, ny; int i; } edge;
 
-/// Edge i of p and the signed distance of q from it; when that is certainly less than `floor`, a bound from above: q
-/// holds its centroid, so it reaches nearer to the edge's line than that does. One product instead of one a vertex, and
-/// it rules out two edges of three.
+/// Edge i of p and the signed distance of q from it; if that is certainly less than `floor`, an upper bound: q contains
+/// its centroid, so it comes nearer to the edge's line than the centroid. One product instead of one per vertex, and it
+/// rules out two edges in three.
 BT_INLINE edge edge_of(const polygon *p, int i, const polygon *q, double floor)
 {
     edge side = {.i = i};
@@ -74,8 +74,8 @@ BT_INLINE edge edge_of(const polygon *p, int i, const polygon *q, double floor)
     return side;
 }
 
-/// The edge of p that separates q most, exact if it does so by `floor`, and its lead on any other edge; stops at the
-/// first one that separates by more than `enough`.
+/// The edge of p that separates q most, exact if it does so by at least `floor`, and its lead over all other edges;
+/// stops at the first edge that separates by more than `enough`.
 BT_INLINE edge best_edge(const polygon *p, const polygon *q, double enough, double floor, double *lead)
 {
     edge best = {.s = -INFINITY};
@@ -147,8 +147,8 @@ BT_INLINE double cosine(const polygon *shape, int j, const edge *side)
     return side->nx * nx + side->ny * ny;
 }
 
-/// Edge of `shape` that faces another one most squarely. It is the guess, unless that is -1, if the edges beside it
-/// face it less so: normals turn one way around an outline.
+/// Edge of `shape` that faces edge `side` most squarely. A guess other than -1 is right if both its neighbours face
+/// `side` less squarely: normals turn one way around an outline.
 BT_INLINE int facing_edge(const polygon *shape, const edge *side, int guess)
 {
     if (guess >= 0) {
@@ -166,14 +166,14 @@ BT_INLINE int facing_edge(const polygon *shape, const edge *side, int guess)
     return facing;
 }
 
-/// How far points may be apart: from the other body; and, where a contact law asks for both ends of an edge, beyond the
-/// nearer one, however near that is to the margin (contact/law.h, bt_closing).
+/// Largest gap of a point; and, where a contact law needs both ends of an edge, by how much the gap of the farther end
+/// may exceed that of the nearer, whatever the margin (contact/law_pair.h, bt_closing).
 typedef struct { double margin, beside; } bounds;
 
 static bounds bounds_of(const bt_world *world, double margin) { return (bounds){margin, world->cells->beside}; }
 
-/// Points of the incident polygon, of its edge `facing`, that face the reference edge, or what counts of it on a shore
-/// (shown, or NULL); `flip` when the reference is b.
+/// Points on edge `facing` of the incident polygon that face the reference edge, or only its exposed part on a shore
+/// (shown, or NULL); `flip` if the reference is b.
 BT_INLINE void clip_points(const polygon *ref, const edge *side, const bt_face *shown, const polygon *inc, int facing,
                         bool flip, const double d[2], bounds most, bt_manifold *manifold)
 {
@@ -223,8 +223,8 @@ BT_INLINE void clip_points(const polygon *ref, const edge *side, const bt_face *
     }
     for (int k = 0; k < n; k++)
         if (ends[k].gap <= bt_max(most.margin, depth + most.beside)) ends[kept++] = ends[k];
-    // Both points on one line along the edge, half-way into the smaller gap: their tangential rows are then the same,
-    // and the solver can treat the friction of the pair as one. The normal rows do not depend on that height.
+    // Both points lie on one line along the edge, half-way into the smaller gap: their tangential rows are then the
+    // same, and the solver can treat their friction as one unknown. The normal rows do not depend on that height.
     for (int k = 0; k < kept; k++)
         set_point(manifold, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny,
                   ends[k].gap, d[0], d[1], base | ends[k].id);
@@ -253,7 +253,7 @@ static void deepest_point(const polygon *ref, const edge *side, const polygon *i
               ((uint32_t)flip << 31) | ((uint32_t)side->i << 20) | (uint32_t)deepest << 1);
 }
 
-/// Two corners, ca of a and cb of b, as the only point: the normal is along the line that joins them. False beyond the
+/// The only point from two corners, ca of a and cb of b: the normal is along the line that joins them. False beyond the
 /// margin.
 static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, const double d[2], double margin,
                          bt_manifold *manifold)
@@ -272,7 +272,7 @@ static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, con
 }
 
 /// Is the edge of b the reference? Two edges that face each other squarely have nearly the same separation: keep the
-/// reference of the step before, so that features, and with them impulses, persist.
+/// previous reference, so that features, and with them impulses, persist.
 BT_INLINE bool reference_is_b(const edge *a, const edge *b, double tie, int before)
 {
     bool ref_b = b->s > a->s;
@@ -280,7 +280,7 @@ BT_INLINE bool reference_is_b(const edge *a, const edge *b, double tie, int befo
     const bool square = a->nx * b->nx + a->ny * b->ny < -0.98;
     if (square && before >= 0 && fabs(a->s - b->s) < tie) ref_b = before;
     else if (square && before < 0 && b->s < a->s + tie) ref_b = false;
-    // apart by one of them: the tie must not feign overlap
+    // one axis shows them apart: the tie must not feign overlap
     if (bt_max(a->s, b->s) > 0 && (ref_b ? b->s : a->s) <= 0) ref_b = !ref_b;
     return ref_b;
 }
@@ -291,17 +291,17 @@ static double tie_of(const bt_bodies *bodies, bt_idx i, bt_idx j)
     return 0.01 * bt_min(bodies->radius[i], bodies->radius[j]);
 }
 
-/// Of a yaw that is no number, or as good as none, any: guards end such a run.
+/// Yaw in units. A NaN or absurd yaw may give any value: guards end such a run.
 BT_INLINE uint16_t turn_of(double yaw) { return fabs(yaw) < 1e9 ? (uint16_t)(int64_t)(yaw * (1 / UNIT)) : 0; }
 
-/// Where bodies i and j are: axes that are not known.
+/// Relative pose of bodies i and j, with axes not yet known.
 BT_INLINE bt_axes place_of(const bt_bodies *bodies, bt_idx i, bt_idx j, const double d[2])
 {
     return (bt_axes){.x = (float)d[0], .y = (float)d[1], .room = -1, .edge = {-1, -1},
                      .turn = {turn_of(bodies->pose[i].yaw), turn_of(bodies->pose[j].yaw)}};
 }
 
-/// No separation by an edge has changed by more than this from `axes` to `now`; radius: the larger one.
+/// Upper bound, m, of the change of any edge's separation from `axes` to `now`; radius: the larger of the two bodies.
 BT_INLINE float motion(const bt_axes *axes, const bt_axes *now, float radius)
 {
     const int turn = abs((int16_t)(now->turn[0] - axes->turn[0])) + abs((int16_t)(now->turn[1] - axes->turn[1])) +
@@ -310,10 +310,10 @@ BT_INLINE float motion(const bt_axes *axes, const bt_axes *now, float radius)
     return fabsf(now->x - axes->x) + fabsf(now->y - axes->y) + (float)turn * (float)UNIT * arm;
 }
 
-/// The edges `side` of a and b that separate the two most. False as soon as one separates by more than the margin.
-/// Those of the last search usually do so again, or are the best for certain (motion). Where not, an edge that
-/// separates by less than they, and by more than the tie, is neither the best nor in question. An edge that does not
-/// count has s = -∞.
+/// The edges `side` of a and b that separate the two most. False as soon as one separates by more than the margin. The
+/// edges of the last search usually do so again, or are certainly still the best (motion). Otherwise an edge that
+/// separates by less than these, by more than the tie, can be neither the best nor a tie. An edge that is ruled out has
+/// s = -∞.
 BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, double tie, float radius,
                          const bt_axes *now, bt_axes *axes, edge side[2])
 {
@@ -337,7 +337,7 @@ BT_INLINE bool find_axes(const polygon *a, const polygon *b, double margin, doub
     return true;
 }
 
-/// Of bodies that are convex. *gap: the largest separation, a lower bound of the distance.
+/// Manifold of convex bodies. *gap: the largest separation, a lower bound of the distance.
 BT_FOR_EACH_CPU
 static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margin, int reference_before,
                          bt_manifold *manifold, bt_axes *axes, double *gap)
@@ -355,7 +355,7 @@ static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margi
     const bool ref = reference_is_b(&side[0], &side[1], tie, reference_before);
     const double sep = side[ref].s;
 
-    manifold->a = a, manifold->b = b, manifold->n_points = 0; // and no more: the rest follows with the points
+    manifold->a = a, manifold->b = b, manifold->n_points = 0; // the rest is set with the points
     const bounds most = bounds_of(world, margin);
     clip_points(&shape[ref], &side[ref], NULL, &shape[!ref], facing_edge(&shape[!ref], &side[ref], side[!ref].i), ref,
                 d, most, manifold);
@@ -381,21 +381,21 @@ static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margi
 // --- bodies that are not convex, and shores --------------------------------------------------------------------------
 //
 // The parts of such a body are convex, but some of their edges are cuts through the ice, and some of their corners are
-// no corners of the body. A contact there would be with something that is not there: a floe that slides along a shore
-// of two parts would be stopped by the corner of the part ahead ("ghost" or "internal edge" collisions). So a contact
-// counts only where the outline itself can be touched:
+// no corners of the body. A contact there would be spurious: a floe that slides along a shore of two parts would be
+// stopped by the corner of the part ahead ("ghost" or "internal edge" collisions). So a contact counts only where the
+// outline itself can be touched:
 //   an edge       is one of the outline, not a cut;
 //   a corner V    of the outline, with edges e1 → V → e2, is convex, and the direction n from the body to the other one
 //                 lies in its normal cone: n·e1 >= 0 and n·e2 <= 0.
-// What is left out here is found with the part that has the edge, or with the one on the other side of the cut. Parts
-// that are apart touch at their nearest features or not at all. Parts that overlap part along the best axis that
-// counts, if that is not much farther than along the best of all: the middle one of three parts that share a corner
-// has edges of the outline only on its far side.
+// A contact left out here is found with the part that has the edge, or with the part on the other side of the cut.
+// Parts that are apart touch at their nearest features or not at all. Overlapping parts separate along the best axis
+// that counts, unless that is much farther than along the best of all: the middle one of three parts that share a
+// corner has edges of the outline only on its far side.
 //
-// Of a shore (space/shore.h) the pieces are such parts of one outline: their edges and corners count where they are on
-// the boundary of it.
+// The pieces of a shore (space/shore.h) are such parts of one outline: their edges and corners count where they lie on
+// its boundary.
 
-// rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
+// rad by which a direction may stand outside a cone: two parts of a straight shore may both count, never neither
 #define CONE 1e-6
 #define DETOUR 4  // depth along an axis that counts / depth along the best of all; more only within the tie
 
@@ -404,7 +404,7 @@ typedef struct {
     const bt_mark *mark;
     const double *outline; ///< of the body
     int corners;
-    const bt_face *face;   ///< of a shore: it says what counts
+    const bt_face *face;   ///< of a shore: which stretches count
     bool whole;            ///< the body is convex and alone: everything counts
 } part_of_body;
 
@@ -456,7 +456,7 @@ static bool covered_at_an_end(const part_of_body *part, int i)
     return face && (face->from > 0 || face->to * part->p.per_length[i] < 1 - 1e-9);
 }
 
-/// Is x beside a stretch of edge i that shows?
+/// Is x beside an exposed stretch of edge i?
 static bool shows_at(const part_of_body *part, int i, const double x[2])
 {
     const bt_face *face = &part->face[i];
@@ -467,8 +467,8 @@ static bool shows_at(const part_of_body *part, int i, const double x[2])
     return face->from < face->to && t >= face->from - slack && t <= face->to + slack;
 }
 
-/// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count, and
-/// where others cover an end of it, what shows.
+/// clip_points, without points on a cut: if the edge that faces the reference is a cut, only its ends can count; if
+/// others cover an end of it, only its exposed stretch.
 static void clip_what_counts(const part_of_body *ref, const edge *side, const part_of_body *inc, bool flip,
                              const double d[2], bounds most, bt_manifold *manifold)
 {
@@ -478,14 +478,14 @@ static void clip_what_counts(const part_of_body *ref, const edge *side, const pa
     if (edge_counts(inc, facing) && !partly) return;
     int kept = 0;
     for (int k = 0; k < manifold->n_points; k++) {
-        const uint32_t id = manifold->p[k].feature & 0xfffff; // vertex, and whether it is one of the reference
+        const uint32_t id = manifold->p[k].feature & 0xfffff; // vertex, and whether it belongs to the reference
         const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -side->nx, -side->ny);
         if (corner || (partly && shows_at(inc, facing, manifold->p[k].ra))) manifold->p[kept++] = manifold->p[k];
     }
     manifold->n_points = kept;
 }
 
-/// Do others cover an end of edge `side` of p, or of the edge of q that faces it, and is nothing else between them?
+/// Do others cover an end of edge `side` of p, or of the edge of q that faces it, leaving no contact point?
 static bool beside_what_shows(const part_of_body *p, const edge *side, const part_of_body *q)
 {
     if (!covered_at_an_end(p, side->i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, side, -1))))
@@ -495,7 +495,7 @@ static bool beside_what_shows(const part_of_body *p, const edge *side, const par
     return manifold.n_points == 0;
 }
 
-/// The edge of p that separates q most, of those that count, against corners of q that do.
+/// Among edges of p that count, against corners of q that count, the edge that separates q most.
 static edge best_that_counts(const part_of_body *p, const part_of_body *q)
 {
     edge best = {.s = -INFINITY};
@@ -509,7 +509,7 @@ static edge best_that_counts(const part_of_body *p, const part_of_body *q)
     return best;
 }
 
-/// The nearest features of two parts that are apart, where both count.
+/// Contact at the nearest features of two separate parts, if both count.
 static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], bounds most,
                             bt_manifold *manifold)
 {
@@ -537,8 +537,7 @@ static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint1
     bt_bodies_offset(world, ia, ib, d);
     const part_of_body p[2] = {part_of(world, ia, part[0], 0, 0), part_of(world, ib, part[1], d[0], d[1])};
     const double tie = tie_of(&world->bodies, ia, ib);
-    // Parts do not hold the centroid of their body, which rules out edges in best_edge: all edges in full, the last
-    // axis first.
+    // A part need not contain its body's centroid, which best_edge relies on: all edges in full, the last axis first.
     const int n_a = p[0].p.count, n = n_a + p[1].p.count,
               hint = known->edge[0] >= 0 ? known->edge[0] : known->edge[1] >= 0 ? n_a + known->edge[1] : 0;
     *known = (bt_axes)BT_NO_AXES;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Clipping of convex outlines, area and gradient of what two of them share; contact/overlap.h.
+// Clipping of convex outlines; area and gradient of their overlap; contact/overlap.h.
 #include "contact/overlap.h"
 
 #include <math.h>
@@ -18,7 +18,7 @@ static const double *outline_of(const bt_bodies *bodies, bt_idx i, int part)
     return bodies->outline + 2 * (bodies->offset[i] + part);
 }
 
-/// What lies to the left of the line from (x0, y0) along (ex, ey), an edge of b.
+/// Keep the part to the left of the line from (x0, y0) along (ex, ey), an edge of b.
 static void cut(bt_overlap *overlap, double x0, double y0, double ex, double ey)
 {
     const double *in = overlap->v[overlap->now], *last = in + 2 * (overlap->n - 1);
@@ -80,8 +80,8 @@ double bt_overlap_area(const bt_overlap *overlap, double centroid[2])
     return bt_max(0, 0.5 * twice);
 }
 
-/// How far inside an outline, placed at (x, y), point p is from the nearest edge that faces along (nx, ny); INFINITY
-/// where none does.
+/// Depth of point p inside an outline placed at (x, y), from the nearest edge that faces along (nx, ny); INFINITY if
+/// none does.
 static double inside_of(const double *q, int n, double x, double y, const double *p, double nx, double ny)
 {
     double least = INFINITY;

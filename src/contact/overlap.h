@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The intersection of two convex outlines, and which of them each of its edges belongs to.
+// The intersection of two convex outlines, and the owner of each of its edges.
 #ifndef BERGTOW_OVERLAP_H
 #define BERGTOW_OVERLAP_H
 
@@ -11,11 +11,11 @@ typedef struct bt_overlap {
     double v[2][4 * BT_MAX_VERTICES];  ///< v[now]: the vertices, m
     uint8_t of_b[2][2 * BT_MAX_VERTICES]; ///< 1 = the edge that starts at the vertex is one of b
     int now;
-    double push[2 * BT_MAX_VERTICES][2]; ///< what each edge has of −grad, m: by bt_overlap_gradient
+    double push[2 * BT_MAX_VERTICES][2]; ///< contribution of each edge to −grad, m: by bt_overlap_gradient
 } bt_overlap;
 
-/// Intersection of these parts of a and b when b has been moved by (dx, dy): Sutherland & Hodgman 1974, Comm. ACM 17, a
-/// cut by the edges of b one after the other. The same bits for the same poses, whatever was before.
+/// Intersection of these parts of a and b when b has been moved by (dx, dy): cut by the edges of b one after the other
+/// (Sutherland & Hodgman 1974, Comm. ACM 17). The bits depend on the poses alone.
 void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double dx, double dy,
                      bt_overlap *overlap);
 
@@ -26,7 +26,7 @@ double bt_overlap_area(const bt_overlap *overlap, double centroid[2]);
 /// line, so with n the outward normal
 ///     grad = ∫_{edges of b} n dl = −∫_{edges of a} n dl = ½ (∫_b − ∫_a) n dl
 /// Where edges of both lie on each other and face the same way (rectangles in a row) the gradient jumps as one passes
-/// the other. Such edges count for neither; within `blend` of each other in part.
+/// the other. Such edges count for neither, and edges within `blend` of each other only in part.
 void bt_overlap_gradient(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], bt_overlap *overlap,
                          double blend, double grad[2]);
 

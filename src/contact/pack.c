@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Contacts of a cell: order, geometry, effective masses, biases, warm start.
 //
-// Order. Contacts that follow each other should not share a body: the processor then works on several at once, where
-// each would otherwise wait for the velocities of the one before. So a cell's manifolds are coloured first-fit in the
-// order of their gids (every body of the block keeps a mask of the colours it has), and stand by colour. The order
-// follows from the manifolds and their gids alone, and is the same wherever and whenever the pair list was made.
+// Order. Successive contacts should not share a body: the processor can then overlap them, where each would otherwise
+// wait for the velocities of the previous one. So a cell's manifolds are coloured first-fit in the order of their gids
+// (every body of the block keeps a mask of the colours it has), and sorted by colour. The order follows from the
+// manifolds and their gids alone, wherever and whenever the pair list was made.
 #include "contact/pack.h"
 
 #include <math.h>
@@ -72,7 +72,7 @@ static int colour_contacts(const bt_world *world, const bt_cell *cell, bt_pack_s
         const bt_idx i = bodies->inv[manifold->a].m > 0 ? in_block(ts, cell, base, manifold->a) : -1,
                      j = bodies->inv[manifold->b].m > 0 ? in_block(ts, cell, base, manifold->b) : -1;
         const uint64_t used = (i >= 0 ? scratch->used[i] : 0) | (j >= 0 ? scratch->used[j] : 0);
-        const int colour = ~used ? __builtin_ctzll(~used) : MAX_COLOURS; // none left: at the end, one by one
+        const int colour = ~used ? __builtin_ctzll(~used) : MAX_COLOURS; // none left: at the end, uncoloured
         if (colour < MAX_COLOURS && i >= 0) scratch->used[i] |= (uint64_t)1 << colour;
         if (colour < MAX_COLOURS && j >= 0) scratch->used[j] |= (uint64_t)1 << colour;
         scratch->colour[k] = (uint8_t)colour;
@@ -84,7 +84,7 @@ static int colour_contacts(const bt_world *world, const bt_cell *cell, bt_pack_s
     return n_colours;
 }
 
-/// The contacts of the step before, whose memory that of this step takes.
+/// Save the contacts of the previous step: those of this step overwrite them.
 static void hold(const bt_cell *cell, bt_pack_scratch *scratch)
 {
     for (size_t k = 0; k < scratch->n; k++) {
@@ -103,7 +103,7 @@ static void inherit(const bt_manifold *manifold, const bt_held *held, bt_contact
     for (int i = 0; i < manifold->n_points; i++)
         for (int j = 0; j < held->n; j++)
             if (held->feature[j] == manifold->p[i].feature) contact->ln[i] = held->ln[j];
-    // The friction of the points is one number: it stays with the normal impulses that stay.
+    // The points share one friction impulse: it is kept in the proportion of the normal impulses that are kept.
     const double before = held->n > 1 ? held->ln[0] + held->ln[1] : held->n > 0 ? held->ln[0] : 0;
     const double kept = contact->ln[0] + contact->ln[1];
     contact->lt = before == 0 ? 0 : kept == before ? held->lt : held->lt * (kept / before);
@@ -148,23 +148,22 @@ static void fill_contact(const bt_world *world, const bt_manifold *manifold, bt_
     if (world->par.warm_start) inherit(manifold, held, contact);
 }
 
-/// Velocity at which point i of these gaps comes to touch at the end of the step, m/s; beyond all speeds where the row
-/// is released.
+/// Approach velocity at which point i just touches at the end of the step, m/s; huge if the row is released.
 static double place_of(const bt_world *world, const bt_gaps *gaps, int i)
 {
     return gaps->row == BT_ROW_RELEASED ? RELEASED / world->par.dt : bt_max(gaps->gap[i], 0) / world->par.dt;
 }
 
-/// Normal bias b of model equation (1). Of a pair that passes: contact/contacts.h.
+/// Normal bias b of model equation (1). For pairs that pass, see contact/contacts.h.
 static double bias_of(const bt_world *world, const bt_contact *contact, const bt_gaps *gaps, int i, double restitution)
 {
     const bt_bodies *bodies = &world->bodies;
     if (restitution > 0 && gaps->row != BT_ROW_RELEASED) {
-        // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
-        // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
-        // from the slop on, or rounding would decide which of two points of a square hit rebounds.
-        // Where drag takes part of the approach within the step, the law refers to what is left: the work of a row is
-        // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
+        // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds now:
+        // letting it close the gap first would lose the approach speed that the law refers to. "Meets" includes gaps up
+        // to the slop, or rounding would decide which of two points of a square hit rebounds.
+        // If drag takes part of the approach within the step, the law refers to the rest: the work of a row is λ (w* +
+        // w2)/2, and a rebound faster than −w* would add energy.
         const double approach = bt_normal_velocity(contact, i, &bodies->vel_start[contact->a],
                                                    &bodies->vel_start[contact->b]);
         const double closing = bt_normal_velocity(contact, i, &bodies->vel_free[contact->a],
@@ -192,17 +191,17 @@ void bt_pack_set_row(const bt_world *world, bt_cell *cell, bt_idx j, bt_row_stat
         for (int i = 0; i < contact->n; i++) cell->laws->limits[j].place[i] = place_of(world, gaps, i);
 }
 
-/// State of the row of contact j, made from the manifold; held: what it takes over.
+/// State of the row of contact j, made from the manifold; held: the contact that it replaces.
 static bt_row_state row_state(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold,
                               const bt_held *held)
 {
     if (world->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
-    if (world->stats.repeats > 0 && held->n > 0) return held->row; // of the detection before, in the same step
+    if (world->stats.repeats > 0 && held->n > 0) return held->row; // from the previous detection in this step
     if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
     for (int i = 0; i < manifold->n_points; i++)
         if (manifold->p[i].gap <= world->par.slop || cell->gaps[j].gap[i] <= world->par.slop) return BT_ROW_STAYS;
     for (int law = 0; cell->laws->limits && law < BT_ALL_LAWS; law++)
-        if (cell->laws->limits[j].record[law] >= 0) return BT_ROW_STAYS; // its outlines are not what touches
+        if (cell->laws->limits[j].record[law] >= 0) return BT_ROW_STAYS; // it is not the outlines that touch
     return BT_ROW_OPEN;
 }
 
@@ -210,7 +209,7 @@ uint64_t bt_contacts_load(const bt_cell *cell)
 {
     uint64_t sum = 0;
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        // + 0: a contact that bears nothing has 0 or −0, and −0 goes when it is made anew
+        // + 0 turns −0 into 0: an unloaded contact may have either, and loses −0 when it is made anew
         const double x[3] = {cell->contacts[i].ln[0] + 0.0, cell->contacts[i].ln[1] + 0.0, cell->contacts[i].lt + 0.0};
         uint64_t bits[3];
         memcpy(bits, x, sizeof bits);
@@ -251,12 +250,12 @@ void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch)
             continue;
         }
         fill_contact(world, &scratch->man[i], scratch->pair[i], &scratch->held[i], contact, &cell->gaps[at]);
-        if (bounded) bt_laws_bound(world, cell, at, pair, &scratch->man[i]); // the gaps may be others after it
+        if (bounded) bt_laws_bound(world, cell, at, pair, &scratch->man[i]); // this may change the gaps
         bt_pack_set_row(world, cell, at, row_state(world, cell, at, &scratch->man[i], &scratch->held[i]));
         pair->contact = at;
         cell->n_points += contact->n;
-        // Of what is left of the outlines. 0 − gap, not −gap: a contact that just touches must not make the deepest
-        // overlap −0 on the one rank that holds it alone.
+        // Overlap of the remaining outlines. 0 − gap, not −gap: a contact that just touches must not make the deepest
+        // overlap −0 on the only rank that holds it.
         for (int j = 0; j < contact->n; j++) cell->overlap = bt_max(cell->overlap, 0 - cell->gaps[at].gap[j]);
     }
 }

@@ -6,14 +6,14 @@
 #include "contact/contacts.h"
 #include "space/cells.h"
 
-/// What the way of a pair has to say about its row (contact/contacts.h).
+/// State of a row by the relative motion of its pair (contact/contacts.h).
 typedef enum {
-    BT_ROW_STAYS,    ///< in touch, or loaded in the step before, or released and back
-    BT_ROW_OPEN,     ///< apart by more than the slop, without load in the step before: it can be released
+    BT_ROW_STAYS,    ///< touching, or loaded in the previous step, or restored after release
+    BT_ROW_OPEN,     ///< apart by more than the slop, unloaded in the previous step: it can be released
     BT_ROW_RELEASED, ///< the two pass each other
 } bt_row_state;
 
-/// What a contact hands on to the one that takes its place.
+/// Data that a contact passes to its successor.
 typedef struct bt_held {
     int32_t n;           ///< points, 0 = there was none
     uint32_t feature[2];
@@ -21,7 +21,7 @@ typedef struct bt_held {
     int32_t row;         ///< bt_row_state
 } bt_held;
 
-/// Manifolds of one cell, in the order of its pairs; one a thread.
+/// Manifolds of one cell, in the order of its pairs; one scratch per thread.
 typedef struct bt_pack_scratch {
     bt_manifold *man; ///< [n]
     bt_idx *pair;     ///< [n] which pair
@@ -32,25 +32,25 @@ typedef struct bt_pack_scratch {
     size_t cap_used;
 } bt_pack_scratch;
 
-/// Room for n manifolds, none kept yet.
+/// Make room for n manifolds, with none kept yet.
 void bt_pack_begin(bt_pack_scratch *scratch, size_t n);
-/// Place for the next manifold, of pair i; it counts once n is one more.
+/// Place for the next manifold, of pair i; it is kept once the caller increments n.
 static inline bt_manifold *bt_pack_next(bt_pack_scratch *scratch, bt_idx i)
 {
     scratch->pair[scratch->n] = i;
     return &scratch->man[scratch->n];
 }
-/// The contacts of cell k from the manifolds kept, with the impulses of those in their places (without warm start: 0).
+/// Make the contacts of cell k from the manifolds kept, with the impulses of their predecessors (0 without warm start).
 void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch);
 void bt_pack_scratch_free(bt_pack_scratch *scratch);
 
-/// Normal and arms of a contact, from its manifold.
+/// Set the normal and arms of a contact from its manifold.
 void bt_pack_rows(const bt_world *world, const bt_manifold *manifold, bt_contact *contact);
 
-/// Normal biases of a contact with these gaps, `share`: factor on the restitution.
+/// Set the normal biases of a contact with these gaps; share: factor on the restitution.
 void bt_pack_bias(const bt_world *world, bt_contact *contact, const bt_gaps *gaps, double share);
 
-/// The row of contact j of the cell gets this state, and the bias that goes with it.
+/// Set the row state of contact j of the cell, and its bias.
 void bt_pack_set_row(const bt_world *world, bt_cell *cell, bt_idx j, bt_row_state state);
 
 #endif

@@ -23,8 +23,8 @@ static bool of_same_outlines(const bt_world *world, const bt_pair *pair, const b
            (pair->b == contact->b || (bt_shore_holds(world, pair->b) && bt_shore_holds(world, contact->b)));
 }
 
-/// Do the bodies of the contact meet if they bear no load on each other, and all others as they do? All of their parts
-/// and pieces nearby count: where several touch at one place, one row stands for all (detect.c).
+/// Would the bodies of the contact meet without this load, all other loads unchanged? All their parts and pieces nearby
+/// count: where several touch at one place, one row stands for all (detect.c).
 static bool meet_without(const bt_world *world, const bt_cell *cell, const bt_contact *contact)
 {
     const bt_bodies *bodies = &world->bodies;

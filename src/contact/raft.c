@@ -11,7 +11,7 @@
 #include "base/elementary.h"
 #include "case/case_derived.h"
 
-// Of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other.
+// Share of the thickness: with less boundary inside each other the floes have no edge; one is wholly under the other.
 #define LEAST_LENGTH 1e-3
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
@@ -107,14 +107,14 @@ static double line_load(const bt_world *world, bt_idx a, bt_idx b)
     return own_of(world)[BT_RAFT_LINE] * h * h;
 }
 
-/// What the sheets gain in height, of that: E', N/m.
+/// The part of it stored as potential energy: E', N/m.
 static double stored_load(const bt_world *world, bt_idx a, bt_idx b)
 {
     const double *h = world->bodies.thickness;
     return bt_min(own_of(world)[BT_RAFT_RISE] * h[a] * h[b], line_load(world, a, b));
 }
 
-/// Over what lengths rounding, and residuals, must not decide, m.
+/// Length below which rounding and residuals must not decide, m.
 static double least_blend(const bt_world *world) { return bt_max(world->par.slop, LEAST_BLEND * world->par.size); }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
@@ -151,7 +151,7 @@ static void set_point(bt_manifold *manifold, double x, double y, const double of
                                                    .feature = feature};
 }
 
-/// The edge: two points along it, about the centroid of the overlap.
+/// The contact of the edge: two points along it, on either side of the centroid of the overlap.
 static void edge_of(const double grad[2], double length, double gap, const double centroid[2], const double off[2],
                     bt_manifold *manifold)
 {
@@ -161,7 +161,7 @@ static void edge_of(const double grad[2], double length, double gap, const doubl
                   centroid[1] + side * 0.25 * length * manifold->nx, off, gap, side < 0 ? 0xfff00000u : 0xfff00001u);
 }
 
-/// s of raft.h: of a push that goes along the edge by less than the blend, a part.
+/// s of raft.h; a push whose component along the edge is below the blend counts in part.
 static double length_of_ends(const bt_overlap *overlap, const bt_manifold *edge, double length, double blend)
 {
     double sum = 0;
@@ -172,7 +172,7 @@ static double length_of_ends(const bt_overlap *overlap, const bt_manifold *edge,
     return bt_min(0.5, sum / length);
 }
 
-/// False without an edge. `sheets` always; it has a vector along the edge, s long, in place of its normal.
+/// False if there is no edge. `sheets` is always set; its normal is a vector along the edge of length s.
 static bool contact(const bt_world *world, const bt_pair *pair, const bt_memory *memory, bt_manifold *edge,
                     bt_manifold *sheets)
 {
@@ -180,7 +180,7 @@ static bool contact(const bt_world *world, const bt_pair *pair, const bt_memory 
     double grad[2], centroid[2], off[2];
     bt_overlap_clip(world, pair->a, pair->b, pair->part, 0, 0, &overlap);
     bt_overlap_area(&overlap, centroid);
-    // rounding must not tell which edge is inside
+    // rounding must not decide which edge is inside
     bt_overlap_gradient(world, pair->a, pair->b, pair->part, &overlap, least_blend(world), grad);
     bt_bodies_offset(world, pair->a, pair->b, off);
     *edge = (bt_manifold){.a = pair->a, .b = pair->b};
@@ -194,13 +194,13 @@ static bool contact(const bt_world *world, const bt_pair *pair, const bt_memory 
     return true;
 }
 
-/// Of a pair that has rafted: its two points, L/4 from the middle, take half each.
+/// Patch of a pair that has rafted: its two points, L/4 from the middle, take half each.
 static bt_patch chord_of(const bt_manifold *manifold)
 {
     return (bt_patch){2 * fabs(bt_law_along(manifold, 1) - bt_law_along(manifold, 0)), NAN};
 }
 
-/// Of one that has not: what lies flush of its edges, from the nearer point on.
+/// Patch of a pair that has not: the flush part of its edges, from the nearer point on.
 static bt_patch flush_part(const bt_manifold *manifold)
 {
     if (manifold->n_points < 2) return (bt_patch){manifold->flush, NAN};
@@ -212,8 +212,8 @@ static bt_patch flush_part(const bt_manifold *manifold)
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-/// Of the way that an edge would make in the step by the velocities without contacts, the part beyond its gap; a slop
-/// is added to the way.
+/// Share, beyond the gap, of the distance that an edge would advance in the step at the velocities without contacts; a
+/// slop is added to that distance.
 static double reached(const bt_world *world, const bt_contact *edge, double gap)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -223,7 +223,7 @@ static double reached(const bt_world *world, const bt_contact *edge, double gap)
     return bt_max(0, 1 - gap / (way + least_blend(world)));
 }
 
-/// edge: contact of the same pair, which has its bounds already (detect.c puts sheets after all others), −1 = none.
+/// edge: the edge contact of the same pair, already bounded (detect.c puts sheets after all others), −1 = none.
 static void bound_sheets(const bt_world *world, bt_cell *cell, bt_idx j, bt_idx edge, const bt_manifold *manifold,
                          const bt_memory *memory)
 {
@@ -274,7 +274,7 @@ static void give_way(bt_world *world, bt_cell *cell, bt_idx j, int i, bt_sum *nu
     bt_sum_add(&number[EDGE_WORK], -bt_contacts_normal_work(world, &cell->contacts[j], i));
 }
 
-/// Sheets with the load of their ends alone.
+/// The sheets with only the load of their ends.
 static bt_contact ends_of(const bt_contact *sheets, const bt_limit *limit)
 {
     bt_contact contact = *sheets;
@@ -283,7 +283,7 @@ static bt_contact ends_of(const bt_contact *sheets, const bt_limit *limit)
     return contact;
 }
 
-/// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
+/// Write the record: a pair that gives way for the first time gets one; sheets store their load in it.
 static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 {
     const bt_contact *contact = &cell->contacts[j];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a contact law must have to be added; bergtow/contact.h.
+// Checks of a contact law that is to be added; bergtow/contact.h.
 #include <stdio.h>
 #include <string.h>
 
@@ -27,7 +27,7 @@ static void check_numbers(const bt_contact_law *law, const char *name, bt_errors
                               law->numbers[k].name, law->numbers[k].state ? "count" : "remember");
 }
 
-/// The series that it brings: its work and its numbers.
+/// Check the series of the law: its work and its numbers.
 static void check_series(const bt_contact_law *law, const char *name, bt_errors *err)
 {
     char work[BT_MOST_LAW_NAME + sizeof "_work"];
@@ -62,6 +62,6 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
                       BT_MAX_ADDED_LAWS);
     if (err->n == before) check_series(law, name, err);
     if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
-    bt_added_add(law); // there is room
+    bt_added_add(law); // there is room: checked above
     return BT_OK;
 }

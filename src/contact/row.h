@@ -13,7 +13,7 @@ static inline double bt_normal_velocity(const bt_contact *contact, int i, const 
            contact->ran[i] * va->w;
 }
 
-/// At the middle of the two points of a contact.
+/// Normal velocity at the middle of the two points of a contact, m/s.
 static inline double bt_mean_normal_velocity(const bt_contact *contact, const bt_vel *va, const bt_vel *vb)
 {
     return 0.5 * (bt_normal_velocity(contact, 0, va, vb) + bt_normal_velocity(contact, 1, va, vb));
@@ -26,13 +26,13 @@ static inline double bt_tangent_velocity(const bt_contact *contact, const bt_vel
 
 /// Effective masses of a contact.
 typedef struct bt_mass {
-    double w[2], w12; ///< W of the normals and their coupling, 1/kg; 0 for a point that is not there
-    double mn[2];     ///< 1/W, kg; 0 for the second of one point
-    double per_det;   ///< 1/(W1 W2 − W12²), kg²; 0 when singular or one point
+    double w[2], w12; ///< W of the normals and their coupling, 1/kg; 0 for a missing point
+    double mn[2];     ///< 1/W, kg; 0 for a missing second point
+    double per_det;   ///< 1/(W1 W2 − W12²), kg²; 0 if singular or with one point
     double wt, mt;    ///< W of the tangent and its inverse
 } bt_mass;
 
-/// W of arms p and q on body a with the inverse masses ia, and of r and s on b.
+/// Entry of W for arms p and q on body a, with inverse masses ia, and r and s on b, with ib.
 static inline double bt_coupling(bt_inv ia, bt_inv ib, double p, double q, double r, double s)
 {
     return ia.m + ib.m + ia.i * p * q + ib.i * r * s;
@@ -49,7 +49,7 @@ static inline bt_mass bt_mass_of_sheets(const bt_contact *contact, bt_inv ia, bt
     return (bt_mass){.w = {w}, .mn = {1 / w}, .wt = w, .mt = 1 / w};
 }
 
-/// Always by these expressions, or by the same four at a time (solve/rows.h): bits are the same wherever it is formed.
+/// Always formed by these expressions, or the same ones four at a time (solve/rows.h), for the same bits everywhere.
 static inline bt_mass bt_mass_of(const bt_contact *contact, const bt_inv *inv)
 {
     const bt_inv ia = inv[contact->a], ib = inv[contact->b];
@@ -81,7 +81,7 @@ static inline void bt_apply(const bt_contact *contact, double jn, double ma, dou
     vb->w += ib.i * (mb + jt * contact->rbt);
 }
 
-/// Impulse of a contact on its body b; on a the opposite.
+/// Impulse of a contact on its body b, N s; that on a is opposite.
 static inline void bt_impulse_on_b(const bt_contact *contact, double *x, double *y)
 {
     const double normal = contact->ln[0] + contact->ln[1];
@@ -89,8 +89,8 @@ static inline void bt_impulse_on_b(const bt_contact *contact, double *x, double 
     *y = normal * contact->ny + contact->lt * contact->nx;
 }
 
-/// The impulse that comes in by a contact whose other body has infinite mass: on the one that can move. False where
-/// both can or neither. inv: of all bodies.
+/// Impulse, N s, on the movable body of a contact whose other body has infinite mass. False if both or neither can
+/// move. inv: of all bodies.
 static inline bool bt_impulse_from_outside(const bt_contact *contact, const bt_inv *inv, double *x, double *y)
 {
     const double sign = (inv[contact->b].m > 0) - (inv[contact->a].m > 0);
@@ -101,14 +101,15 @@ static inline bool bt_impulse_from_outside(const bt_contact *contact, const bt_i
 
 static inline double bt_clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
 
-/// Part of the ends of an overlap, e (bt_limit.ends), that is nearest to the load (x, y) of sheets.
+/// Factor on the load e of the ends of an overlap (bt_limit.ends) that brings it nearest to the load (x, y) of the
+/// sheets.
 static inline double bt_part_of_ends(const double e[2], double x, double y)
 {
     const double square = e[0] * e[0] + e[1] * e[1];
     return square > 0 ? bt_clamp((x * e[0] + y * e[1]) / square, 1) : 0;
 }
 
-/// Bodies of infinite mass are never written: they are shared by cells that are done at once.
+/// Store a velocity, but never that of a body of infinite mass: cells processed in parallel share it.
 static inline void bt_store(bt_vel *v, bt_inv inv, const bt_vel *x)
 {
     if (inv.m > 0) *v = *x;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Applied forces as laws of the table: each has a row of loads for every body, filled once a step; see
+// Applied forces as laws of the table: each has a row of loads for every body, filled once per step; see
 // bergtow/applied.h.
 //
 // Rest. own[0] says whether any row of the step is not zero: while none is, the law lets floes rest.
@@ -18,8 +18,7 @@
 
 enum { ACTS }; // own[]
 
-/// What a force was given and has answered in the step at hand. The texts stay where they are to the end of the
-/// program, as those of every law.
+/// Input and answer of a force in the present step. Its texts stay in place to the end of the program.
 typedef struct slot {
     char name[BT_MOST_LAW_NAME + 1];
     char doc[200];
@@ -30,10 +29,10 @@ typedef struct slot {
     bt_idx *row;         ///< [n_global] of a body
     int64_t *id;
     double *place, *velocity, *mass, *inertia, *load;
-    int64_t cap;         ///< bodies that there is room for
+    int64_t cap;         ///< capacity in bodies
 } slot;
 
-static slot *slots[BT_MAX_FORCE_LAWS]; // each stays where it is: the table of laws points into it
+static slot *slots[BT_MAX_FORCE_LAWS]; // never moved: the table of laws points into them
 static int n_slots;
 
 static void reserve(slot *arrays, int64_t n)
@@ -50,7 +49,7 @@ static void reserve(slot *arrays, int64_t n)
     arrays->cap = n;
 }
 
-/// Rows of the bodies of this rank by their ids; returns their number.
+/// List the rows of this rank's bodies by their ids; returns their number.
 static int64_t list_bodies(slot *arrays, const bt_bodies *bodies)
 {
     int64_t n = 0;
@@ -71,7 +70,7 @@ static int64_t list_bodies(slot *arrays, const bt_bodies *bodies)
     return n;
 }
 
-/// K must not be negative: g >= 0, and g gw >= gx² + gy², but for rounding.
+/// Reason to reject the answer, or NULL. K must be positive semidefinite: g >= 0, and g gw >= gx² + gy² to rounding.
 static const char *fault_of(const slot *arrays, int64_t n, double *acts)
 {
     for (int64_t k = 0; k < n; k++) {
@@ -92,7 +91,7 @@ static const char *begin(const bt_world *world, double *own, void *context)
     slot *arrays = context;
     own[ACTS] = 0;
     arrays->of = NULL;
-    if (!arrays->force) return NULL; // alike on all ranks
+    if (!arrays->force) return NULL; // the same on all ranks
     reserve(arrays, world->bodies.n_global);
     const bt_applied applied = {
         .n = list_bodies(arrays, &world->bodies),
@@ -106,7 +105,7 @@ static const char *begin(const bt_world *world, double *own, void *context)
     };
     const char *fault = arrays->force(&applied, arrays->user) != 0 ? "its function has failed"
                                                                    : fault_of(arrays, applied.n, &own[ACTS]);
-    bt_domain_maxima(world, &own[ACTS], 1); // what rests, and is so left out, is the same on any ranks
+    bt_domain_maxima(world, &own[ACTS], 1); // so the same bodies rest, and are left out, on any ranks
     if (!fault) arrays->of = &world->bodies;
     return fault;
 }
@@ -114,7 +113,7 @@ static const char *begin(const bt_world *world, double *own, void *context)
 static void add(const bt_force_body *body, bt_load *load)
 {
     const slot *arrays = body->context;
-    if (body->own[ACTS] == 0 || arrays->of != body->all) return; // or a body that stands nowhere (step/window.c)
+    if (body->own[ACTS] == 0 || arrays->of != body->all) return; // or a body without a position (step/window.c)
     const double *x = arrays->load + BT_APPLIED_NUMBERS * arrays->row[body->all->gid[body->i]];
     load->fx += x[BT_APPLIED_FX];
     load->fy += x[BT_APPLIED_FY];
@@ -155,7 +154,7 @@ bool bt_force_is_applied(void)
     return false;
 }
 
-/// As much of a text as there is room for, up to the end of a character.
+/// Copy as much of a text as fits, in whole characters.
 static void copy_line(char *to, size_t room, const char *text)
 {
     size_t n = strlen(text);

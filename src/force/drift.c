@@ -8,7 +8,7 @@
 #include "force/load.h"
 #include "base/elementary.h"
 
-/// Force on a body at velocity u, N; its derivative; the sum of the magnitudes of its parts.
+/// Force on a body at a velocity, N; its derivative; the sum of the magnitudes of its parts.
 typedef struct {
     double f[2], df[2][2], scale;
 } balance;
@@ -35,7 +35,7 @@ static void add_stream(const bt_bodies *bodies, bt_idx i, const bt_stream *in, c
     double d[2];
     extent_across(bodies, i, v, d);
     const double across = v[0] * d[1] - v[1] * d[0], g = skin * s + form * across;
-    const double dg[2] = {skin * v[0] / s + form * d[1], skin * v[1] / s - form * d[0]}; // by v
+    const double dg[2] = {skin * v[0] / s + form * d[1], skin * v[1] / s - form * d[0]}; // derivative by v
     for (int r = 0; r < 2; r++) {
         sum->f[r] += g * v[r];
         sum->df[r][r] -= g;
@@ -44,8 +44,7 @@ static void add_stream(const bt_bodies *bodies, bt_idx i, const bt_stream *in, c
     sum->scale += g * s;
 }
 
-/// Explicit and linear forces. An explicit force counts as constant: one that falls with the velocity slows Newton's
-/// method down.
+/// Explicit and linear forces. An explicit force counts as constant; if it is not, Newton's method slows down.
 static void add_rest(const bt_load *load, const double u[2], balance *sum)
 {
     const double f[2] = {load->fx + load->jx - load->g * u[0], load->fy + load->jy - load->g * u[1]};
@@ -77,7 +76,7 @@ static balance balance_at(const bt_world *world, bt_idx i, const double u[2])
     return sum;
 }
 
-/// Forces across walls are borne by them.
+/// The balance without forces across walls, which bear them.
 static balance held_balance(const bt_world *world, bt_idx i, const bool hold[2], const double u[2])
 {
     balance sum = balance_at(world, i, u);

@@ -15,7 +15,7 @@ typedef struct {
     double u, v;         ///< constant part, m/s
     double e1[2], e2[2]; ///< semi-axes of the ellipse as vectors, m/s
     double turn, lag;    ///< ω, rad/s; φ, rad
-    bt_table table;      ///< in place of all that when it has rows
+    bt_table table;      ///< replaces all of these if it has rows
 } flow;
 
 struct bt_environment {
@@ -140,7 +140,7 @@ void bt_environment_advance(bt_world *world)
     if (world->environment) {
         world->drift_x += par->dt * par->water_u;
         world->drift_y += par->dt * par->water_v;
-    } else { // without the rounding of a sum
+    } else { // avoids the rounding of a sum
         const double time = (double)(world->step + 1) * par->dt;
         world->drift_x = time * par->water_u;
         world->drift_y = time * par->water_v;

@@ -13,22 +13,22 @@
 #include "space/cells.h"
 #include "space/phases.h"
 
-enum { SLOW = 8 }; // looks to one at a floe past which nothing flows fast, assumed
+enum { SLOW = 8 }; // a floe without fast flow is evaluated once in this many times, assumed
 
-#define TAPER 3.5 // x at which the lee begins to end, assumed
+#define TAPER 3.5 // x at which the lee begins to taper off, assumed
 
-/// Lines along the flow past a floe: a power of two, so that their mean is exact where all agree. With 64 the factor of
-/// a floe of 30 m in 80 % ice is another by 0.02 rms, and the mean of the field 0.568 for 0.566.
+/// Lines along the flow past a floe: a power of two, so that their mean is exact if all agree. With 64 the factor of a
+/// floe of 30 m in 80 % ice differs by 0.02 rms, and the mean of the field is 0.568 instead of 0.566.
 enum { LINES = 8 };
 
-/// A floe near the one that is looked at.
+/// A floe near the floe being evaluated.
 typedef struct neighbour {
     const bt_bodies *b;
     bt_idx i;
     double dx, dy; ///< from centroid to centroid, m
 } neighbour;
 
-/// What one visit needs memory for.
+/// Scratch memory of one visit.
 typedef struct scratch {
     neighbour *near;
     size_t n, cap;
@@ -38,20 +38,20 @@ typedef struct scratch {
     size_t n_candidates, cap_candidates;
 } scratch;
 
-/// A copy of a floe, by its cell.
+/// A copy of a floe, with its cell.
 typedef struct placed {
     int32_t cell[2];
     bt_idx i;
 } placed;
 
-/// The floes that this rank can look at, by cells.
+/// The copies of floes in the surroundings of this rank, by cells.
 typedef struct surroundings {
-    int rings[2];     ///< cells along x and y within which all stand that may shelter a floe
+    int rings[2];     ///< number of cells along x and y within which a floe may be sheltered
     bt_bodies copies; ///< of those rings that this rank does not hold
     placed *sorted;   ///< [copies.n] by cell
 } surroundings;
 
-/// Farthest that ice shelters / its thickness, of the fluid with the higher edges.
+/// Largest reach of a lee / thickness of its ice, for the fluid with the higher edges.
 static double lee_reach(const bt_params *par)
 {
     return BT_EXPOSURE_REACH * par->lee * bt_max(par->draft, 1 - par->draft);
@@ -67,12 +67,12 @@ static double lee(double x)
     return bt_exp(-x) * (u > 0 ? 1 - u * u * (3 - 2 * u) : 1);
 }
 
-/// Lines along the flow, evenly over the width of a floe, about its centroid.
+/// Lines along the flow, evenly spaced over the width of a floe, relative to its centroid.
 typedef struct lines {
     double along[2];     ///< of the flow
-    double from, step;   ///< places across: from + (k + ½) step, m
+    double from, step;   ///< positions across: from + (k + ½) step, m
     double enter[LINES]; ///< where they enter the floe, along the flow, m
-    double first, last;  ///< of them
+    double first, last;  ///< first and last of these, m
 } lines;
 
 /// Vertices as (along, across) the flow.
@@ -85,7 +85,7 @@ static void turn(const double along[2], double dx, double dy, int n, const doubl
     }
 }
 
-/// Where the lines enter and leave a convex polygon that has been turned; INFINITY, −INFINITY of those that pass it by.
+/// Where the lines enter and leave a convex polygon that has been turned; INFINITY, −INFINITY for lines that miss it.
 static void cross(const lines *rays, int n, const double *v, double in[LINES], double out[LINES])
 {
     const double per_step = 1 / rays->step;
@@ -108,7 +108,7 @@ static void cross(const lines *rays, int n, const double *v, double in[LINES], d
     }
 }
 
-/// Width of the convex hull of body i across the flow (vx, vy) that is not 0, m, and the lines.
+/// Width, m, of the convex hull of body i across the flow (vx, vy), which must not be 0, and the lines.
 static double draw(const bt_bodies *bodies, bt_idx i, double vx, double vy, lines *rays)
 {
     const int n = bt_body_corners(bodies, i);
@@ -130,8 +130,7 @@ static double draw(const bt_bodies *bodies, bt_idx i, double vx, double vy, line
     return high - low;
 }
 
-/// What a neighbour leaves of n fluids with the heights scale × h, on each line; thickness: of the floe that is looked
-/// at.
+/// Apply the lee of a neighbour to each line, for n fluids with edge heights scale × h; thickness: of this floe.
 static void cast(const bt_params *par, const lines *rays, const neighbour *near, double thickness, int n,
                  const double *scale, double shelter[][LINES])
 {
@@ -157,7 +156,7 @@ static void cast(const bt_params *par, const lines *rays, const neighbour *near,
     }
 }
 
-/// Factors of n fluids that flow past floe i with the same velocity.
+/// Form-drag factors for n fluids that flow past floe i with the same velocity.
 static void edges(const bt_world *world, bt_idx i, const double v[2], const scratch *room, int n, const double *scale,
                   double factor[])
 {
@@ -181,7 +180,7 @@ static int outline_of(const neighbour *near, const double **v)
     return bt_body_corners(near->b, near->i);
 }
 
-/// Area that two convex outlines share, m²: what is left of b between the edges of a, one after the other.
+/// Area shared by two convex outlines, m²: b clipped by the edges of a, one after the other.
 static double shared(const neighbour *a, const neighbour *b)
 {
     const double *v, *u, dx = b->dx - a->dx, dy = b->dy - a->dy;
@@ -215,8 +214,8 @@ static double shared(const neighbour *a, const neighbour *b)
     return bt_max(0, 0.5 * twice);
 }
 
-/// Do two convex outlines overlap by more than `slop`, m, along every edge normal of the first? Of the other one it is
-/// asked the other way round.
+/// Do two convex outlines overlap by more than `slop`, m, along every edge normal of the first? A second call tests the
+/// normals of the other.
 static bool within(const bt_bodies *a, bt_idx i, const bt_bodies *b, bt_idx j, double dx, double dy, double slop)
 {
     const int n = bt_body_corners(a, i), m = bt_body_corners(b, j);
@@ -232,7 +231,7 @@ static bool within(const bt_bodies *a, bt_idx i, const bt_bodies *b, bt_idx j, d
     return true;
 }
 
-/// By insertion: there are few, and most lists are nearly in order.
+/// Insertion sort: lists are short and mostly nearly sorted.
 static void sort(double *x, size_t n)
 {
     for (size_t j = 1; j < n; j++) {
@@ -266,7 +265,7 @@ static void add_crossings(const neighbour *a, const neighbour *b, scratch *room)
     }
 }
 
-/// The line y = const in a convex outline: from x[0] to x[1]; false where it passes by.
+/// The line y = const inside a convex outline: from x[0] to x[1]; false if it misses.
 static bool chord(const neighbour *near, double y, double x[2])
 {
     const double *v;
@@ -283,14 +282,14 @@ static bool chord(const neighbour *near, double y, double x[2])
     return x[0] < x[1];
 }
 
-/// ∫ dx/n on the line y = const through the first of m sheets, m; *own: what of the line lies in it.
+/// ∫ dx/n on the line y = const through the first of m sheets, m; *own: length of the line in it, m.
 static double seen_on(const neighbour *sheet, size_t m, double y, double *end, double *own)
 {
     double x[2], of[2];
     *own = 0;
     if (!chord(&sheet[0], y, x)) return 0;
     *own = x[1] - x[0];
-    size_t n = 0; // ends, in pairs: places where a sheet begins, and where it ends
+    size_t n = 0; // ends, in pairs: where a sheet begins, and where it ends
     for (size_t k = 1; k < m; k++) {
         if (!chord(&sheet[k], y, of)) continue;
         of[0] = bt_max(of[0], x[0]), of[1] = bt_min(of[1], x[1]);
@@ -310,7 +309,7 @@ static double seen_on(const neighbour *sheet, size_t m, double y, double *end, d
     return sum + (x[1] - at);
 }
 
-/// e of a floe, the first of m sheets.
+/// e (exposure.h) of a floe, the first of m sheets.
 static double seen(const neighbour *sheet, size_t m, scratch *room)
 {
     room->n_numbers = 0;
@@ -334,7 +333,7 @@ static double seen(const neighbour *sheet, size_t m, scratch *room)
     return area > 0 ? bt_min(1, sum / area) : 1;
 }
 
-/// The sheets on and under floe i go to the front of the list, which loses its order.
+/// Skin factor of floe i. Moves the sheets on and under it to the front of the list, which loses its order.
 static double skin(const bt_world *world, bt_idx i, scratch *room)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -354,7 +353,7 @@ static double skin(const bt_world *world, bt_idx i, scratch *room)
     if (m == 0) return 1;
     neighbour *sheet = bt_alloc(m + 1, sizeof *sheet);
     sheet[0] = (neighbour){bodies, i, 0, 0};
-    for (size_t j = 0; j < m; j++) { // by id: rounding follows the order
+    for (size_t j = 0; j < m; j++) { // by id: rounding depends on the order
         const neighbour at = room->near[j];
         size_t k = j + 1;
         for (; k > 1 && sheet[k - 1].b->gid[sheet[k - 1].i] > at.b->gid[at.i]; k--) sheet[k] = sheet[k - 1];
@@ -370,16 +369,16 @@ static double skin(const bt_world *world, bt_idx i, scratch *room)
     return bt_max(0, e);
 }
 
-// --- who is near -----------------------------------------------------------------------------------------------------
+// --- neighbours ------------------------------------------------------------------------------------------------------
 
-/// A floe in the cells about the one that is looked at, and the box about it from the middle of that cell, m.
+/// A floe in the cells around the cell being visited, and its box relative to the middle of that cell, m.
 typedef struct candidate {
     const bt_bodies *b;
     bt_idx i;
     double low[2], high[2];
 } candidate;
 
-/// Where obstacles of floe i may stand: from its centroid, m.
+/// Region where obstacles of a floe may lie, relative to its centroid, m.
 typedef struct region {
     double low[2], high[2];
 } region;
@@ -390,7 +389,7 @@ static double offset(const bt_world *world, const bt_pose *pose, const double fr
                 : bt_nearest_image(pose->x - from[0], world->par.period_x);
 }
 
-/// Does a box from low to high miss that of the region about a place?
+/// Does a box from low to high miss the box of the region about a place?
 static bool misses(const region *r, const double at[2], const double low[2], const double high[2])
 {
     return low[0] > at[0] + r->high[0] || high[0] < at[0] + r->low[0] || low[1] > at[1] + r->high[1] ||
@@ -408,7 +407,7 @@ static void consider(const bt_world *world, bt_idx i, const bt_bodies *bodies, b
     room->near[room->n++] = (neighbour){bodies, j, d[0], d[1]};
 }
 
-/// Columns (or rows) of cells within so many rings of c: the first, and how many. Around a period none comes twice.
+/// Columns (or rows) of cells within this many rings of c: the first, and their number. None comes twice.
 static int32_t span(int32_t c, int rings, int32_t wrap, int32_t *first)
 {
     const int32_t n = 2 * rings + 1;
@@ -423,7 +422,7 @@ static int by_cell(const void *a, const void *b)
     return (p->cell[0] > q->cell[0]) - (p->cell[0] < q->cell[0]);
 }
 
-/// Copies of cell (x, y): the first, and the end.
+/// Copies of floes in cell (x, y): [first, end).
 static void find_copies(const surroundings *around, int32_t x, int32_t y, bt_idx *first, bt_idx *end)
 {
     const placed at = {.cell = {x, y}}, *copy = around->sorted;
@@ -449,7 +448,7 @@ static void add_candidate(const bt_world *world, const bt_bodies *bodies, bt_idx
     room->candidate[room->n_candidates++] = new;
 }
 
-/// Lists the floes in the cells about cell k, held here or copies.
+/// List the floes in the cells around cell k, held here or as copies.
 static void list_candidates(const bt_world *world, const surroundings *around, bt_idx k, const double middle[2],
                             scratch *room)
 {
@@ -458,7 +457,7 @@ static void list_candidates(const bt_world *world, const surroundings *around, b
     int32_t from[2];
     const int32_t n_x = span(cell->x, around->rings[0], cells->wrap_x, &from[0]),
                   n_y = span(cell->y, around->rings[1], cells->wrap_y, &from[1]);
-    const bool round[2] = {n_x == cells->wrap_x, n_y == cells->wrap_y}; // no box goes all around a period
+    const bool round[2] = {n_x == cells->wrap_x, n_y == cells->wrap_y}; // around a whole period, boxes do not apply
     for (int32_t c = 0; c < n_x * n_y; c++) {
         int32_t x = from[0] + c % n_x, y = from[1] + c / n_x;
         if (cells->wrap_x) x = bt_cells_wrapped(x, cells->wrap_x);
@@ -472,7 +471,7 @@ static void list_candidates(const bt_world *world, const surroundings *around, b
     }
 }
 
-/// Where fluids that flow past floe i at v may come from: the circle about it, drawn out upstream by the farthest lee.
+/// Region from where fluids that flow past floe i at v may come: its circle, extended upstream by the farthest lee.
 static region upstream(const bt_world *world, bt_idx i, const double v[2][2])
 {
     const double r = world->bodies.radius[i];
@@ -488,7 +487,7 @@ static region upstream(const bt_world *world, bt_idx i, const double v[2][2])
     return of;
 }
 
-/// All floes that may shelter or cover floe i of a cell, whose candidates are listed about its middle.
+/// Gather all floes that may shelter or cover floe i of a cell, from the candidates listed around that cell.
 static void gather(const bt_world *world, const surroundings *around, bt_idx i, const double v[2][2],
                    const double middle[2], scratch *room)
 {
@@ -525,8 +524,8 @@ static void look_at(bt_world *world, const bt_idx i, const double v[2][2], scrat
     if (par->covers) exposure->skin = skin(world, i, room);
 }
 
-/// Velocities of water and air past floe i, m/s; false where it is not looked at now: nothing flows past it, or slowly,
-/// or it is none of this rank.
+/// Velocities of water and air past floe i, m/s; false if it is not evaluated now: no flow or slow flow past it, or not
+/// owned by this rank.
 static bool flows(const bt_world *world, bt_idx i, double v[2][2])
 {
     const bt_bodies *bodies = &world->bodies;
@@ -547,7 +546,7 @@ static void look_cell(bt_world *world, bt_idx k, const void *around, bt_totals *
     if (cells->asleep[k] == BT_ASLEEP) return;
     const double middle[2] = {cells->x0 + (cell->x + 0.5) * cells->side_x, cells->y0 + (cell->y + 0.5) * cells->side_y};
     scratch room = {0};
-    bool listed = k == cells->n - 1; // bodies of the last cell look at all others
+    bool listed = k == cells->n - 1; // bodies of the last cell may be sheltered by any other
     for (bt_idx i = cell->first; i < cell->end; i++) {
         double v[2][2];
         if (!flows(world, i, v)) continue;
@@ -561,7 +560,7 @@ static void look_cell(bt_world *world, bt_idx k, const void *around, bt_totals *
     free(room.candidate);
 }
 
-/// Rings of cells that the floes near one of the middle cell stand in.
+/// Rings of cells around a cell that contain the floes near any of its floes.
 static int rings_of(const bt_world *world, double side, int32_t wrap)
 {
     const bt_cells *cells = world->cells;
@@ -590,7 +589,7 @@ void bt_exposure_begin(bt_world *world)
     if (world->par.exposure_steps > 0 && world->step % world->par.exposure_steps == 0) bt_exposure_look(world);
 }
 
-// --- a field that begins ---------------------------------------------------------------------------------------------
+// --- start of a field ------------------------------------------------------------------------------------------------
 
 void bt_exposure_setup(bt_world *world, double speed)
 {

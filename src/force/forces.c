@@ -13,11 +13,11 @@
 
 // --- a load and its integration --------------------------------------------------------------------------------------
 
-// The load on a body, and all that is implicit of it at a velocity; equations in bergtow/forces.h.
+// The load on a body, and its implicit part at a velocity; equations in bergtow/forces.h.
 
 /// Dampers g = form max(0, −v·n) dl at the arms a = t (t·r) + τ n (n·r); (rx, ry): U_ref − U, w: ω. On an edge v and a
-/// are linear and n constant, so that g and its moments to a² are polynomials up to the third degree where water comes
-/// in: two points of Gauss are exact.
+/// are linear and n constant, so that g and its moments up to a² are polynomials of at most third degree on the inflow
+/// part: two Gauss points are exact.
 void bt_linear_add_outline(const bt_bodies *bodies, bt_idx i, bt_stream stream, double rx, double ry, double w,
                            bt_linear *linear)
 {
@@ -29,7 +29,7 @@ void bt_linear_add_outline(const bt_bodies *bodies, bt_idx i, bt_stream stream, 
     for (int k = 0; k < n; k++) {
         if (mark[k].next == k) continue;
         const double *p = v + 2 * k, *q = v + 2 * mark[k].next, ex = q[0] - p[0], ey = q[1] - p[1];
-        // Inflow −v·n times the length of the edge, at its ends.
+        // Inflow −v·n times the length of the edge, at its two ends.
         const double in0 = -((rx + w * p[1]) * ey - (ry - w * p[0]) * ex),
                      in1 = -((rx + w * q[1]) * ey - (ry - w * q[0]) * ex);
         if (in0 <= 0 && in1 <= 0) continue;
@@ -58,21 +58,21 @@ void bt_forces_load(const bt_world *world, bt_idx i, const bt_vel *u, bt_load *l
     bt_load_fill(world->forces, 0, &body, load);
 }
 
-// --- what each law did to the towed body -----------------------------------------------------------------------------
+// --- record of the towed body ----------------------------------------------------------------------------------------
 
 // The record: what each law has done to a body in the step just solved.
 //
 // The impulses follow from the load of the law alone, by the scheme of bergtow/forces.h:
-//     rotation   M (R − I) (U1 − U_b): with U1 the part of the law whose turn it is, with U_b that of the law that says
-//                U_b
+//     rotation   M (R − I) (U1 − U_b): the part with U1 belongs to the law that turns, that with U_b to the law that
+//                sets U_b
 //     gain       M times the gain;   explicit: Δt F
-//     implicit   Δt (j − D U2 − O U*), K = D + O with the diagonal D: contacts and line see D alone, so that what
-//                couples turning and drift is that of U*. From (M + Δt K) U* = M U' + Δt j and (M + Δt D)(U2 − U*) =
+//     implicit   Δt (j − D U2 − O U*), K = D + O with the diagonal D: contacts and line see only D, so the coupling
+//                of rotation and drift is taken at U*. From (M + Δt K) U* = M U' + Δt j and (M + Δt D)(U2 − U*) =
 //                J_contacts + J_line: Δt (j − D U2 − O U*) = M (U2 − U') − J_contacts − J_line, all that is not
 //                rotation, gain or explicit
-// Every impulse is so computed from its law, and that they add up to M (U2 − U1) is a check. Rejected: drag as what is
-// left of M (U2 − U1) when all else is taken away. A law that is forgotten there is booked as drag, and the balance
-// closes. Of a kinematic body U1 = U* = U2 is the prescribed velocity, and the rotation that of its rate, Δt m f k×U.
+// Thus every impulse is computed from its law, and their sum, M (U2 − U1), is a check. Rejected: drag as the remainder
+// of M (U2 − U1): a forgotten law would be booked as drag, and the balance would still close. For a kinematic body U1 =
+// U* = U2 is the prescribed velocity, and the rotation is that of its rate, Δt m f k×U.
 
 /// State of a body over a step.
 typedef struct {
@@ -113,7 +113,7 @@ static bt_impulse impulse_of(const bt_bodies *bodies, bt_idx i, const motion *mo
     return j;
 }
 
-/// The load of all laws of a sum: as the step itself adds them up, where a sum of their impulses would round otherwise.
+/// The load of all laws that share a series, added up as in the step itself: summed impulses would round differently.
 static void load_of_sum(const bt_forces *forces, const char *name, bt_force_body *body, bt_load *load)
 {
     bt_load_clear(load);
@@ -163,7 +163,7 @@ void bt_forces_record(bt_world *world)
 
 // --- free velocities -------------------------------------------------------------------------------------------------
 
-/// All laws of a body: those of the list inline, those that a program has added through the table.
+/// Load of all laws on a body: the listed laws inline, added laws through the table.
 static inline void load_of(const bt_forces *forces, bool added, bt_force_body *body, bt_load *load)
 {
     bt_load_clear(load);
@@ -175,8 +175,8 @@ static inline void load_of(const bt_forces *forces, bool added, bt_force_body *b
     if (added) bt_load_fill(forces, BT_LISTED_LAWS, body, load);
 }
 
-/// Two programs, without and with laws that are added: where the load of a body leaves the function, the compiler must
-/// keep all of it in memory.
+/// Compiled twice, without and with added laws: if the load of a body leaves the function, the compiler must keep all
+/// of it in memory.
 __attribute__((always_inline)) static inline void predict(bt_world *world, bt_idx i, bool added, bt_turning *turning)
 {
     bt_bodies *bodies = &world->bodies;
@@ -195,8 +195,8 @@ __attribute__((always_inline)) static inline void predict(bt_world *world, bt_id
     bodies->vel[i] = bodies->vel_free[i] = u;
 }
 
-/// What predict() comes to for a body that drifts with the water where all forces let it: no load, and the velocity as
-/// it is, but for the sign of a zero, to which the gain of the slope adds 0.
+/// The result of predict() for a body that drifts with the water when all laws let it rest: no load, and an unchanged
+/// velocity, except that −0 becomes 0 as the gain of the slope adds 0.
 static void drift(bt_bodies *bodies, bt_idx i)
 {
     const bt_vel u = bodies->vel[i];
@@ -205,7 +205,7 @@ static void drift(bt_bodies *bodies, bt_idx i)
     bodies->inv[i] = (bt_inv){1 / bodies->mass[i], 1 / bodies->inertia[i]};
 }
 
-/// rest: no listed law has anything to say to a body that drifts with the water, and none is added.
+/// rest: no listed law acts on a body that drifts with the water, and there are no added laws.
 static void predict_cell(bt_world *world, bt_idx k, const void *rest, bt_totals *none)
 {
     (void)none;

@@ -3,7 +3,7 @@
 //
 // Entries and functions stand in a header, so that the prediction, which calls every law for every body, has them
 // inline: called through the table they made a step in 20 % ice and wind 8 % longer in instructions, 2 % in 80 % ice.
-// Who needs a law less often takes it from the table (table.c), which is made of the same list.
+// Less frequent users take a law from the table (table.c), which is made from the same list.
 #ifndef BERGTOW_LAWS_H
 #define BERGTOW_LAWS_H
 
@@ -56,7 +56,7 @@ static inline void bt_add_yaw_drag(const bt_force_body *body, bt_load *load)
     load->yaw += body->drag->yaw * body->exposure->skin;
 }
 
-// One law for both fluids: what rests turns in neither, and the body has one coefficient.
+// One law for both fluids: a body at rest turns in neither, and it has one coefficient.
 static const bt_force_law bt_law_yaw_drag = {
     .name = "yaw_drag",
     .doc = "moment of the skin drag of water and air as the body turns",
@@ -108,7 +108,7 @@ static const bt_force_law bt_law_tilt = {
 
 // --- the list --------------------------------------------------------------------------------------------------------
 
-/// One line a law, in the order in which they add to a load. Rounding follows that order.
+/// One line per law, in the order in which they add to a load. Rounding depends on that order.
 #define BT_FORCE_LAWS(LAW) \
     LAW(water_drag) \
     LAW(air_drag) \

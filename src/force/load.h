@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How a load is integrated over a step; equations in bergtow/forces.h. Inline: this is what a step spends on forces.
+// Integration of a load over a step; equations in bergtow/forces.h. Inline, as it is the cost of forces in a step.
 #ifndef BERGTOW_LOAD_H
 #define BERGTOW_LOAD_H
 
@@ -9,10 +9,10 @@
 #include "bergtow/forces.h"
 #include "base/elementary.h"
 
-/// Middle of the step at hand, s.
+/// Middle of the present step, s.
 static inline double bt_load_time(const bt_world *world) { return ((double)world->step + 0.5) * world->par.dt; }
 
-/// Streams are counted.
+/// Clear a load; its streams need not be cleared, they are counted.
 static inline void bt_load_clear(bt_load *load)
 {
     load->turn = load->about_x =
@@ -21,7 +21,7 @@ static inline void bt_load_clear(bt_load *load)
     load->n_streams = 0;
 }
 
-/// What law k adds to a body on which it acts.
+/// Add the load of law k on a body, if it acts there.
 static inline void bt_load_add(const bt_forces *forces, int k, bt_force_body *body, bt_load *load)
 {
     const bt_force_law *law = bt_force_laws[k];
@@ -31,13 +31,13 @@ static inline void bt_load_add(const bt_forces *forces, int k, bt_force_body *bo
     law->add(body, load);
 }
 
-/// What all laws from `first` on add to a body.
+/// Add the loads of all laws from `first` on.
 static inline void bt_load_fill(const bt_forces *forces, int first, bt_force_body *body, bt_load *load)
 {
     for (int k = first; k < forces->n; k++) bt_load_add(forces, k, body, load);
 }
 
-/// Body i at velocity u as laws see it.
+/// Body i at velocity u, as passed to the laws.
 static inline bt_force_body bt_load_body(const bt_world *world, bt_idx i, const bt_vel *u)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -57,7 +57,7 @@ static inline bt_force_body bt_load_body(const bt_world *world, bt_idx i, const 
     };
 }
 
-/// The angle by which a load turns a velocity in a step, rad; many bodies have the same.
+/// The angle by which a load rotates a velocity in a step, rad; it is the same for many bodies.
 typedef struct bt_turning {
     double angle, c, s;
 } bt_turning;
@@ -89,10 +89,10 @@ static inline void bt_load_turn(const bt_load *load, const bt_turning *turning, 
     if (load->moment != 0) u->w += dt * load->moment / inertia;
 }
 
-/// All that is implicit as one linear force j − K (U, ω).
+/// The implicit part of a load as one linear force j − K (U, ω).
 typedef struct bt_linear {
     double g, gx, gy, gw, jx, jy, jw; ///< as in bt_load
-    /// jw without that of streams, which vanishes where they do not couple, but for rounding
+    /// jw without that of streams, which is 0 to rounding if they do not couple
     double twist;
 } bt_linear;
 
@@ -115,7 +115,7 @@ static inline void bt_linear_add_skin(bt_linear *linear, const bt_stream *stream
 void bt_linear_add_outline(const bt_bodies *bodies, bt_idx i, bt_stream stream, double rx, double ry, double w,
                            bt_linear *linear);
 
-/// Everything implicit that acts on body i at velocity u.
+/// The implicit part of the load on body i at velocity u.
 static inline bt_linear bt_load_implicit(const bt_bodies *bodies, bt_idx i, const bt_load *load, const bt_vel *u)
 {
     bt_linear linear = bt_load_linear(load, u->w);
@@ -133,11 +133,11 @@ static inline bt_linear bt_load_implicit(const bt_bodies *bodies, bt_idx i, cons
     return linear;
 }
 
-/// (M + Δt K) U* = M U' + Δt j; inv: of the diagonal of M + Δt K.
+/// Solve (M + Δt K) U* = M U' + Δt j; inv: inverse of the diagonal of M + Δt K.
 static inline void bt_linear_take(const bt_linear *linear, double dt, double m, double inertia, bt_inv inv, bt_vel *u)
 {
     if (linear->gx == 0 && linear->gy == 0) { // no coupling
-        // without drag exactly as it was: a floe that drifts with the water is at rest to the last bit
+        // without drag exactly unchanged: a floe that drifts with the water is at rest to the last bit
         if (linear->g > 0 || linear->jx != 0 || linear->jy != 0) {
             u->x = (m * u->x + dt * linear->jx) * inv.m;
             u->y = (m * u->y + dt * linear->jy) * inv.m;

@@ -28,7 +28,7 @@ static void add_series(const char *name, const bt_force_law *law, bool part)
     if (bt_force_series_find(name) < 0) bt_force_series_of[bt_n_force_series++] = (bt_force_series){name, law, part};
 }
 
-/// After those that are there: a world knows its series by their places, so that none may move.
+/// Append series: a world knows its series by their indices, so none may move.
 static void add_series_of(const bt_force_law *law)
 {
     if (law->part_of) add_series(law->part_of, NULL, false);
@@ -43,8 +43,8 @@ static bool add_keys(const bt_force_law *law, bt_errors *err)
 }
 
 /// Keys and series of the laws of the program, before main, so that every reader of the tables finds them complete. The
-/// first of all constructors (the least priority that programs may have), so that one of another file can register its
-/// laws.
+/// first of all constructors (the lowest priority number that programs may use), so that constructors of other files
+/// can register laws.
 __attribute__((constructor(101))) static void begin(void)
 {
     bt_errors err = {0};
@@ -55,7 +55,7 @@ __attribute__((constructor(101))) static void begin(void)
     bt_keys_fault(&err);
 }
 
-/// The series that it brings.
+/// Check the series of a law.
 static void check_series(const bt_force_law *law, const char *name, bt_errors *err)
 {
     const char *of = law->part_of ? law->part_of : law->turns_only ? NULL : name;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What of a contact's impulse is a collision, and the corner that it meets; see loads/collision.h.
+// The collision part of a contact's impulse, and the corner in contact; see loads/collision.h.
 #include "loads/collision.h"
 
 #include <math.h>
@@ -7,8 +7,8 @@
 #include "base/elementary.h"
 #include "contact/row.h"
 
-/// Interior angle of the outline of body i, rad, where vertex v of its part stands; NaN when there is no such vertex.
-/// Parts have no corners of their own: a cut leads from one corner of the outline to another.
+/// Interior angle of the outline of body i, rad, at vertex v of a part; NaN if there is no such vertex. Every corner of
+/// a part is a corner of the outline: a cut leads from one corner of the outline to another.
 static double interior_angle(const bt_bodies *bodies, bt_idx i, int part, uint32_t v)
 {
     const bt_mark *mark = bodies->mark + bodies->offset[i] + part;
@@ -32,7 +32,7 @@ bt_contact_corner bt_contact_corner_of(const bt_bodies *bodies, const bt_contact
                                               (feature & 0xfffffu) >> 1), of_b};
 }
 
-/// Masses without the drag that the solver's contain: a collision is short against the step.
+/// Masses without the drag included in the solver's: a collision is short compared with the step.
 static bt_inv bare(const bt_bodies *bodies, bt_idx i)
 {
     return bodies->inv[i].m > 0 ? (bt_inv){1 / bodies->mass[i], 1 / bodies->inertia[i]} : (bt_inv){0};

@@ -17,7 +17,7 @@
 
 // --- contacts of the body --------------------------------------------------------------------------------------------
 
-// Contacts of the towed body as a step leaves them: where, how hard, how fast; see loads/impact.h for the equations.
+// Contacts of the towed body after a step: place, impulse, approach; equations in loads/impact.h.
 
 enum { CONTACT_WIDTH = sizeof(bt_body_contact) / sizeof(double) };
 _Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a contact is a row of doubles");
@@ -38,7 +38,7 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
     const double sign = is_b ? 1 : -1;
     const bt_collision collision = bt_contact_collision(world, contact);
 
-    // Arms in the world's axes from their products with n and t, turned into the body's frame at X1.
+    // Arms in world axes from their products with n and t, rotated into the body's frame at X1.
     const double along = is_b ? contact->rbt : contact->rat, arm = is_b ? collision.rbn : collision.ran;
     const double nx = c * contact->nx + s * contact->ny, ny = c * contact->ny - s * contact->nx;
     bt_body_contact t = {
@@ -87,21 +87,21 @@ static void add_cell(const bt_world *world, const bt_impacts *impacts, bt_idx k,
 
 static int by_gid(const void *a, const void *b)
 {
-    // A pair has one manifold. A floe of several parts has more: then by place.
+    // A pair has one manifold; a floe of several parts has more, sorted by place.
     const bt_body_contact *p = a, *q = b;
     if (p->gid != q->gid) return p->gid < q->gid ? -1 : 1;
     if (p->x != q->x) return p->x < q->x ? -1 : 1;
     return (p->y > q->y) - (p->y < q->y);
 }
 
-/// Collective. All manifolds on the towed body with an impulse, in the order of gids, on rank 0: [*n], the caller
-/// frees; nothing on other ranks. After the solve and before poses move.
+/// Collective. All manifolds on the towed body with an impulse, [*n], in the order of gids, on rank 0; NULL on other
+/// ranks. The caller frees them. Call after the solve and before poses move.
 static bt_body_contact *collect_body_contacts(const bt_world *world, const bt_impacts *impacts, int64_t *n)
 {
     const bt_cells *ts = world->cells;
     const bt_idx towed = bt_world_towed(world);
-    // A large movable body has its contacts in the last cell, which comes last of all; one of infinite mass has them in
-    // the cells of the floes.
+    // The contacts of a large movable body are in the last cell, the last in the order; those of a body of infinite
+    // mass are in the cells of the floes.
     const bt_idx from = world->bodies.large[towed] && world->bodies.motion[towed] == BT_DYNAMIC
                         ? ts->start[BT_COLOURS] : 0;
     contact_rows all = {0};
@@ -133,7 +133,7 @@ static bt_body_contact *collect_body_contacts(const bt_world *world, const bt_im
 // --- collisions ------------------------------------------------------------------------------------------------------
 
 #define TURNED                                                                                                         \
-    1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
+    1.25 // factor on the remaining approach: a turning floe may close the rest of its gap somewhat faster, assumed
 
 bt_impact_rule bt_impact_rule_of(const bt_case *input)
 {
@@ -208,8 +208,8 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
     bt_impact_convert(&impacts->rule, impact);
 }
 
-/// Contacts `contact[n]` of one floe in this step into its event; o is its open one, or empty. True when an event is
-/// there that may go on.
+/// Add contacts `contact[n]` of one floe in this step to its event; o: its open event, or empty. True if there is an
+/// event that may continue.
 static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t n, double time, bt_impact_open *o,
                    bool *begun)
 {
@@ -258,7 +258,7 @@ static void follow_events(bt_impacts *impacts, double time)
         const bool stays = follow(impacts, impacts->contact + i, end - i, time, &o, &there);
         const bool same = was_open && o.so_far.time == before.so_far.time;
         if (was_open && (!same || !stays)) {
-            // Closed as it is, with this step's part if there was one; and another may have begun.
+            // Close it as it is, with this step's part if there was one; another may have begun.
             close_event(impacts, same ? &o : &before);
         }
         if (there && !same && !stays) close_event(impacts, &o);
@@ -273,7 +273,7 @@ static void follow_events(bt_impacts *impacts, double time)
 
 // --- one step --------------------------------------------------------------------------------------------------------
 
-/// Impulses of the step into panels and sums. c, s: yaw of the body at X1.
+/// Add the impulses of the step to panels and sums. c, s: cosine and sine of the body's yaw at X1.
 static void add_loads(bt_impacts *impacts, double c, double s)
 {
     double hit[2] = {0, 0}, push = 0;

@@ -2,37 +2,36 @@
 // Loads on the towed body: contact impulses of a step separated into quasi-static loads and collisions, and collisions
 // as forces.
 //
-// A step gives impulses. What they mean as forces depends on how long they act, which a rigid contact does not say [Y:
-// Yulmetov & Løset 2017, section 2.2 begins so; formulas derived here]:
+// A step gives impulses. Their forces depend on how long they act, which a rigid contact does not determine [Yulmetov &
+// Løset 2017, beginning of section 2.2; formulas derived here]:
 //
-//   quasi-static  a contact that has been closed before: F = λ / Δt
-//   collision     a contact whose approach the step cuts: λ_c acts for the time of a collision, T_c, not for a step
+//   quasi-static  a contact that was closed before: F = λ / Δt
+//   collision     a contact whose approach the step stops: λ_c acts for the time of a collision, T_c, not for a step
 //
-// Separation. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ +
-// M_b⁻¹)·n including rotation, W_nt the coupling with the tangent, and ρ = λ_t / λ, an impulse alone changes the normal
+// Separation. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ + M_b⁻¹)·n
+// including rotation, W_nt the coupling with the tangent, and ρ = λ_t / λ, an impulse λ alone changes the normal
 // velocity by λ (W + ρ W_nt). From an approach v1 < 0 at the start of the step to v2 at its end the collision takes
 //     λ_c = min(λ, (v2 − v1) / (W + ρ W_nt)),      λ − λ_c is quasi-static,      m_e = 1/W.
-// M is the mass with added mass, without the drag of the step. For one floe that hits by itself this is all of λ; a
-// floe held against the hull by wind, or by others, has v1 = 0 and λ_c = 0. Rejected: the manifold's two points each by
-// itself, λ_i against (v2 − v1)_i / W_ii; a square hit flush then shows 4/5 of its momentum, since the points share it.
-// A blow that comes through a floe already against the hull has no approach there: it is quasi-static, and as sharp as
-// Δt makes it. Approaches below a least speed count as quasi-static: a contact that has converged to the tolerance
-// still creeps, and one that slides over a corner of the hull meets a new normal every step.
+// M is the mass with added mass, without the drag of the step. For a single floe that hits the hull this is all of λ; a
+// floe held against the hull by wind, or by others, has v1 = 0 and λ_c = 0. Rejected: the manifold's two points
+// separately, λ_i against (v2 − v1)_i / W_ii; a square that hits flush then shows 4/5 of its momentum, since the points
+// share it. A blow transmitted by a floe already against the hull has no approach there: it is quasi-static, and its
+// peak depends on Δt. Approaches below a least speed count as quasi-static: a contact that has converged to the
+// tolerance still creeps, and a contact that slides over a corner of the hull meets a new normal every step.
 //
-// Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step takes the
-// rest. So a collision goes on into the next step if the last one left a rest of approach above the solver's tolerance
-// and it is this that is cut; impulses add up.
+// Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step stops the
+// rest. So a collision continues in the next step if the last one left an approach above the solver's tolerance and
+// this rest is now stopped; impulses add up.
 //
-// Force of a collision with impulse λ, approach v_n and effective mass m_e; every peak names which:
+// Force of a collision with impulse λ, approach v_n and effective mass m_e, by the conversion:
 //   duration    T_c given:                       mean λ / T_c,  peak (π/2) λ / T_c of a half-sine
 //   crushing    a corner of angle φ is crushed at pressure p over thickness h: F = k x, k = 2 p h tan(φ/2), so
 //               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then, without the rebound
-// In the second v_n is what the contact itself takes away, min(approach, λ / m_e): neighbours may take a part.
+// In the second v_n is the approach that the contact itself removes, min(approach, λ / m_e): neighbours may share it.
 //
-// What is counted of them, and from when: src/output/impact_count.h, src/loads/panel.h.
+// Counts, and their start: src/output/impact_count.h, src/loads/panel.h.
 //
-// On several ranks every rank finds the contacts that it owns; rank 0 gathers them, in the order of ids, and has all
-// that follows.
+// On several ranks every rank finds the contacts that it owns; rank 0 gathers them, by id, and does the rest.
 #ifndef BT_IMPACT_H
 #define BT_IMPACT_H
 
@@ -40,15 +39,15 @@
 #include "bergtow/world.h"
 #include "loads/panel.h"
 
-/// One manifold on the towed body in one step. Numbers only, so that ranks can hand it on as a row.
+/// One manifold on the towed body in one step. Numbers only, so that ranks can exchange it as a row.
 typedef struct bt_body_contact {
     double gid;           ///< of the other body
     double x, y;          ///< pressure centre, m, body frame
     double nx, ny;        ///< direction of the normal force on the towed body, body frame; the tangent is (−ny, nx)
     double normal, friction; ///< λ, λ_t on the towed body, N s
     double collision;     ///< λ_c, N s
-    double approach;      ///< −v1 where the contact closes, otherwise 0, m/s
-    double rest;          ///< −v2 where it still closes, otherwise 0, m/s
+    double approach;      ///< −v1 if the contact closes, otherwise 0, m/s
+    double rest;          ///< −v2 if it still closes, otherwise 0, m/s
     double mass;          ///< m_e, kg
     double thickness;     ///< of the ice that is crushed, m
     double corner;        ///< interior angle of the corner in contact, rad; NaN if it has none
@@ -70,19 +69,19 @@ typedef struct bt_impact {
     double duration;      ///< T_c or t_p, s
 } bt_impact;
 
-/// A collision that may go on in the next step.
+/// A collision that may continue in the next step.
 typedef struct bt_impact_open {
     bt_impact so_far;
     double rest;          ///< approach that the last step left, m/s
-    double largest;       ///< largest λ_c of one manifold in it so far: place, mass and corner are of that one, N s
+    double largest;       ///< largest λ_c of one manifold so far, which gives place, mass and corner, N s
 } bt_impact_open;
 
-/// What the conversion goes by.
+/// Parameters of the conversion.
 typedef struct bt_impact_rule {
     bt_impact_conversion conversion;
     double duration;      ///< T_c, s
     double pressure;      ///< p, Pa
-    bool real_corner;     ///< φ of the floe's or hull's own corner where there is one
+    bool real_corner;     ///< use the angle of the floe's or hull's corner if there is one
     double corner_angle;  ///< φ otherwise, rad
     double least_speed;   ///< slower approaches are quasi-static, m/s
 } bt_impact_rule;
@@ -97,11 +96,11 @@ typedef struct bt_impacts {
     // the last step
     bt_body_contact *contact;    ///< [n_contacts] by gid
     int64_t n_contacts;
-    bt_impact *closed;    ///< [n_closed] collisions that ended in it, by gid
+    bt_impact *closed;    ///< [n_closed] collisions that ended in the step, by gid
     int64_t n_closed, cap_closed;
     double collision_x, collision_y; ///< share of collisions in the contact impulse on the body, world frame, N s
     double largest_quasi_static_load;  ///< Σ (λ − λ_c) / Δt over the manifolds of one floe or wall, N
-    // carried on
+    // carried over to the next step
     bt_impact_open *open; ///< [n_open] by gid
     int64_t n_open;
 } bt_impacts;
@@ -110,17 +109,17 @@ bt_impact_rule bt_impact_rule_of(const bt_case *input);
 /// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
 void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact);
 
-/// For the towed body of the world; NULL when the case asks for none, or there is no body.
+/// Create it for the towed body of the world; NULL if the case does not ask for collisions, or there is no body.
 bt_impacts *bt_impacts_create(const bt_case *input, const bt_world *world);
 void bt_impacts_free(bt_impacts *impacts);
 
 /// Collective. Take the step just solved: after the solve and before poses move.
 void bt_impacts_take(bt_world *world);
 
-/// The run is over: what is still open is closed as it is, into `closed`.
+/// At the end of the run: move the open collisions, as they are, to `closed`.
 void bt_impacts_end(bt_impacts *impacts);
 
-/// What the conversion is, in words: "half-sine of 0.1 s".
+/// Description of the conversion, such as "half-sine of 0.1 s".
 void bt_impact_describe(const bt_impact_rule *rule, char out[160]);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a point lies on the waterline, and sums of load by panel; see loads/panel.h.
+// Position of a point on the waterline, and sums of load by panel; see loads/panel.h.
 #include "loads/panel.h"
 
 #include <math.h>
@@ -32,8 +32,8 @@ static double nearest(const bt_panels *panels, double x, double y)
     return at;
 }
 
-/// Where the ray along +x leaves the waterline: the centroid is inside and the outline convex, so one edge crosses it
-/// upwards.
+/// Position where the ray along +x leaves the waterline: the centroid is inside and the outline convex, so exactly one
+/// edge crosses the ray upwards.
 static double bow_of(const bt_panels *panels)
 {
     for (int i = 0; i < panels->n_vertices; i++) {
@@ -69,7 +69,7 @@ void bt_panels_free(bt_panels *panels)
 
 int bt_panels_at(const bt_panels *panels, double x, double y)
 {
-    // Half a panel before the bow begins panel 0.
+    // Panel 0 begins half a panel before the bow.
     const double around = panels->arc[panels->n_vertices];
     double s = (nearest(panels, x, y) - panels->bow) / around * panels->n + 0.5;
     s -= panels->n * floor(s / panels->n);
@@ -133,7 +133,7 @@ static void clear(bt_panel_blocks *blocks, int64_t from, int64_t to)
     memset(row(blocks, from), 0, (size_t)((to - from) * blocks->n) * sizeof *blocks->load);
 }
 
-/// Room for so many blocks at least; what is new bears no load.
+/// Make room for at least this many blocks; new ones have no load.
 static void reserve(bt_panel_blocks *b, int64_t blocks)
 {
     if (blocks <= b->cap) return;
@@ -165,7 +165,7 @@ void bt_panel_blocks_restore(bt_panel_blocks *blocks, int64_t steps, bt_panel_lo
 
 _Static_assert(BT_STATS_STARTS % 2 == 0, "full blocks go in pairs");
 
-/// Blocks 2k − 1 and 2k become block k.
+/// Merge blocks 2k − 1 and 2k into block k.
 static void merge_pairs(bt_panel_blocks *blocks)
 {
     for (int64_t to = 1; to <= BT_STATS_STARTS / 2; to++) {

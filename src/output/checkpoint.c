@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files of checkpoints: written beside, renamed in turn, read with a second one to fall back on.
+// Files of checkpoints: written under a temporary name, renamed in turn, read with the previous one as a fallback.
 #include "output/checkpoint.h"
 
 #include <inttypes.h>
@@ -12,9 +12,10 @@
 #include "base/fileio.h"
 #include "base/snapshot.h"
 
-// --- units and axes of what is saved ---------------------------------------------------------------------------------
+// --- units and axes of saved arrays ----------------------------------------------------------------------------------
 
-// What those arrays of a checkpoint are that no row of a saved member describes (state.c, history.c), for readers.
+// Descriptions, for readers, of the arrays of a checkpoint that no row of a saved member describes (state.c,
+// history.c).
 
 typedef struct {
     const char *name, *units, *meaning; ///< units: NULL = text
@@ -22,7 +23,7 @@ typedef struct {
 } row;
 
 static const row rows[] = {
-    // where it comes from, and how long it took: no part of the state
+    // origin and duration: not part of the state
     {"about/program", NULL, "program that wrote it", "one"},
     {"about/revision", NULL, "revision of its sources", "one"},
     {"about/written", NULL, "date and time at which it was written", "one"},
@@ -42,7 +43,7 @@ static const row rows[] = {
     {"world/hash", "1", "hash of the state", "one"},
     {"contacts/added_laws", NULL, "contact laws that the program added, in the order of their indices", "one"},
     {"forces/added_laws", NULL, "force laws that the program added and that have acted, in order", "one"},
-    // loads and what was written
+    // loads and counts of written rows
     {"impacts/open", "1", "collisions under way, a row each, columns in SI units", "impact column"},
     {"collisions/sum", "N", "panel loads of the sample under way: force x, y, normal", "panel panel_force"},
     {"collisions/panel_blocks", "N", "panel loads summed over blocks of steps", "panel_block panel_load"},
@@ -96,7 +97,7 @@ bt_status bt_checkpoint_write(bt_snapshot *snap, const char *dir, const char *na
          *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = path_of_part(dir, name);
     bt_status status = bt_snapshot_close(snap, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
-        // One that has been damaged meanwhile must not take the place of a sound one.
+        // A checkpoint that has been damaged meanwhile must not replace a sound one.
         bt_errors unheard = {0};
         const bool sound = bt_checksum_check(path, BT_CHECKSUM_CHECKPOINT, NULL, &unheard) == BT_OK;
         status = bt_file_rename(path, sound ? before : damaged, err);
@@ -164,7 +165,7 @@ void bt_checkpoint_remove(const char *dir)
     }
 }
 
-/// Dimensions and kind of an array, and its numbers where they are few.
+/// Print dimensions and type of an array, and its numbers if they are few.
 static void print_item(const bt_item *item)
 {
     static const char *const kinds[BT_ITEM_TYPES] = {

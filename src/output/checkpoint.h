@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT
-// Checkpoints: the whole state of a run in one file, from which it goes on to the same bits.
+// Checkpoints: the whole state of a run in one file, from which it continues with the same bits.
 //
-// The promise. A run that is stopped, or killed, at any moment and taken up again ends with the state, the series, the
-// frames, the events, the collisions and the summary of the run that was never stopped, on any number of ranks and
-// threads. Only wall times, and the counts of what the division among ranks has cost, are those of the pieces. A run
-// that is killed before its first checkpoint starts again from case.resolved.yml, which is then also its case as given,
-// unless that or a file that it names has changed (src/case/case_files.h).
+// The promise. A run that is stopped, or killed, at any moment and resumed ends with the state, the series, the frames,
+// the events, the collisions and the summary of an uninterrupted run, on any number of ranks and threads. Only wall
+// times, and the costs of the division among ranks, are those of the pieces. A run killed before its first checkpoint
+// starts again from case.resolved.yml, which is then also its case as given, unless that or a file that it names has
+// changed (src/case/case_files.h).
 //
 // The file. DIR/checkpoint.h5 is an HDF5 file protected by a checksum (src/base/checksum.h), of named arrays
-// (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp, brought to the disk, the one
-// before becomes checkpoint.previous.h5, the new one checkpoint.h5; so at every moment there is one that is whole. It
-// holds the case as text with its tables of current and wind, and the ice field as made, with the lead in it: a run
-// that goes on reads no other file but DIR/result.h5, and makes no field. The number of format is part of the checksum;
-// another one is refused.
+// (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp and synced, the previous one
+// is renamed checkpoint.previous.h5, the new one checkpoint.h5; so there is a complete one at every moment. It holds
+// the case as text with its tables of current and wind, and the ice field as made, with the lead: a resumed run reads
+// no other file except DIR/result.h5, and makes no field. The format number is part of the checksum; other formats are
+// rejected.
 //
-// What is state. Everything that steps carry on is in the tables of src/output/state.c, src/output/record_resume.c,
+// What is state. Everything that steps carry over is in the tables of src/output/state.c, src/output/record_resume.c,
 // src/output/impact_store.c and src/run/run_state.c; nothing else writes or reads it. Member by member, S saved, D
-// derived from case and field by the same functions as in a fresh run, - of one step alone:
+// derived from case and field by the same functions as in a fresh run, - used within one step only:
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
 //   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, lap, exposure
@@ -30,20 +30,20 @@
 //                       poses, and cannot be made from them
 //                     D cell array, at, n_in_cells, labelled
 //                     - moved, moved_any, speed, bound, awake, busy, order, share, still
-//                     not needed: asleep (a cell that rests is found to do so again)
+//                     not needed: asleep (a cell at rest is found to be so again)
 //   bt_pair           S of those in contact: part
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts
 //                     (contacts.h)
-//   bt_memory         S all: what contact laws remember of pairs (contact/law.h)
+//   bt_memory         S all: the records of contact laws for pairs (contact/law.h)
 //   bt_contact        S n, ln, lt (warm start)    - the rest
 //   bt_gaps           S feature (warm start; reference edge)    - the rest
 //   bt_limit, bt_solver, lists
-//                     - all: the momentum starts anew in every solve
+//                     - all: momentum starts anew in every solve
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way
 //                     D, - the rest
 //   bt_forces         S acted, as names of the added laws
 //                     D own
-//                     - what is recorded of the towed body, its place
+//                     - the record and place of the towed body
 //   bt_undisturbed    S drift, vel
 //                     D the rest
 //   bt_window         S start, rear, counters, most, overtaken, dropped, brought
@@ -54,19 +54,19 @@
 //   bt_impacts        S open
 //                     D rule, panels' places
 //                     - contact, closed, collision, largest_quasi_static_load, panels' loads
-//   bt_record         S history, numbers of entries and frames, the entry under way
+//   bt_record         S history, numbers of entries and frames, the present entry
 //                     in result.h5: the entries and frames themselves
-//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel.h)
+//   bt_impact_store   S numbers of rows, panel loads of the present entry and by blocks (src/loads/panel.h)
 //                     in result.h5: the rows
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
 //                     D the rest
 //   bt_guard          S in_a_row, locked, energy
 //                     D the rest
-//   bt_domain         not state: which rank owns what affects no bit
+//   bt_domain         not state: ownership by ranks affects no bit
 //   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: no counter
 //
-// That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c).
-// What no step can leave is refused, under a sound checksum too (src/output/state_check.c).
+// A test that resumes a run after every step shows that nothing is missing (tests/unit/test_checkpoint.c). States that
+// no step can leave are rejected, even with a valid checksum (src/output/state_check.c).
 #ifndef BT_CHECKPOINT_H
 #define BT_CHECKPOINT_H
 
@@ -77,39 +77,39 @@ struct bt_snapshot;
 #define BT_CHECKPOINT_FILE "checkpoint.h5"
 #define BT_CHECKPOINT_BEFORE "checkpoint.previous.h5"
 #define BT_CHECKPOINT_DAMAGED                                                                                          \
-    "checkpoint.damaged.h5" // a checkpoint.h5 that was refused, set aside when the next one was written
+    "checkpoint.damaged.h5" // a rejected checkpoint.h5, set aside when the next one was written
 #define BT_FAILURE_FILE "failure.h5"
 
-/// What is added to `snap` from here on goes to dir/name.tmp at once; `snap` is empty before, bt_snapshot_free ends it.
-/// What fails here or on the way, bt_checkpoint_write returns.
+/// Begin a checkpoint: data added to `snap` from now on goes to dir/name.tmp at once. `snap` must be empty;
+/// bt_snapshot_free releases it. bt_checkpoint_write returns any error from here on.
 void bt_checkpoint_begin(struct bt_snapshot *snap, const char *dir, const char *name, bt_errors *err);
-/// dir/name from what has been added since bt_checkpoint_begin, a complete file or none. The one before is kept for
-/// checkpoint.h5. Errors: BT_ERR_IO.
+/// Complete dir/name from the data added since bt_checkpoint_begin: a complete file or none. The previous checkpoint.h5
+/// is kept. Errors: BT_ERR_IO.
 bt_status bt_checkpoint_write(struct bt_snapshot *snap, const char *dir, const char *name, bt_errors *err);
 
-/// Read dir/checkpoint.h5, or, if that is not there or refused, the one before it. *said: why the first was not taken,
-/// for the user, or NULL; the caller frees it, and *path, which must live as long as the snapshot. Errors: BT_ERR_IO,
-/// BT_ERR_CASE for what is refused.
+/// Read dir/checkpoint.h5, or the previous one if that is missing or rejected. *said: why the first was not used, for
+/// the user, or NULL; the caller frees it, and *path, which must live as long as the snapshot. Errors: BT_ERR_IO,
+/// BT_ERR_CASE (rejected).
 bt_status bt_checkpoint_read(struct bt_snapshot *snap, const char *dir, char **path, char **said, bt_errors *err);
 
 /// Is there a checkpoint in dir?
 bool bt_checkpoint_there(const char *dir);
 
-/// Remove the checkpoints of dir; what cannot be removed stays.
+/// Remove the checkpoints of dir, as far as possible.
 void bt_checkpoint_remove(const char *dir);
 
-/// Print what a checkpoint holds, an array a line, on stdout. Errors as for bt_checkpoint_read.
+/// Print the contents of a checkpoint on stdout, one array per line. Errors as for bt_checkpoint_read.
 bt_status bt_checkpoint_print(const char *path, bt_errors *err);
 
-/// Compare two checkpoints; *difference: the first, in words, NULL = none. The caller frees it. Errors as for
-/// bt_checkpoint_read: a difference is none.
+/// Compare two checkpoints; *difference: description of the first difference, NULL = none; the caller frees it. Errors
+/// as for bt_checkpoint_read; a difference is not an error.
 bt_status bt_checkpoint_compare(const char *a, const char *b, char **difference, bt_errors *err);
 
-// --- units and axes of what is saved ---------------------------------------------------------------------------------
+// --- units and axes of saved arrays ----------------------------------------------------------------------------------
 
-// What those arrays of a checkpoint are that no row of a saved member describes, for readers of the file.
+// Descriptions of the arrays of a checkpoint that no row of a saved member describes, for readers of the file.
 
-/// Meaning of an array "group/name", its units (NULL: it is text) and axes; NULL where it has none.
+/// Meaning of an array "group/name", its units (NULL: text) and axes; NULL if it has no description.
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes);
 
 #endif

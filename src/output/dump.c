@@ -2,10 +2,9 @@
 // The contact problem of the step just solved, as a local problem in FCLIB's format.
 //
 // Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
-// share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
-// (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the
-// solution. Sheets that lie on each other (contact/raft.h) are contacts, too, whose two components lie in a disc about
-// a middle of its own.
+// share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that the contribution of a tow
+// line (not a contact) keeps its solved value. With a contact law the bounds of the normal impulses are those at the
+// solution. Sheets (contact/raft.h) are also contacts; their two components lie in a disc about a separate centre.
 #include "output/dump.h"
 
 #include <errno.h>
@@ -28,16 +27,16 @@
 
 // The contact problem of one step in the file format of FCLIB, so that other solvers can check ours.
 //
-// Layout as FCLIB's reader (github.com/FrictionalContactLibrary/fclib, src/fclib.h) expects it; every scalar is a
-// dataset of one entry, integers are of 32 bits:
+// Layout as expected by FCLIB's reader (github.com/FrictionalContactLibrary/fclib, src/fclib.h); every scalar is a
+// dataset of one entry, integers have 32 bits:
 //     /fclib_local/spacedim                       2
 //     /fclib_local/W/{nzmax, m, n, nz, p, i, x}    nz = −2: compressed rows (p [m+1], i columns, x values)
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /solution/{u, r}
-//     /bound, /disc, /ends, /places                of our own: bounds of the normal impulses; what sheets bear (mu is
-//                                                  0), a disc, of which this is the radius (NaN = another contact),
-//                                                  and a line, of which this is half; where contacts and bodies are
+//     /bound, /disc, /ends, /places                extensions: bounds of the normal impulses; of sheets (where mu is
+//                                                  0), a disc given by its radius (NaN = another contact),
+//                                                  and a line given by its half; places of contacts and bodies
 
 #define COMPRESSED_ROWS (-2)
 
@@ -119,7 +118,7 @@ static void write_places(bt_h5 *h5, const bt_fclib_places *places, hsize_t n)
         "x, y, yaw of every body at the end of the step, by id");
 }
 
-/// What the format does not know, and the solution.
+/// Write the extensions of the format, and the solution.
 static void write_more(bt_h5 *h5, const bt_fclib_problem *p)
 {
     const hsize_t n = (hsize_t)p->n;
@@ -192,7 +191,7 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
     out[3] += s * (inv.m * c + inv.i * rt * qt);  // t·t'
 }
 
-/// Sheets that lie on each other: rows along x and y, after the points of the pair.
+/// Sheets: rows along x and y, after the points of the pair.
 static row sheets_of(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
@@ -229,7 +228,7 @@ static row *rows_of(const bt_world *world, int *n)
             const double total = contact->ln[0] + contact->ln[1];
             if (ts->cell[k].gaps[j].row == BT_ROW_RELEASED) continue; // the two pass each other
             if (contact->n == 0) rows[(*n)++] = sheets_of(world, &ts->cell[k], j);
-            for (int i = 0; i < contact->n; i++) // one friction for both: distributed like the normal impulses
+            for (int i = 0; i < contact->n; i++) // one friction impulse for both: distributed like the normal impulses
                 rows[(*n)++] = (row){.gid_a = world->bodies.gid[contact->a],
                                      .gid_b = world->bodies.gid[contact->b],
                                      .point = i,
@@ -262,7 +261,7 @@ static void lever_of(double nx, double ny, double rn, double rt, double out[2])
     out[1] = rt * ny - rn * nx;
 }
 
-/// Of a body among those of the start and then all pieces of floes, whose ids come between those of the others.
+/// Row of a body: the original bodies first, then all pieces of floes, whose ids lie between those of the others.
 static int64_t row_of(const bt_world *world, bt_gid gid)
 {
     const bt_splitting *splitting = world->splitting;
@@ -271,7 +270,7 @@ static int64_t row_of(const bt_world *world, bt_gid gid)
                ? world->bodies.n_global - splitting->reserve + gid - splitting->first : gid - splitting->reserve;
 }
 
-/// Where the rows and all bodies are; the arrays belong to the caller afterwards.
+/// Places of the rows and of all bodies; the caller then owns the arrays.
 static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -307,7 +306,7 @@ static int by_contact(const void *a, const void *b)
     return (p->contact > q->contact) - (p->contact < q->contact);
 }
 
-/// The contacts at each movable body: those of body i are at[first[i]] up to at[first[i + 1]].
+/// The contacts at each movable body: those of body i are entries first[i] to first[i + 1] − 1 of the result.
 static incidence *incidences_of(const bt_bodies *bodies, const row *rows, int n, int64_t *first)
 {
     for (int k = 0; k < n; k++) {
@@ -326,14 +325,14 @@ static incidence *incidences_of(const bt_bodies *bodies, const row *rows, int n,
     return at;
 }
 
-/// The problem as it is made; bt_fclib_problem points to these.
+/// The problem under construction; bt_fclib_problem points to these arrays.
 typedef struct {
     int64_t *ptr;
     int32_t *col;
     double *val, *q, *mu, *u, *r, *bound, *disc, *ends;
 } problem;
 
-/// most: blocks of W, at most.
+/// Allocate the problem. most: largest number of blocks of W.
 static problem problem_of(const bt_bodies *bodies, const row *rows, int n, int64_t most)
 {
     const size_t m = (size_t)n;
@@ -360,7 +359,7 @@ static problem problem_of(const bt_bodies *bodies, const row *rows, int n, int64
     return out;
 }
 
-/// The two rows of W of contact k. near [m]: the contacts at its two bodies, in the order of the contacts.
+/// Form the two rows of W of contact k. near [m]: the contacts at its two bodies, in the order of the contacts.
 static void couple_all(problem *out, const bt_bodies *bodies, const row *rows, int k, const incidence *near, size_t m)
 {
     const row *p = &rows[k];

@@ -8,7 +8,7 @@
 
 
 /// Concentrations of the curves: 0 to 0.98 in hundredths, with a point just above and just below the two thresholds of
-/// Lichey and Hellmer so that the steps stay steps.
+/// Lichey and Hellmer, so that the steps remain sharp.
 enum { N_HUNDREDTHS = 99, N_CURVE = N_HUNDREDTHS + 2 };
 
 static void curve_points(double a[N_CURVE])
@@ -34,7 +34,7 @@ static void curves(bt_json *json, const bt_estimate_input *in)
             at.concentration = a[i];
             const bt_estimate estimate = bt_estimate_at(k, &at);
             force[i] = estimate.force;
-            if (!estimate.valid || a[i] == 0) continue; // without ice all are
+            if (!estimate.valid || a[i] == 0) continue; // without ice all are valid
             if (isnan(range[k][0])) range[k][0] = a[i];
             range[k][1] = a[i];
         }
@@ -46,7 +46,7 @@ static void curves(bt_json *json, const bt_estimate_input *in)
     bt_json_close(json, '}');
 }
 
-/// One estimate and the conditions, as their tables see them.
+/// One estimate and the conditions, for the tables of keys.
 typedef struct estimate_item {
     bt_estimate e;
     double ratio;
@@ -92,7 +92,7 @@ const bt_json_key bt_condition_keys[] = {
 };
 const int bt_n_condition_keys = sizeof bt_condition_keys / sizeof *bt_condition_keys;
 
-/// Simulated / estimate, NaN where there is none.
+/// Simulated / estimate, NaN if there is none.
 static double ratio_of(const bt_estimate_def *def, const bt_estimate *estimate, double simulated)
 {
     return def->on_top || !(estimate->force > 0) ? NAN : simulated / estimate->force;
@@ -115,7 +115,7 @@ void bt_estimates_json(bt_json *json, const char *key, const bt_estimate_input *
     bt_json_close(json, '}');
 }
 
-/// Does the formula know the size of floes? Asked of itself, in thin ice, where all have a value.
+/// Does the formula depend on floe size? Found by evaluating it in thin ice, where all formulas are valid.
 static bool uses_floe_size(int k, const bt_estimate_input *in)
 {
     bt_estimate_input small = *in, large = *in;

@@ -8,15 +8,15 @@
 
 extern const bt_json_key bt_estimate_keys[]; ///< of one estimate
 extern const int bt_n_estimate_keys;
-extern const bt_json_key bt_condition_keys[]; ///< of what they depend on
+extern const bt_json_key bt_condition_keys[]; ///< of their conditions
 extern const int bt_n_condition_keys;
 
-/// An object "estimates": the conditions, one object an estimate, and curves over the concentration with all else kept.
-/// simulated: mean ice resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
+/// Write an object "estimates": the conditions, one object per estimate, and curves over the concentration with all
+/// else fixed. simulated: mean ice resistance of a run, N, for the ratios (none for drag); NaN = no run.
 void bt_estimates_json(bt_json *json, const char *key, const bt_estimate_input *in, double simulated);
 
-/// An object "estimate_labels": of each estimate, in the order of the registry, its label, its kind, and whether its
-/// curve differs between fields of one case. For readers of the file, which know no estimate by name.
+/// Write an object "estimate_labels": for each estimate, in the order of the registry, its label, its kind, and whether
+/// its curve differs between fields of one case. For readers of the file, which know no estimate by name.
 void bt_estimate_labels_json(bt_json *json, const char *key, const bt_estimate_input *in);
 
 static inline const char *bt_estimate_kind_name(const bt_estimate_def *def)
@@ -24,7 +24,7 @@ static inline const char *bt_estimate_kind_name(const bt_estimate_def *def)
     return def->on_top ? "on top" : "ice resistance";
 }
 
-/// A table on stdout, each line begun with indent: estimate, force, simulated / estimate when there is a run, regime.
+/// Print a table on stdout, each line after `indent`: estimate, force, simulated / estimate if there is a run, regime.
 /// full: with formula and source.
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Replacing the result of a folder; the states it passes through are in folder.h.
+// Replacing the result in a folder; its states meanwhile are listed in folder.h.
 #include "output/folder.h"
 
 #include <errno.h>
@@ -25,7 +25,7 @@ static bool is_case(const char *path) { return bt_file_begins(path, BT_CASE_RESO
 
 static bool is_sealed(const char *path) { return bt_checksum_there(path, ""); }
 
-/// Sealed, or on its way to it.
+/// Is the file sealed, or begun with a seal to come?
 static bool is_begun(const char *path) { return is_sealed(path) || bt_checksum_to_come(path); }
 
 static bool is_regular(const char *path)
@@ -40,8 +40,8 @@ static bool is_request(const char *path)
     return lstat(path, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
-/// What a run leaves in its folder, or takes notice of; the case is first to go and last to come. HDF5 without a seal,
-/// and what may be damaged beyond knowing, is ours beside another file that is.
+/// The files that a run leaves in its folder, or reacts to; the case is moved out first and back last. An HDF5 file
+/// without a seal, or damaged beyond recognition, counts as ours if another file in the folder does.
 static const struct {
     const char *name;
     bool (*ours)(const char *path);
@@ -70,7 +70,7 @@ static bool is_there(const char *path)
     return lstat(path, &st) == 0;
 }
 
-/// Is file k in the folder, and this program's? A link is replaced and never followed: what it leads to stays.
+/// Is file k in the folder, and this program's? A link is replaced and never followed: its target stays.
 static bool holds(const char *dir, int k)
 {
     char *path = bt_file_join(dir, files[k].name);
@@ -81,7 +81,7 @@ static bool holds(const char *dir, int k)
     return yes;
 }
 
-/// Has this program written into the folder, beyond doubt?
+/// Has this program certainly written into the folder?
 static bool is_known(const char *dir)
 {
     bool known = false;
@@ -93,7 +93,7 @@ static bool is_known(const char *dir)
     return known;
 }
 
-/// Is what stands under the name of file k somebody else's?
+/// Was the file under the name of file k written by something else?
 static bool is_foreign(const char *dir, int k, const char *path)
 {
     if (!is_there(path)) return false;
@@ -116,7 +116,7 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
     return status;
 }
 
-/// Does the folder hold a run that has begun and not come to its end?
+/// Does the folder hold a run that has begun but not ended?
 static bool has_begun(const char *dir)
 {
     return bt_file_there(dir, BT_RESULT_PART) || bt_checkpoint_there(dir) || bt_folder_keeps(dir);
@@ -124,7 +124,7 @@ static bool has_begun(const char *dir)
 
 bool bt_folder_keeps(const char *dir) { return bt_file_there(dir, BT_FOLDER_REPLACED); }
 
-/// File k of one folder to the same name in another.
+/// Move file k of one folder to the same name in another.
 static bt_status move(const char *from, const char *to, int k, bt_errors *err)
 {
     if (!holds(from, k)) return BT_OK;
@@ -150,8 +150,8 @@ static bt_status clear(const char *dir, bt_errors *err)
 
 static bool stands(const char *dir) { return bt_checkpoint_there(dir) || bt_file_there(dir, "summary.json"); }
 
-/// What is in the folder to the one aside. If that is there already, what it holds is the last result that stood, and
-/// the run in its place never did: that one goes.
+/// Move the contents of the folder aside. If a folder aside exists already, it holds the last complete result, and the
+/// run in its place never completed: that run is removed.
 static bt_status make_room(const char *dir, bt_errors *err)
 {
     if (stands(dir)) bt_folder_settle(dir);
@@ -166,8 +166,8 @@ static bt_status make_room(const char *dir, bt_errors *err)
     return status;
 }
 
-/// The case last: until it is there, the next call goes on with this. What has got its name back on a disk that refuses
-/// to sync is back all the same; what cannot be moved stays where it is, and the next call tries again.
+/// Move the old result back, the case last: until it is there, the next call continues this. A file renamed on a disk
+/// that refuses to sync counts as moved; a file that cannot be moved stays, and the next call tries again.
 static void move_back(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
@@ -186,13 +186,13 @@ static void move_back(const char *dir)
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err)
 {
     char *ready = bt_file_join(dir, NEW_CASE), *path = bt_file_join(dir, CASE_FILE);
-    bt_status status = bt_file_write(ready, resolved, err); // where the disk is full, nothing has changed
+    bt_status status = bt_file_write(ready, resolved, err); // if the disk is full, nothing has changed
     if (status == BT_OK) {
         status = make_room(dir, err);
         if (status != BT_OK) {
             move_back(dir); // a case that is there is still the old one
         } else if ((status = bt_file_rename(ready, path, err)) != BT_OK) {
-            unlink(path); // and now the new one, where it has its name on a disk that refuses to sync
+            unlink(path); // now the new one, if it got its name on a disk that refuses to sync
             move_back(dir);
         }
     }
@@ -219,14 +219,14 @@ void bt_folder_recover(const char *dir)
     char *aside = aside_of(dir), *ready = bt_file_join(dir, NEW_CASE);
     if (is_case(ready)) unlink(ready);
     free(ready);
-    rmdir(aside); // it stays where it is not empty
+    rmdir(aside); // it stays if not empty
     free(aside);
 }
 
 void bt_folder_settle(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    bt_errors unheard = {0}; // the next result that stands tries again
+    bt_errors unheard = {0}; // the next complete result tries again
     char *aside = aside_of(dir);
     clear(aside, &unheard);
     rmdir(aside);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bodies and frames as the recorder takes them.
+// Bodies and frames in the form that the recorder takes.
 #ifndef BT_FRAME_H
 #define BT_FRAME_H
 
@@ -8,7 +8,7 @@
 #include "bergtow/world.h"
 
 /// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are distributed in equal blocks in the
-/// order of their ids; the other bodies are the last rank's. first: [size + 1].
+/// order of their ids; the last rank records the other bodies. first: [size + 1].
 void bt_record_blocks(const bt_comm *comm, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
 
 /// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes
@@ -22,31 +22,31 @@ typedef struct bt_record_bodies {
     const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...; on rank 0
     bt_idx towed;                ///< index of the towed body among all, −1 = none
     int branches;                ///< of the tow line, 0 = none
-    /// where this rank holds them all, while the record is open: frames draw their outlines; NULL = those of a copy
+    /// if this rank holds them all while the record is open: frames draw their outlines; NULL = those of a copy
     const bt_bodies *all;
-    const bt_outline_counts *outlines; ///< of the map that the floes came from; NULL: of none
+    const bt_outline_counts *outlines; ///< of the map from which the floes came; NULL: none
 } bt_record_bodies;
 
 /// A body in a frame.
 typedef struct bt_frame_row {
     double x, y, yaw;        ///< m, m, rad
-    double contact_force;    ///< largest normal force on the floe in this step, N; of other bodies not recorded
+    double contact_force;    ///< largest normal force on the floe in this step, N; not recorded for other bodies
     double speed;            ///< of the centroid, m/s
-    double vx, vy;           ///< its velocity, m/s; kept in single precision
-    double fx, fy;           ///< sum of all contact forces on the body in this step, N; in single precision, too
+    double vx, vy;           ///< its velocity, m/s; stored in single precision
+    double fx, fy;           ///< sum of all contact forces on the body in this step, N; also in single precision
 } bt_frame_row;
 enum { BT_FRAME_ROW = sizeof(bt_frame_row) / sizeof(double) };
 
 /// A piece of a floe in a frame.
 typedef struct bt_piece_row {
-    double piece;            ///< which, from 0
+    double piece;            ///< number of the piece, from 0
     bt_frame_row row;
 } bt_piece_row;
 
 /// The tow line in a frame: each branch from the hull to its towing end, or at the hull alone once it is broken.
 enum { BT_FRAME_BRANCHES = 2 };
 typedef struct bt_frame_line {
-    double point[BT_FRAME_BRANCHES][2][2]; ///< m, beside the body as frames show it
+    double point[BT_FRAME_BRANCHES][2][2]; ///< m, relative to the body as drawn
     double tension[BT_FRAME_BRANCHES];     ///< N
 } bt_frame_line;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The bodies and their frames in result.h5, each rank writing its block of them.
 //
-// Outlines are kept in single precision, as /xdmf stores them: 8 bytes a vertex and 1 byte a body are all that a rank
-// holds of its block between frames. Everything else passes through one buffer of 1 MB.
+// Outlines are kept in single precision, as /xdmf stores them: a rank holds only 8 bytes per vertex and 1 byte per body
+// of its block between frames. Everything else passes through one buffer of 1 MB.
 #include "output/frames.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 
-/// Rows first up to first + n, copied from memory.
+/// Write rows first to first + n − 1 from memory.
 static void write_copy(bt_slab *slab, int64_t first, int64_t n, const void *rows)
 {
     if (n > 0) bt_slab_write(slab, first, n, rows);
@@ -38,7 +38,7 @@ static outlines create_outlines(bt_frames *frames, const char *group, const char
         .offsets = bt_slab_fixed(h5, NAMED("offsets"), H5T_NATIVE_INT64, n + 1, 0, false),
         .thickness = bt_slab_fixed(h5, NAMED(height), H5T_NATIVE_DOUBLE, n, 0, false),
         .area = bt_slab_fixed(h5, NAMED("area"), H5T_NATIVE_DOUBLE, n, 0, false),
-        // Vertex numbers in XDMF are of 32 bits here: enough for 2^31 vertices a block.
+        // Vertex numbers in XDMF have 32 bits here: enough for 2^31 vertices per block.
         .topology = bt_slab_fixed(h5, topology, H5T_NATIVE_INT32, n_vertices + 2 * n, 0, false),
         .mirrored = frames->axes.swapped,
     };
@@ -46,7 +46,7 @@ static outlines create_outlines(bt_frames *frames, const char *group, const char
     return o;
 }
 
-/// What ParaView's coordinates are.
+/// Describe ParaView's coordinates.
 static void describe_axes(bt_h5 *h5, const bt_map_axes *axes)
 {
     bt_h5_attr_text(h5, "/xdmf", "axes", bt_map_axes_names(axes));
@@ -79,8 +79,8 @@ static void describe(bt_h5 *h5, const bt_record_bodies *bodies)
               "which of these bodies is towed, -1 = none");
 }
 
-/// Bodies from .. from + n of the block `bodies` to rows first .. first + n of the datasets; `before`: vertices of the
-/// rows before.
+/// Write bodies from .. from + n of the block `bodies` to rows first .. first + n of the datasets; before: number of
+/// vertices of previous rows.
 static void write_outlines(outlines *o, const bt_record_bodies *bodies, int64_t from, int64_t n, int64_t first,
                            int64_t before, char *buffer)
 {
@@ -104,7 +104,7 @@ static void write_outlines(outlines *o, const bt_record_bodies *bodies, int64_t 
     bt_rows_end(&rows);
 }
 
-/// The ids of the floes, their rows: ParaView numbers the cells of a selection anew.
+/// Write the ids of the floes, their rows: ParaView renumbers the cells of a selection.
 static void write_ids(bt_frames *frames)
 {
     bt_slab ids = bt_slab_fixed(frames->h, "/xdmf/floe_id", H5T_NATIVE_INT32, frames->n_floes, 0, true);
@@ -138,7 +138,7 @@ static void write_bodies(bt_frames *frames, const bt_record_bodies *bodies)
     write_ids(frames);
     if (bt_slab_share(frames->comm, all, N) == BT_OK) {
         char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
-        // An empty block of floes still has the 0 of the offsets to write if it is the first rank.
+        // The first rank writes the 0 of the offsets even for an empty block of floes.
         if (frames->own_floes > 0 || (last && frames->n_floes == 0))
             write_outlines(&o[0], bodies, 0, frames->own_floes, frames->first, frames->vertices_before, buffer);
         if (last) write_outlines(&o[1], bodies, frames->own_floes, frames->own_others, 0, 0, buffer);
@@ -181,7 +181,7 @@ static const struct {
      FLOES | OTHERS},
 };
 
-/// So many floes and other bodies as a column has.
+/// The number of rows of a column, with this many floes and other bodies.
 static int64_t rows_of(int column, int64_t floes, int64_t others)
 {
     return (columns[column].of & FLOES ? floes : 0) + (columns[column].of & OTHERS ? others : 0);
@@ -242,7 +242,7 @@ static void draw_vector(const bt_frames *frames, double x, double y, float to[3]
     to[0] = (float)drawn[0], to[1] = (float)drawn[1], to[2] = 0;
 }
 
-/// Bodies from .. from + n of the block to rows first .. first + n.
+/// Write bodies from .. from + n of the block to rows first .. first + n.
 static void write_rows(const bt_frames *frames, bt_slab *slab, enum quantity q, int64_t first, const bt_frame_row *row,
                        int64_t n, char *buffer)
 {
@@ -265,22 +265,22 @@ static void write_rows(const bt_frames *frames, bt_slab *slab, enum quantity q, 
     bt_rows_end(&rows);
 }
 
-/// Outline of body i of the block in its own frame, in single precision; returns its number of vertices. `at`: vertices
-/// of the block before it.
+/// Outline of body i of the block in its own frame, in single precision; returns its number of vertices. at: number of
+/// previous vertices in the block.
 static int outline_of(const bt_frames *frames, int64_t i, int64_t at, float *v)
 {
     if (!frames->bodies) {
         memcpy(v, frames->vertices + 2 * at, 2 * frames->n_vertices[i] * sizeof *v);
         return frames->n_vertices[i];
     }
-    const bt_idx k = frames->bodies->index_of[i]; // one rank's block is all bodies, by their ids
+    const bt_idx k = frames->bodies->index_of[i]; // on one rank the block is all bodies, by id
     const double *own = frames->bodies->vertices + 2 * frames->bodies->offset[k];
     const int n = bt_body_corners(frames->bodies, k);
     for (int c = 0; c < 2 * n; c++) v[c] = (float)own[c];
     return n;
 }
 
-/// All vertices of bodies from .. from + n of the block as drawn; `local`: vertices of the block before them.
+/// Write all vertices of bodies from .. from + n of the block as drawn; local: number of vertices before.
 static void write_points(const bt_frames *frames, bt_slab *slab, int64_t first, const bt_frame_row *row, int64_t from,
                          int64_t n, int64_t local, char *buffer)
 {
@@ -290,7 +290,7 @@ static void write_points(const bt_frames *frames, bt_slab *slab, int64_t first, 
         const double c = bt_cos(row[i].yaw), sine = bt_sin(row[i].yaw);
         const int corners = outline_of(frames, i, local, p);
         local += corners;
-        const bool gone = isnan(row[i].x); // a floe that has split: all of it in one point
+        const bool gone = isnan(row[i].x); // a floe that has split: all its vertices at one point
         for (int v = 0; v < corners; v++) {
             float *to = bt_rows_next(&rows);
             double drawn[2];
@@ -302,7 +302,7 @@ static void write_points(const bt_frames *frames, bt_slab *slab, int64_t first, 
     bt_rows_end(&rows);
 }
 
-/// Datasets of the frame in single precision, see xdmf.c; the last of floes alone.
+/// Datasets of the frame in single precision, see xdmf.c; the last for floes only.
 static const struct {
     const char *name, *units, *text;
     enum quantity quantity;
@@ -316,7 +316,7 @@ static const struct {
 };
 enum { N_DRAWN = sizeof drawn / sizeof *drawn };
 
-/// Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
+/// Without axes: each scale would list all its datasets, in one attribute of at most 64 kB.
 static void create_drawn(bt_frames *frames, const char *kind, int64_t cells, int64_t points, int n, bt_slab *slab)
 {
     for (int k = 0; k < n; k++) {
@@ -347,7 +347,7 @@ static void write_frame(bt_frames *frames, bt_slab *floes, bt_slab *others, cons
     free(buffer);
 }
 
-/// Of all ranks one writes; the line is the same on all.
+/// Only one rank writes the line, which is the same on all.
 static void write_line(bt_frames *frames, const bt_frame_line *line)
 {
     bt_h5_append(frames->h, frames->line_points, H5T_NATIVE_DOUBLE, (hsize_t)frames->n, 1, line->point);

@@ -12,7 +12,7 @@ enum { BT_FRAME_COLUMNS = 6 };
 typedef struct bt_frames {
     bt_h5 *h;
     const bt_comm *comm;
-    bt_map_axes axes;               ///< of what is drawn: /xdmf
+    bt_map_axes axes;               ///< of the drawing: /xdmf
     int64_t n_floes, n_others;      ///< of all ranks: floes, other bodies
     int64_t first;                  ///< first body of this rank's block
     int64_t own_floes, own_others;  ///< of the block
@@ -23,7 +23,7 @@ typedef struct bt_frames {
     int64_t vertices_before;        ///< of floes on the ranks before this one
     hid_t time;
     bt_slab column[BT_FRAME_COLUMNS]; ///< pose, ...: frames.c
-    int64_t towed;                  ///< which of the other bodies, −1 = none
+    int64_t towed;                  ///< index among the other bodies, −1 = none
     int branches;                   ///< of the tow line
     hid_t line_points, line_tension;///< −1 without a line
     double *times;                  ///< [n] s
@@ -31,15 +31,15 @@ typedef struct bt_frames {
     int64_t n, cap;                 ///< frames
 } bt_frames;
 
-/// Collective. Write /floes and /bodies, make /frames and /xdmf. *frames is zeroed memory. What fails shows in
-/// h5->status of the rank that met it.
+/// Collective. Write /floes and /bodies, make /frames and /xdmf. *frames must be zeroed. Errors show in h5->status of
+/// the rank concerned.
 void bt_frames_create(bt_frames *frames, bt_h5 *h5, const bt_comm *comm, const bt_record_bodies *bodies,
                       const bt_map_axes *axes);
-/// Where ParaView's part of the next frame is, into path, which is returned.
+/// Write the group of ParaView's part of the next frame to path; returns path.
 char *bt_frames_group(const bt_frames *frames, char path[64]);
 
-/// Collective. Add a frame, whose group is there: rows of this rank's block. Returns the same status on all ranks;
-/// after a failure the file stays as the last flush left it.
+/// Collective. Add a frame, whose group must exist: rows of this rank's block. Returns the same status on all ranks;
+/// after a failure the file stays as at the last flush.
 bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows, const bt_frame_line *line);
 void bt_frames_close(bt_frames *frames); ///< datasets and memory
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Bodies from the ranks that hold them to the ranks that record them.
 //
-// The world lies on the ranks as the computation wants it; result.h5 has the bodies in the order of their ids. Each
-// body is sent once, by the rank that speaks for it, to the rank whose block of ids holds it (bt_record_blocks). Lost
-// and doubled bodies show here.
+// The ranks hold the bodies as the computation needs them; result.h5 has them in the order of their ids. Each body is
+// sent once, by the rank responsible for it, to the rank whose block of ids contains it (bt_record_blocks). Lost and
+// duplicate bodies are detected here.
 #include "output/gather.h"
 
 #include <math.h>
@@ -16,9 +16,9 @@
 #include "base/elementary.h"
 
 typedef struct list {
-    bt_idx n;       ///< bodies this rank speaks for: rank 0 also for floes that have split
+    bt_idx n;       ///< bodies for which this rank is responsible; rank 0 also for floes that have split
     bt_gid *row;    ///< [n] among all rows (bt_roster_row)
-    int64_t *body;  ///< [n]; of a floe that has split −1 − the split (step/splitting.h)
+    int64_t *body;  ///< [n]; for a floe that has split, −1 − its split (step/splitting.h)
     int64_t *first; ///< [ranks + 1] blocks
     int64_t count;  ///< bodies of this rank's block
 } list;
@@ -52,7 +52,7 @@ static void free_list(list *block)
     free(block->first);
 }
 
-/// Its outline in its own frame; returns the number of vertices.
+/// Outline of a body in its own frame; returns the number of vertices.
 static int outline_of(const bt_world *world, int64_t body, const double **v)
 {
     if (body < 0) {
@@ -72,7 +72,7 @@ static int most_vertices(const bt_comm *comm, const bt_world *world, const list 
     return (int)most;
 }
 
-/// Vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
+/// Send vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
 static bt_status hand_over_vertices(const bt_comm *comm, const bt_world *world, const list *l, const int64_t *offsets,
                                     double *vertices, bt_errors *err)
 {
@@ -139,7 +139,7 @@ bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_
                               .thickness = thickness,
                               .area = area,
                               .names = roster->names,
-                              .all = comm->size == 1 && !world->splitting ? bodies : NULL, // none of whose floes goes
+                              .all = comm->size == 1 && !world->splitting ? bodies : NULL, // no floe goes
                               .towed = world->towed < 0 ? -1 : (bt_idx)bt_roster_row(roster, world->towed),
                               .branches = bt_tow_has_line(world->tow) ? world->tow->n_branches : 0};
     if (status != BT_OK) bt_gather_free(out);
@@ -155,7 +155,7 @@ void bt_gather_free(bt_record_bodies *bodies)
     *bodies = (bt_record_bodies){0};
 }
 
-/// Body k in a frame; k < 0: a floe that has split.
+/// Row of body k in a frame; k < 0: a floe that has split.
 static bt_frame_row row_of(const bt_bodies *bodies, int64_t k, const double *force, double (*net)[2])
 {
     if (k < 0) return (bt_frame_row){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
@@ -171,7 +171,7 @@ static int by_piece(const void *p, const void *q)
     return (a->piece > b->piece) - (a->piece < b->piece);
 }
 
-/// Collective. Pieces there are, in the order of their ids, on rank 0.
+/// Collective. The existing pieces, in the order of their ids, on rank 0.
 static bt_piece_row *gather_pieces(const bt_comm *comm, const bt_world *world, const double *force, double (*net)[2],
                                    int64_t *n)
 {
@@ -204,7 +204,7 @@ bt_status bt_gather_frame(const bt_comm *comm, const bt_world *world, const bt_r
     if (world->stats.locked) // the contacts of this step have no solution
         for (bt_idx i = 0; i < bodies->n; i++) force[i] = net[i][0] = net[i][1] = NAN;
     list l = make_list(comm, world, roster);
-    const bool alone = comm->size == 1; // all bodies are of one block: each row is put where it belongs
+    const bool alone = comm->size == 1; // all bodies are in one block: each row is put in its place directly
     bt_frame_row *rows = bt_alloc((size_t)(alone ? l.count : l.n), sizeof *rows);
     for (bt_idx i = 0; i < l.n; i++) rows[alone ? l.row[i] : i] = row_of(bodies, l.body[i], force, net);
     *pieces = gather_pieces(comm, world, force, net, n_pieces);
@@ -226,7 +226,7 @@ bt_status bt_gather_frame(const bt_comm *comm, const bt_world *world, const bt_r
 
 _Static_assert((int)BT_FRAME_BRANCHES == (int)BT_MAX_BRANCHES, "a frame has room for every branch");
 
-/// The towing end and the travel of the body are not wrapped and the pose is, so the end is drawn from the body on.
+/// The towing end and the travel of the body are not wrapped, but the pose is: draw it relative to the body.
 bt_frame_line bt_gather_line(const bt_world *world)
 {
     bt_frame_line line = {0};

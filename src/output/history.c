@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Columns and running totals of the steps of a run; what is made of them: steady.h, summary.h.
+// Columns and running totals of the steps of a run, which steady.h and summary.h reduce.
 #include "output/history.h"
 #include "case/cost.h"
 
@@ -65,7 +65,7 @@ enum { N_TOTALS = sizeof totals / sizeof *totals };
 
 int bt_n_history_totals(void) { return N_TOTALS + bt_law_first_total(BT_LAWS); }
 
-/// Those of the contact laws, made of their tables once.
+/// Totals of the contact laws, made from their tables once.
 static const bt_total *total_of_law(int k)
 {
     static bt_total made[BT_MAX_LAW_TOTALS];
@@ -86,7 +86,7 @@ static const bt_total *total_of_law(int k)
 
 const bt_total *bt_history_total(int k) { return k < N_TOTALS ? &totals[k] : total_of_law(k - N_TOTALS); }
 
-/// A step into a total. Counts of whole numbers are exact in a double up to 2⁵³, far beyond any run.
+/// Add a step to a total. Counts are exact in a double up to 2⁵³, far beyond any run.
 static void add_total(bt_history *history, const bt_total *total, const bt_sample *sample)
 {
     double x = 0, sum = 0;

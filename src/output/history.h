@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the summary keeps of every step of a run.
+// Data that the summary keeps of every step of a run.
 #ifndef BT_HISTORY_H
 #define BT_HISTORY_H
 
@@ -7,7 +7,7 @@
 #include "contact/law.h"
 #include "output/sample.h"
 
-/// Columns of what the summary keeps of every step: X(id, name in a checkpoint, member of bt_sample). Units and meaning
+/// Columns that the summary keeps of every step: X(id, name in a checkpoint, member of bt_sample). Units and meaning
 /// are those of the series of that member.
 #define BT_HISTORY_COLUMNS(X) \
     X(TIME, "time", time) \
@@ -43,13 +43,13 @@ typedef enum bt_column {
     BT_N_COLUMNS
 } bt_column;
 
-/// What the summary keeps of every step, whatever output.sample_every says: 200 bytes a step.
-/// A load that is no number (bt_sample.no_load) is kept as the last one before it, 0 at the start: it has no bound, so
-/// any number is below it, and means, percentiles and peaks of what is kept are the least that they can be.
+/// Data of every step for the summary, whatever output.sample_every: 200 bytes per step.
+/// A load that is not a number (bt_sample.no_load) is replaced by the last valid one, 0 at the start: it is unbounded,
+/// so any number is below it, and means, percentiles and peaks of the column are lower bounds.
 typedef struct bt_history {
     int64_t n, cap;
     int n_columns;                   ///< the program's own, then one for each registered quantity
-    /// [n] each, units as in bt_sample; NaN where a step has no such number
+    /// [n] each, units as in bt_sample; NaN if a step has no such number
     double *column[BT_N_COLUMNS + BT_MAX_ADDED];
     // running totals: bt_history_total
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, sum_checks, sum_projected, contact_work;
@@ -61,7 +61,7 @@ typedef struct bt_history {
 
 enum { BT_HISTORY_NAME = 80 };
 
-/// A running total: its member of bt_history, what it takes of a step, and how.
+/// A running total: its member of bt_history, the number of a step that it takes, and its rule.
 typedef struct bt_total {
     bt_state_row at;                      ///< name in the checkpoint, under history
     bt_total_rule rule;
@@ -71,16 +71,16 @@ int bt_n_history_totals(void);
 const bt_total *bt_history_total(int k);
 
 #define BT_HISTORY_ADDED "history/added_"
-/// Column k of a history as it is in a checkpoint; its name there, with the group, is written to name.
+/// Column k of a history as stored in a checkpoint; its name there, with the group, is written to name.
 bt_state_row bt_history_column(int k, char name[BT_HISTORY_NAME]);
 
-/// The larger of the two, and NaN when one of them is: a maximum must not hide it.
+/// The larger of the two, NaN if either is: a maximum must not hide it.
 static inline double bt_max_seen(double a, double b) { return a >= b || a != a ? a : b; }
 
-/// Largest of x[from..to), NaN for none of them.
+/// Largest of x[from..to), NaN if the range is empty.
 double bt_history_largest(const double *x, int64_t from, int64_t to);
 
-/// Empty, with a column for each quantity that has been registered by now.
+/// Make an empty history, with a column for each quantity registered so far.
 void bt_history_init(bt_history *history);
 void bt_history_add(bt_history *history, const bt_sample *sample);
 void bt_history_free(bt_history *history);

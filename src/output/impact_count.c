@@ -93,11 +93,10 @@ void bt_impact_count_add(bt_impact_count *count, const bt_impact *impact)
 
 // --- in the summary --------------------------------------------------------------------------------------------------
 
-// Collisions as numbers for scripts and readers: how many, the largest, how often a peak is exceeded.
+// Collisions as numbers for scripts and readers: their number, the largest, how often a peak is exceeded.
 //
-// Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times: at the rate k/T. The table
-// takes the ranks 1, 2, 5, 10, ...; nothing is fitted and nothing between ranks is made up. A rate near 1/T rests on
-// one peak.
+// Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times, at the rate k/T. The table
+// has the ranks 1, 2, 5, 10, ..., without fits or interpolation. A rate near 1/T rests on a single peak.
 
 /// The k-th of 1, 2, 5, 10, 20, ...
 static int64_t rank_of(int k)

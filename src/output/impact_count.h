@@ -2,11 +2,11 @@
 // Collisions and quasi-static loads counted over the window of a run, which is known only when the run ends (private to
 // the recorder). On rank 0.
 //
-// A collision belongs to the window when the step in which it begins does: time >= start. Those before it are the
-// start's, counted apart. They are read back from the file they were written to, 104 B each, piece by piece: a million
-// of them is a file of 104 MB, and in memory no more than the largest peaks (80 kB) and a piece (0.9 MB). What is of
-// steps (resistance by collisions and quasi-static, largest quasi-static load) is a column of the history. Rejected:
-// counters that begin anew when the start that is found moves, which it also does backwards; all peaks in memory.
+// A collision belongs to the window if the step in which it begins does: time >= start. Earlier collisions are counted
+// separately. They are read back piece by piece from the file to which they were written, 104 B each: a million of them
+// take 104 MB on disk, but in memory only the largest peaks (80 kB) and one piece (0.9 MB). Values per step (resistance
+// by collisions and quasi-static, largest quasi-static load) are columns of the history. Rejected: counters that
+// restart when the start found moves, as it may also move backwards; all peaks in memory.
 #ifndef BT_IMPACT_COUNT_H
 #define BT_IMPACT_COUNT_H
 
@@ -25,7 +25,7 @@ typedef struct bt_panel_hits {
 } bt_panel_hits;
 
 typedef struct bt_impact_count {
-    char conversion[160]; ///< what it is, in words
+    char conversion[160]; ///< its description
     double start;         ///< of the window, s; NaN without one
     double hours;         ///< its length
     int64_t n_all, n;     ///< collisions of the whole run, in the window
@@ -39,24 +39,24 @@ typedef struct bt_impact_count {
     double largest_quasi_static_load, start_quasi_static_load;
 } bt_impact_count;
 
-/// Begin to count over the window; what is of steps is taken at once.
+/// Begin to count over the window; values per step are taken at once.
 void bt_impact_count_init(bt_impact_count *count, const bt_impacts *impacts, const bt_history *history,
                           const bt_steady *steady);
 void bt_impact_count_free(bt_impact_count *count);
 
-/// A collision of the run, in any order.
+/// Count a collision of the run; in any order.
 void bt_impact_count_add(bt_impact_count *count, const bt_impact *impact);
 
-/// The largest peaks kept, into peaks[n_peaks], largest first.
+/// Copy the largest peaks to peaks[n_peaks], largest first.
 void bt_impact_count_peaks(const bt_impact_count *count, double *peaks);
 
 // --- in the summary --------------------------------------------------------------------------------------------------
 
 // Collisions and quasi-static loads in the summary (private to it).
 
-/// An array of ranks, each with its peak and how often that is reached or exceeded.
+/// Write an array of ranks, each with its peak and how often that is reached or exceeded.
 void bt_impacts_exceedance(bt_json *json, const char *key, const bt_impact_count *count);
-/// Two lines of the printed table; nothing when `count` is NULL. at_least: the loads are lower bounds.
+/// Print two lines of the table; nothing if `count` is NULL. at_least: the loads are lower bounds.
 void bt_impacts_print(const bt_impact_count *count, bool at_least);
 
 #endif

@@ -9,8 +9,8 @@
 
 #include "base/h5dataset.h"
 
-#define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
-#define PIECE 8192 // rows that are read back at once
+#define CHUNK 256 // rows of collisions in a chunk: 2 kB per column
+#define PIECE 8192 // rows read back at once
 
 static const struct {
     const char *name, *units, *description;
@@ -38,7 +38,7 @@ _Static_assert(sizeof columns / sizeof *columns == BT_IMPACT_COLUMNS &&
                    sizeof(bt_impact) == BT_IMPACT_COLUMNS * sizeof(double),
                "every number of a collision has its column");
 
-/// Numbers x[n] of column k into rows[n].
+/// Put numbers x[n] of column k into rows[n].
 static void put_column(bt_impact *rows, int64_t n, int k, const double *x)
 {
     for (int64_t i = 0; i < n; i++) memcpy((char *)&rows[i] + columns[k].offset, &x[i], sizeof *x);
@@ -108,7 +108,7 @@ void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int
     store->n_bodies = n_bodies;
 }
 
-/// Of a body in /floes, /bodies and /pieces, one after the other. Ids of pieces come between those of the others.
+/// Row of a body in /floes, /bodies and /pieces, one after the other. Ids of pieces lie between those of the others.
 static double row_of(const bt_impact_store *store, double gid)
 {
     const bt_gid row = store->roster ? bt_roster_row(store->roster, (bt_gid)gid) : (bt_gid)gid;
@@ -273,7 +273,7 @@ void bt_impact_store_save(const bt_impact_store *store, bt_snapshot *to)
                     bt_panel_blocks_rows(&store->blocks, store->blocks.steps), LOADS_WIDTH, store->blocks.load);
 }
 
-/// Can the rows that are kept be counted?
+/// Are the stored rows valid, so that they can be counted?
 static bool rows_sound(const bt_impact_store *store)
 {
     bool sound = true;
@@ -285,7 +285,7 @@ static bool rows_sound(const bt_impact_store *store)
     return sound;
 }
 
-/// The first n rows of the old file into the new one.
+/// Copy the first n rows of the old file to the new one.
 static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc(PIECE, sizeof *x);
@@ -311,7 +311,7 @@ static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
     free(x);
 }
 
-/// Steps up to `step` that do not end before the earliest start.
+/// Number of steps up to `step` that do not end before the earliest start.
 static int64_t late_steps(const bt_impact_store *store, int64_t step)
 {
     int64_t n = 0;

@@ -16,12 +16,12 @@ enum { BT_IMPACT_COLUMNS = 13 };
 
 typedef struct bt_impact_store {
     bt_h5 *h;                         ///< NULL: nothing is stored
-    const bt_impacts *from;           ///< what is stored
+    const bt_impacts *from;           ///< their source
     double earliest;                  ///< the window of the statistics begins there or later, s
     hid_t column[BT_IMPACT_COLUMNS];  ///< [collisions] each
     bt_impact *rows;                  ///< [n_rows] not yet written
     int64_t n_rows, cap_rows, written;
-    const bt_roster *roster;          ///< where floes split; NULL: ids are rows
+    const bt_roster *roster;          ///< if floes may split; NULL: ids are rows
     int64_t n_bodies;                 ///< rows of /floes and /bodies
     bt_panel_blocks blocks;
     // series of panel loads, if asked for
@@ -32,26 +32,26 @@ typedef struct bt_impact_store {
     int64_t n_merged, n_samples, cap_samples, samples_written;
 } bt_impact_store;
 
-/// Make the groups of the case. With output.panels the panel loads of every sample are in them.
+/// Make the groups of the case; with output.panels also for the panel loads of every sample.
 void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts *impacts, const bt_case *input);
-/// Floes split: collisions are with rows of /floes, /bodies and /pieces, n_bodies of the first two.
+/// For runs whose floes may split: collisions refer to rows of /floes, /bodies (n_bodies together) and /pieces.
 void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int64_t n_bodies);
-/// Collisions that ended in the last step, and its panel loads; time: its end, s. no_load: they are no numbers, and
-/// count as none.
+/// Take the collisions that ended in the last step, and its panel loads; time: end of the step, s. no_load: the loads
+/// are not numbers, and count as none.
 void bt_impact_store_take(bt_impact_store *store, double time, bool no_load);
-/// Collisions alone: those that the end of the run has closed.
+/// Take only collisions: those closed by the end of the run.
 void bt_impact_store_take_closed(bt_impact_store *store);
-/// The present sample is complete.
+/// End the present sample.
 void bt_impact_store_end_sample(bt_impact_store *store);
-/// What is kept into the file.
+/// Write the buffered data to the file.
 void bt_impact_store_write(bt_impact_store *store);
-/// Everything is written: the collisions of the file, one after the other, into `count`.
+/// When everything has been written: count the collisions of the file, one after the other.
 void bt_impact_store_count(bt_impact_store *store, bt_impact_count *count);
-/// Means and maxima by panel, over the window `steady` and before it.
+/// Write means and maxima by panel, over the window `steady` and before it.
 void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, const bt_steady *steady);
-/// Where it stands, after bt_impact_store_write.
+/// Save the state of the store, after bt_impact_store_write.
 void bt_impact_store_save(const bt_impact_store *store, bt_snapshot *to);
-/// Go on from there: what had been written by then comes from `old`, the result file of that run.
+/// Load that state: the data written by then comes from `old`, the result file of that run.
 void bt_impact_store_load(bt_impact_store *store, bt_snapshot *from, bt_h5_reader *old);
 void bt_impact_store_close(bt_impact_store *store);
 

@@ -3,9 +3,9 @@
 //
 // Momentum balance of the towed body, along the tow direction d:
 //     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)
-// tow = inertia + ice resistance + what the table of force laws has: drag, Coriolis, tilt, ... On a line J_tow is the
-// line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what the balance leaves; the
-// check is then the resistance found without the rows of the body: from the momentum that everything else has gained
+// tow = inertia + ice resistance + the force laws of the table: drag, Coriolis, tilt, ... On a line J_tow is the line's
+// own impulse, so the balance is a check. Under a prescribed velocity J_tow is the remainder of the balance; the check
+// is then the resistance found without the rows of the body, from the momentum gained by all other bodies
 // (ice_resistance_budget).
 #include "output/observe.h"
 
@@ -63,7 +63,7 @@ static void observe_cell(bt_world *world, bt_idx k, const void *context, bt_tota
                        sign * (contact->ln[0] * arm[0] + contact->ln[1] * arm[1] +
                                contact->lt * (is_b ? contact->rbt : contact->rat)));
             touching += (contact->ln[0] > 0) + (contact->ln[1] > 0);
-        // from the others of infinite mass
+        // from other bodies of infinite mass
         } else if (prescribed && bt_impulse_from_outside(contact, bodies->inv, &jx, &jy)) {
             bt_sum_add(&totals->sum[BUDGET], jx * dx + jy * dy);
         }
@@ -94,7 +94,7 @@ static double budget_impulse(const bt_world *world, const bt_totals *seen, doubl
     return jx * dx + jy * dy;
 }
 
-/// Tension, length and end of the line; the body's share along the course.
+/// Tension, length and end of the line; its force on the body along the course.
 static void observe_line(const bt_tow *tow, bt_sample *sample)
 {
     const bt_branch *branch = &tow->branch[0];
@@ -121,7 +121,7 @@ static void observe_line(const bt_tow *tow, bt_sample *sample)
     sample->vessel_line = sample->tow_force; // both along the course
 }
 
-/// What holds the body back beside ice and inertia, in the order of the table: water, air, Coriolis, tilt, ….
+/// Add the forces that hold the body back besides ice and inertia, in table order: water, air, Coriolis, tilt, ….
 static double add_forces(const bt_world *world, double sum)
 {
     for (int k = 0; k < world->forces->n_series; k++)
@@ -172,7 +172,7 @@ static void observe_body(const bt_world *world, const bt_totals *seen, bt_sample
     sample->contacts_body = bt_sum_value(&seen->sum[TOUCHING]);
 }
 
-/// Collisions of the towed body; on rank 0, which records.
+/// Collisions of the towed body, on rank 0, which records.
 static void observe_impacts(const bt_world *world, bt_sample *sample)
 {
     const bt_impacts *impacts = world->impacts;
@@ -209,12 +209,12 @@ static double sum_of_floes(const bt_world *world, const bt_quantity *quantity)
     return bt_sum_value(&all.sum[0]);
 }
 
-/// What the rows of the series say themselves, by one thread: their functions need not know of threads.
+/// Numbers given by the rows of the series themselves, by one thread, so that their functions need not be thread-safe.
 static void observe_rows(const bt_world *world, unsigned has, bt_sample *sample)
 {
     for (int k = 0, n = bt_n_series(); k < n; k++) {
         const bt_quantity *quantity = bt_series(k);
-        if (!(has & 1u << quantity->applies)) bt_sample_set(sample, quantity, NAN); // alike on all ranks
+        if (!(has & 1u << quantity->applies)) bt_sample_set(sample, quantity, NAN); // the same on all ranks
         else if (quantity->of_floe) bt_sample_set(sample, quantity, sum_of_floes(world, quantity));
         else if (quantity->of_world) bt_sample_set(sample, quantity, quantity->of_world(world, quantity->context));
     }
@@ -235,7 +235,7 @@ void bt_observe(bt_world *world, double reference_speed, bt_sample *sample)
         sample->window_waiting = (double)world->window->waiting;
     }
     observe_rows(world, has, sample);
-    if (world->stats.locked) sample->contact_work = NAN; // by loads that are none
+    if (world->stats.locked) sample->contact_work = NAN; // the loads are not valid
     if (world->stats.no_load)
         bt_sample_lose_load(sample, !bt_tow_has_line(world->tow) && world->tow->mode == BT_TOW_SPEED);
 }
@@ -265,7 +265,7 @@ void bt_observe_contact_force(const bt_world *world, double *force)
     bt_domain_largest(world, force);
 }
 
-/// Which of the bodies after the floes that move freely, < 0: such a floe, or a piece of one.
+/// Index among the bodies after the free floes; < 0: a free floe or a piece.
 static bt_gid other_of(const bt_roster *roster, bt_gid gid) { return bt_roster_row(roster, gid) - roster->n_free; }
 
 void bt_observe_net_force(const bt_comm *comm, const bt_world *world, const bt_roster *roster, double (*force)[2])
@@ -294,7 +294,7 @@ void bt_observe_net_force(const bt_comm *comm, const bt_world *world, const bt_r
         const double m = bodies->inv[i].m;
         if (other >= 0) {
             for (int k = 0; k < 2; k++) force[i][k] = bt_sum_value(&sum[2 * other + k]) / world->par.dt;
-        } else { // m is 0 until a step has been taken
+        } else { // m is 0 before the first step
             force[i][0] = m > 0 ? (bodies->vel[i].x - bodies->vel_free[i].x) / m / world->par.dt : 0;
             force[i][1] = m > 0 ? (bodies->vel[i].y - bodies->vel_free[i].y) / m / world->par.dt : 0;
         }

@@ -11,7 +11,7 @@
 #include "base/h5dataset.h"
 #include "step/splitting.h"
 
-/// A column of the splits. Times and rows of floes are made of the history, the others are in it.
+/// A column of the splits. Times and rows of floes are derived from the history, the other columns are in it.
 typedef struct {
     const char *name;
     bool whole;
@@ -110,7 +110,7 @@ void bt_piece_store_write(bt_piece_store *store)
     }
 }
 
-/// Columns of the frames from rows of the world.
+/// Fill a column of the frames from rows of the world.
 static void fill(const bt_piece_store *store, int k, const bt_piece_row *rows, int64_t n, void *to)
 {
     double *d = to;
@@ -129,7 +129,7 @@ static void fill(const bt_piece_store *store, int k, const bt_piece_row *rows, i
     }
 }
 
-/// Polygons as ParaView draws them: topology and points.
+/// Write polygons for ParaView: topology and points.
 static void draw(const bt_piece_store *store, const bt_piece_row *rows, int64_t n, int64_t n_points, int32_t *topology,
                  float *points)
 {

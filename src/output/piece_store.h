@@ -4,10 +4,10 @@
 //
 //     /splits     [S] time, parent, generation, mode, ratio, thickness; crack [S][4]
 //     /pieces     [2 S] area, offsets [2 S + 1], vertices: split k made the pieces 2 k (the larger) and 2 k + 1
-//     /frames     piece_end [T]; up to there in each frame, of pieces that are there: piece, piece_pose, ...
+//     /frames     piece_end [T]: end of each frame's rows of its existing pieces: piece, piece_pose, ...
 //     /xdmf/NNNNNN/piece_...     for ParaView
 //
-// A floe is a row of /floes, or from n_floes on a piece. A floe that has split has no numbers (NaN) in later frames.
+// A floe is a row of /floes, or, from n_floes on, a piece. A floe that has split has no numbers (NaN) in later frames.
 #ifndef BT_PIECE_STORE_H
 #define BT_PIECE_STORE_H
 
@@ -34,14 +34,14 @@ typedef struct bt_piece_store {
     int64_t cap;
 } bt_piece_store;
 
-/// On rank 0, before the first frame. All arguments must stay valid.
+/// Set up the store, on rank 0 before the first frame. All arguments must stay valid.
 void bt_piece_store_create(bt_piece_store *store, bt_h5 *h5, const struct bt_splitting *splitting,
                            const bt_roster *roster, double dt, const bt_map_axes *axes);
-/// The splits since the last call.
+/// Write the splits since the last call.
 void bt_piece_store_write(bt_piece_store *store);
-/// The pieces [n] of a frame, in the order of their ids; the frame is in /xdmf.
+/// Write the pieces [n] of a frame, in the order of their ids; the frame is already in /xdmf.
 void bt_piece_store_frame(bt_piece_store *store, const bt_piece_row *rows, int64_t n);
-/// Those of frame k of an older file, for bt_piece_store_frame; [*n], to be freed.
+/// Read the pieces [*n] of frame k of an older file, for bt_piece_store_frame; the caller frees them.
 bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n);
 void bt_piece_store_close(bt_piece_store *store);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All quantities: the program's own table (series.inc), then what has been registered, those of force laws and contact
-// laws included: their tables may grow, and are looked at before anybody counts.
+// All quantities: the program's own table (series.inc), then the registered ones, with those of force and contact laws:
+// their tables may grow, and are read before quantities are counted.
 #include "bergtow/quantity.h"
 
 #include <ctype.h>
@@ -15,9 +15,9 @@
 #include "contact/law.h"
 #include "output/sample.h"
 
-// --- what has been registered ----------------------------------------------------------------------------------------
+// --- registered quantities -------------------------------------------------------------------------------------------
 
-// What has been registered beside the program's own quantities.
+// Quantities registered besides the program's own.
 
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
 const char *const bt_role_names[BT_ROLE_KINDS] = {"", "balance", "force", "load", "diagnostic"};
@@ -36,7 +36,7 @@ const char *const bt_applies_names[BT_APPLIES_KINDS] = {
     [BT_APPLIES_WINDOW] = "with a moving window",
 };
 
-enum { MOST_NAME = 48, MOST_KEY = 80 }; // of the 40 letters that a force law may have, _force makes 46
+enum { MOST_NAME = 48, MOST_KEY = 80 }; // a force law may have 40 letters; with _force 46
 static bt_quantity added[BT_MAX_ADDED];
 static char added_keys[BT_MAX_ADDED][MOST_KEY];
 static int n_added;
@@ -53,7 +53,7 @@ static bool is_taken(const char *name)
     return false;
 }
 
-/// mean_NAME_n for a mean in N: the units as the other keys of summary.json end with them.
+/// Key mean_NAME_n for a mean in N, with the suffix for units of the other keys of summary.json.
 static void make_key(const bt_quantity *quantity, char key[MOST_KEY])
 {
     int n = snprintf(key, MOST_KEY, "%s_%s", bt_keep_names[quantity->keep], quantity->name);
@@ -64,7 +64,7 @@ static void make_key(const bt_quantity *quantity, char key[MOST_KEY])
     key[n] = '\0';
 }
 
-/// A name without underscores; kept to the end of the program, as the texts of a quantity are.
+/// A name without underscores; kept to the end of the program, like all texts of a quantity.
 static char *in_words(const char *name)
 {
     char *words = bt_text_copy(name);
@@ -73,7 +73,7 @@ static char *in_words(const char *name)
     return words;
 }
 
-/// Why there can be no series of this name, or not `more` of them, into err.
+/// Report in err why there cannot be a series of this name, or `more` of them.
 static void registry_check(const char *name, int more, bt_errors *err)
 {
     if (!bt_is_name(name, MOST_NAME))
@@ -121,7 +121,7 @@ static bool has_series(const bt_force_series *of)
     return false;
 }
 
-/// Its texts stay for the life of the program, as the law does.
+/// Add the quantity of a law. Its texts stay for the life of the program, like the law.
 static void add_quantity(const bt_force_series *of)
 {
     bt_errors err = {0};
@@ -134,10 +134,10 @@ static void add_quantity(const bt_force_series *of)
     bt_errors_free(&err);
 }
 
-/// Register a quantity for each series of the table of force laws that is none of the program's own series, once.
+/// Register, once, a quantity for each series of the table of force laws that is not one of the program's own.
 static void force_quantities(void)
 {
-    static int known; // series of the table that have been looked at
+    static int known; // series of the table processed so far
     for (; known < bt_n_force_series; known++) {
         const bt_force_series *of = &bt_force_series_of[known];
         if (!of->part && !has_series(of)) add_quantity(of);
@@ -153,10 +153,10 @@ static double own_number(const bt_world *world, const void *quantity)
     return world->stats.laws[(const bt_quantity *)quantity - own];
 }
 
-/// Those of the program's own, in the order of the laws.
+/// Number of series of the program's own contact laws.
 static int n_law_series(void)
 {
-    static int n; // asked for every quantity of every step
+    static int n; // cached: needed for every quantity of every step
     if (n == 0) n = bt_law_first_number(BT_LAWS);
     return n;
 }
@@ -179,7 +179,7 @@ static double number(const bt_world *world, const void *place)
     return ((const double *)world->stats.added)[*(const int *)place];
 }
 
-/// Its texts stay for the life of the program, as the law does.
+/// Add the quantity of a law. Its texts stay for the life of the program, like the law.
 static void add_number(const bt_quantity *like, int law, int k)
 {
     static int place[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS];
@@ -234,11 +234,11 @@ int bt_n_added(void)
 
 const bt_quantity *bt_added(int k) { return &added[k]; }
 
-/// For a law that is about to be registered, whose series are taken up when they are asked for first.
+/// Check for a law about to be registered; its series are registered when first needed.
 static bool may_be(const char *name, int more, bt_errors *err)
 {
     const size_t before = err->n;
-    bt_n_added(); // those of the laws before it
+    bt_n_added(); // register those of earlier laws
     registry_check(name, more, err);
     return err->n == before;
 }
@@ -252,7 +252,7 @@ const bt_quantity *bt_series_find(const char *name)
     return NULL;
 }
 
-/// Does the balance name this series by itself: at its begin (tow), as what it gives (ice), at its end (inertia)?
+/// Does the balance name this series itself: at its beginning (tow), as its result (ice), at its end (inertia)?
 static bool is_end_of_balance(const bt_quantity *quantity)
 {
     return quantity->offset == offsetof(bt_sample, tow_force) ||
@@ -274,11 +274,11 @@ const char *bt_balance_words(void)
     return words = bt_text_end(&text);
 }
 
-/// What contacts do to the towed body: no numbers in a step without a load.
+/// Loads by contacts on the towed body: not numbers in a step without a valid load.
 static const size_t loads[] = {
     offsetof(bt_sample, ice_resistance), offsetof(bt_sample, ice_force_x), offsetof(bt_sample, ice_force_y),
     offsetof(bt_sample, ice_moment), offsetof(bt_sample, ice_resistance_budget),
-    offsetof(bt_sample, largest_quasi_static_load), offsetof(bt_sample, tow_force), // the last: not on a line
+    offsetof(bt_sample, largest_quasi_static_load), offsetof(bt_sample, tow_force), // the last one not on a line
 };
 enum { N_LOADS = sizeof loads / sizeof *loads };
 

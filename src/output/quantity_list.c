@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The registry in text and JSON: nothing is named here, all comes from the tables.
+// The registry as text and JSON: all names come from the tables.
 #include "output/quantity_list.h"
 
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #include "output/estimate_text.h"
 #include "output/summary_keys.h"
 
-/// The tables of summary.json, and what stands before their keys there; the first is put together by bt_summary_keys.
+/// The tables of summary.json, and the prefixes of their keys; bt_summary_keys makes the first.
 static const struct { const char *prefix; const bt_json_key *keys; const int *n; } tables[] = {
     {"", NULL, NULL},
     {"window.series.NAME.", bt_reported_keys, &bt_n_reported_keys},

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What a run leaves behind: result.h5 while it runs, case.resolved.yml before, summary.json and frames.xdmf after it.
+// Files of a run: case.resolved.yml before it, result.h5 while it runs, summary.json and frames.xdmf after it.
 //
-// result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to
-// then, so that a calculation can be watched; killed within a flush, some series have its length and some that of the
-// last, all rows whole (h5driver.c). Under its final name, result.h5, stands only what is complete and protected by a
-// checksum (checksum.h): a copy of it at each checkpoint (record_resume.c), and at the end the file itself (attribute
-// "complete" of the root: 0 until the run has closed it). The small text files are written under a temporary name and
-// renamed.
+// The run writes result.part.h5: after each flush all series have one length and the file is complete up to then, so
+// that a run can be watched; if it is killed within a flush, some series have the new length and some the old, with
+// whole rows (h5driver.c). The final name, result.h5, is only for complete files protected by a checksum (checksum.h):
+// a copy at each checkpoint (record_resume.c), and at the end the file itself (attribute "complete" of the root: 0
+// until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "output/record.h"
 
 #include <math.h>
@@ -26,8 +25,8 @@
 #include "output/xdmf.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
-// The same at a frame, or so many of them. Not at each: one append a series takes some milliseconds, a quarter of the
-// time of a small run.
+// The same at a frame, or after this many frames. Not at each frame: one append per series takes some milliseconds, a
+// quarter of the time of a small run.
 #define FRAME_SECONDS 0.5
 #define FRAMES_WAITING 16
 
@@ -103,7 +102,7 @@ static void record_free(bt_record *record)
     free(record);
 }
 
-/// Close datasets and file; returns the status of everything that went to the file.
+/// Close datasets and file; returns the status of all writes to the file.
 static bt_status close_file(bt_record *record)
 {
     for (int k = 0; k < record->n_series; k++)
@@ -132,7 +131,7 @@ bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors 
     return status;
 }
 
-/// A run that goes on takes only away what was under way.
+/// Prepare the folder. A resumed run removes only the unfinished file.
 static bt_status prepare_dir(const bt_record *record, const char *resolved, const char *digests, bool fresh,
                              bt_errors *err)
 {
@@ -186,7 +185,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
         create_events(record);
         const bt_map_axes axes = bt_map_axes_of(input, bodies->outlines);
         bt_frames_create(&record->frames, &record->h5, comm, bodies, &axes);
-        // what the others wrote is in the file: now it may be announced
+        // the data of other ranks is in the file: now it may be announced
         status = bt_comm_agree(comm, record->h5.status);
         if (status == BT_OK) {
             bt_h5_flush(&record->h5);
@@ -330,7 +329,7 @@ char *bt_record_xdmf(const bt_record *record)
                                    .pieces = record->pieces.h ? record->pieces.frame : NULL});
 }
 
-/// What is still on its way goes to the file, and the numbers of the whole run are made: on rank 0.
+/// Write the buffered data to the file, and form the numbers of the whole run, on rank 0.
 static void conclude(bt_record *record, const bt_run_totals *totals)
 {
     if (record->n_merged > 0) end_entry(record);
@@ -346,7 +345,7 @@ static void conclude(bt_record *record, const bt_run_totals *totals)
 
 static bt_status write_summary(const bt_record *record, const bt_run_totals *totals, bt_errors *err)
 {
-    bt_run_totals all = *totals; // with the time up to here
+    bt_run_totals all = *totals; // with the wall time so far
     all.call.end = totals->stepped > 0 ? bt_clock() - totals->stepped : 0;
     char *text = bt_summary_json(&record->summary, &record->history, record->c, &all, record->n_floes);
     const bt_status status = bt_record_write_text(record, "summary.json", text, err);
@@ -354,7 +353,7 @@ static bt_status write_summary(const bt_record *record, const bt_run_totals *tot
     return status;
 }
 
-/// The file that was written, now closed, under its final name.
+/// Give the closed file its final name.
 static bt_status hand_in(const bt_record *record, bt_errors *err)
 {
     char *part = bt_file_join(record->dir, BT_RESULT_PART), *path = bt_file_join(record->dir, BT_RESULT_FILE);
@@ -379,7 +378,7 @@ bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_sna
     }
     bt_h5_sync_raw(&record->h5);
     bt_status status = bt_comm_agree(record->comm, close_file(record));
-    // The result before the checkpoint, which counts on it; the summary last: where there is one, the rest is complete.
+    // The result before the checkpoint, which refers to it; the summary last: if there is one, the rest is complete.
     if (first && status == BT_OK) status = hand_in(record, err);
     if (first && status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
     if (first && status == BT_OK && last) status = bt_checkpoint_write(last, record->dir, BT_CHECKPOINT_FILE, err);

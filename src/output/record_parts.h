@@ -15,7 +15,7 @@
 enum { BT_RECORD_BUFFER = 256 }; ///< entries of the series between flushes, and in a chunk
 
 #define BT_RESULT_FILE "result.h5"
-#define BT_RESULT_PART "result.part.h5" // the file that is being written
+#define BT_RESULT_PART "result.part.h5" // the file being written
 
 struct bt_record {
     bt_h5 h5;
@@ -23,48 +23,48 @@ struct bt_record {
     const bt_case *c;
     const bt_comm *comm;
     char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_resume.c)
-    bool fresh;            ///< a new run, in place of what the folder held
+    bool fresh;            ///< a new run, which replaces the contents of the folder
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
     // series
-    int n_series;          ///< there were when the run began; any that a program adds later are not its own
+    int n_series;          ///< when the run began; series that a program adds later are not recorded
     hid_t *series;         ///< [n_series]
     double *buffer;        ///< [n_series][BT_RECORD_BUFFER]
     int64_t written, buffered;
     double *merged;        ///< [n_series] of the steps of the present entry
     int64_t n_merged;
     double last_flush;     ///< bt_clock
-    int frames_waiting;    ///< since then
+    int frames_waiting;    ///< since the last flush
     hid_t events[4];       ///< time, kind, subject, value
     int64_t n_events;      ///< written
     bt_frames frames;
     bt_impact_store impacts;
     bt_piece_store pieces;
-    // of the end of the run
+    // for the end of the run
     bt_summary summary;
     bt_impact_count count; ///< collisions over the window
 };
 
-/// What is buffered into the file, and the file to the system.
+/// Write the buffers to the file, and flush the file.
 void bt_record_flush(bt_record *record);
 
-/// Collective. A frame, with the pieces of floes in it, on rank 0.
+/// Collective. Add a frame, with the pieces of floes on rank 0.
 bt_status bt_record_add_frame(bt_record *record, double time, const bt_frame_row *rows, const bt_frame_line *line,
                               const bt_piece_row *pieces, int64_t n_pieces);
 
-/// frames.xdmf for the frames there are; the caller frees it.
+/// Text of frames.xdmf for the frames so far; the caller frees it.
 char *bt_record_xdmf(const bt_record *record);
 
-/// A file of the folder goes, if it is there.
+/// Remove a file of the folder, if it exists.
 bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors *err);
 
-/// The next step of an entry: m of those before, x its own.
+/// Merge the next step of an entry: m from the previous steps, x of this step.
 static inline double bt_record_merge(bt_keep keep, double m, double x)
 {
     return keep == BT_KEEP_LAST ? x : keep == BT_KEEP_MAX ? bt_max_seen(m, x) : m + x;
 }
 
-/// The entry of n steps.
+/// The value of an entry of n steps.
 static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
 {
     return keep == BT_KEEP_MEAN ? m / (double)n : m;
@@ -72,7 +72,7 @@ static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
 
 #define BT_RECORD_IDENTITY "about/run" // in a checkpoint
 
-/// A text file of the folder.
+/// Write a text file of the folder.
 bt_status bt_record_write_text(const bt_record *record, const char *name, const char *text, bt_errors *err);
 
 #endif

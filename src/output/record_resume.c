@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// A record that is complete at every moment, and goes on after a stop without gap, overlap or difference.
+// A record that is complete at every moment, and resumes after a stop without gap, overlap or difference.
 //
-// At a checkpoint the file under way is flushed and copied, and the copy takes the name result.h5. A run that goes on
-// writes a new file and fills it from result.h5 up to the counts of its checkpoint, frame by frame and through the
-// functions that any frame goes through: so it may have another number of ranks, whose files are laid out differently,
-// and nothing that came after the checkpoint can be left over. The file that was under way when a run was killed is not
-// read: a kill within a write can leave it unreadable.
+// At a checkpoint the unfinished file is flushed and copied, and the copy is named result.h5. A resumed run writes a
+// new file and fills it from result.h5 up to the counts of its checkpoint, frame by frame and through the functions
+// that write any frame: so it may have another number of ranks, whose files have a different layout, and nothing later
+// than the checkpoint remains. The unfinished file of a killed run is not read: a kill within a write can leave it
+// unreadable.
 //
-// The copy costs a write of the whole file per checkpoint (nothing where the file system copies by reference).
-// Rejected: to cut the file under way back to the checkpoint's counts, which has to be readable for that; a file of its
-// own for each piece between two checkpoints, which every reader would have to join.
+// The copy costs a write of the whole file per checkpoint (nothing if the file system copies by reference).
+// Rejected: truncating the unfinished file to the checkpoint's counts, for which it would have to be readable; a
+// separate file for each piece between two checkpoints, which every reader would have to join.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,14 +20,14 @@
 #include "case/case_files.h"
 #include "output/record_parts.h"
 
-// --- of the same run -------------------------------------------------------------------------------------------------
+// --- identity of a run -----------------------------------------------------------------------------------------------
 
-// Is the result in a folder of the run that a checkpoint is of? A checkpoint that was kept while another run took the
-// folder, or comes from another folder, would go on in a result whose beginning is not its own.
+// Do the result in a folder and a checkpoint belong to the same run? A checkpoint that was kept while another run took
+// the folder, or that comes from another folder, would continue the result of a different run.
 //
-// A run has an identity, the digest of what it began with (run_parts.h), in its result and in its checkpoints. Runs
-// that began alike may have been led apart by a program; and so the series, too, are compared with the history that
-// the checkpoint keeps of every step.
+// A run has an identity, the digest of its start (run_parts.h), in its result and in its checkpoints. A program may
+// have made runs with the same start diverge, so the series are also compared with the history of every step in the
+// checkpoint.
 
 #define CASE_FILE "case.resolved.yml"
 #define IDENTITY "run" // attribute of the root
@@ -41,7 +41,7 @@ bt_status bt_record_identify(bt_record *record, const char *identity, bt_errors 
     return record->h5.status;
 }
 
-/// Does a text say the same of every key? Tables that it names are those that the case has: no file is read.
+/// Does a case text give every key the same value? Tables that it names are taken from the case: no file is read.
 static bool same_values(const bt_case *input, const char *text)
 {
     bt_case other;
@@ -66,8 +66,8 @@ static void refuse(bt_h5_reader *old, const bt_snapshot *snap, const char *why)
         old->path, snap->path, why);
 }
 
-/// On rank 0. Refuse, in old, a result of another run than that of the checkpoint `snap`: by what both began with, and
-/// by the first n entries x of series k.
+/// On rank 0. Reject, in `old`, a result of another run than that of the checkpoint `snap`: by the identity of both,
+/// and by the first entries of the series.
 static void record_check_run(bt_snapshot *snap, bt_h5_reader *old)
 {
     char *its = bt_h5_read_word(old, IDENTITY);
@@ -76,7 +76,7 @@ static void record_check_run(bt_snapshot *snap, bt_h5_reader *old)
     free(its);
 }
 
-/// Of step j = 0, 1, ... of an entry, and of all of them: as bt_record_sample makes it.
+/// Value of an entry from its steps, as bt_record_sample forms it.
 static double entry_of(bt_keep keep, const double *step, int64_t every)
 {
     double m = step[0];
@@ -91,7 +91,7 @@ static void record_check_series(const bt_record *record, int k, const double *x,
         const char *name;
         bt_column column;
     } kept[] = {{"time", BT_COL_TIME}, {"ice_resistance", BT_COL_ICE}, {"tow_force", BT_COL_TOW},
-                {"residual", BT_COL_RESIDUAL}}; // also of ice that has not met the body
+                {"residual", BT_COL_RESIDUAL}}; // also shows ice that has not met the body
     const bt_quantity *quantity = bt_series(k);
     const int64_t every = record->c->output.sample_every > 1 ? record->c->output.sample_every : 1;
     for (size_t j = 0; j < sizeof kept / sizeof *kept; j++) {
@@ -109,8 +109,8 @@ static void record_check_series(const bt_record *record, int k, const double *x,
     }
 }
 
-/// On rank 0, of a run that goes on. Write case.resolved.yml anew where it is no more what the run began with, and warn
-/// of it. Errors: BT_ERR_IO.
+/// On rank 0, for a resumed run. Rewrite case.resolved.yml, with a warning, if it is no longer that with which the run
+/// began. Errors: BT_ERR_IO.
 static bt_status record_keep_case(const bt_record *record, bt_errors *err)
 {
     char *path = bt_file_join(record->dir, CASE_FILE), *text = NULL, *resolved = bt_case_resolved(record->c);
@@ -121,7 +121,7 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
          *wanted = bt_case_with_digests(resolved, digests);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        if (!read || !same_values(record->c, text)) // otherwise its comments have been edited
+        if (!read || !same_values(record->c, text)) // otherwise only its comments have been edited
             bt_errors_add(&warnings,
                           "warning: %s: was not the case that the run began with; it is written anew, by the "
                           "checkpoint",
@@ -139,9 +139,9 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
     return status;
 }
 
-// --- what was recorded -----------------------------------------------------------------------------------------------
+// --- recorded data ---------------------------------------------------------------------------------------------------
 
-/// By name: a program that goes on may have its series in another order.
+/// By name: a resumed program may have its series in another order.
 static const char *merged_name(int k, char name[BT_HISTORY_NAME])
 {
     snprintf(name, BT_HISTORY_NAME, "merged/%s", bt_series(k)->name);
@@ -165,7 +165,7 @@ bt_status bt_record_save(bt_record *record, int64_t n_frames, bt_snapshot *snap,
     bt_snapshot_add_int(snap, "record/entries", record->written);
     bt_snapshot_add_int(snap, "record/frames", n_frames);
     bt_snapshot_add_int(snap, "record/merged_steps", record->n_merged);
-    // Between two entries the sum is over: its last value would only make states that are alike look different.
+    // Between two entries the sum is finished: its last value would only make equal states look different.
     for (int k = 0; k < record->n_series && record->n_merged > 0; k++)
         bt_snapshot_add(snap, merged_name(k, name), BT_ITEM_F64, 1, 1, &record->merged[k]);
     bt_impact_store_save(&record->impacts, snap);
@@ -197,13 +197,13 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err)
     return bt_comm_agree(record->comm, status);
 }
 
-// --- going on --------------------------------------------------------------------------------------------------------
+// --- resuming --------------------------------------------------------------------------------------------------------
 
-/// A force that the run had not: it was 0. Of the series, those that programs have added alone.
+/// Is an added series that the run did not have 0 before? Forces are.
 static bool was_zero(const bt_quantity *quantity) { return quantity->role == BT_ROLE_BALANCE; }
 static bool may_lack(int k) { return k >= bt_n_program_series() && was_zero(bt_series(k)); }
 
-/// NaN: a force on the towed body where there is none.
+/// Are all values 0 or NaN? A force on the towed body is NaN without a body.
 static bool all_zero(const bt_item *item)
 {
     for (int64_t k = 0; k < item->n; k++)
@@ -213,7 +213,7 @@ static bool all_zero(const bt_item *item)
     return true;
 }
 
-/// What programs add (forces, quantities) goes on as it was, or not at all: a run without one of its forces would be
+/// Forces and quantities that programs have added must be the same as before: a run without one of its forces would be
 /// another run.
 static void check_added(bt_snapshot *snap)
 {
@@ -242,7 +242,7 @@ static void check_added(bt_snapshot *snap)
     snap->faulty |= missing || left_over;
 }
 
-/// n: steps done; each has a value.
+/// Load the history. n: steps done; each has a value.
 static void load_history(bt_history *history, bt_snapshot *snap, int64_t n)
 {
     for (int k = 0; k < bt_n_history_totals(); k++)
@@ -261,7 +261,7 @@ static void load_history(bt_history *history, bt_snapshot *snap, int64_t n)
     if (snap->faulty) history->n = 0;
 }
 
-/// The entry under way.
+/// Load the present entry.
 static void load_merged(bt_record *record, bt_snapshot *snap)
 {
     char name[BT_HISTORY_NAME];
@@ -271,7 +271,7 @@ static void load_merged(bt_record *record, bt_snapshot *snap)
     }
 }
 
-/// Entries 0 up to n of all series.
+/// Copy the first n entries of all series.
 static void load_series(bt_record *record, const bt_snapshot *snap, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
@@ -298,7 +298,7 @@ static void read_velocities_and_forces(bt_h5_reader *old, int64_t k, bt_idx n, b
     free(v);
 }
 
-/// The tow line of frame k.
+/// Read the tow line of frame k.
 static void read_line(bt_h5_reader *old, int64_t k, int branches, bt_frame_line *line)
 {
     if (branches == 0) return;
@@ -306,7 +306,7 @@ static void read_line(bt_h5_reader *old, int64_t k, int branches, bt_frame_line 
     bt_h5_read(old, "/frames/line_tension", H5T_NATIVE_DOUBLE, k, 1, branches, line->tension);
 }
 
-/// Frame k of the old file as rows of all bodies; on rank 0.
+/// Read frame k of the old file as rows of all bodies; on rank 0.
 static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bodies, double *time, bt_frame_row *rows)
 {
     double *x = bt_alloc((size_t)n_bodies, 3 * sizeof *x);
@@ -324,7 +324,7 @@ static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bo
     read_velocities_and_forces(old, k, n_bodies, rows);
 }
 
-/// Collective. The first n frames, through the function that takes any frame.
+/// Collective. Copy the first n frames, through the function that adds any frame.
 static bt_status load_frames(bt_record *record, bt_h5_reader *old, int64_t n, bt_errors *err)
 {
     const bool first = record->comm->rank == 0;
@@ -365,7 +365,7 @@ static bt_status load_frames(bt_record *record, bt_h5_reader *old, int64_t n, bt
     return status;
 }
 
-/// Does the old result hold what the checkpoint counts on?
+/// Does the old result hold the data to which the checkpoint refers?
 static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int64_t floes)
 {
     if (old->status != BT_OK) return;
@@ -409,7 +409,7 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
     if (status == BT_OK && first) bt_record_flush(record);
     if (status == BT_OK) status = record->h5.status;
     if (status == BT_OK && first) status = record_keep_case(record, err);
-    // of an end that is none any more
+    // the summary is of an end that is no longer valid
     if (status == BT_OK && first) status = bt_record_remove(record, "summary.json", err);
     free(path);
     return bt_comm_agree(record->comm, status);

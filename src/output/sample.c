@@ -10,12 +10,12 @@
 #define SHOWN(...) {PARTS(__VA_ARGS__)},
 #define ROW(...) {PARTS(__VA_ARGS__, NONE, NULL, NULL)},
 
-// --- rows that say where their number is; that of the others is formed in observe.c --------------------------------
+// --- rows with the place of their number; observe.c forms the others -------------------------------------------------
 
-/// A number of the world.
+/// The place of a number in the world.
 typedef struct {
     size_t offset;
-    enum { REAL, WHOLE, FLAG, NO_FLAG } kind; ///< NO_FLAG: 1 where it is false
+    enum { REAL, WHOLE, FLAG, NO_FLAG } kind; ///< NO_FLAG: 1 if false
 } place;
 
 static double at_place(const bt_world *world, const void *context)
@@ -33,7 +33,7 @@ static double at_place(const bt_world *world, const void *context)
 double bt_force_against(const bt_world *world, int k)
 {
     const bt_impulse *j = &world->forces->series[k];
-    return 0.0 - (j->x * world->tow->ux + j->y * world->tow->uy) / world->par.dt; // 0 − x, for no −0 in open water
+    return 0.0 - (j->x * world->tow->ux + j->y * world->tow->uy) / world->par.dt; // 0 − x avoids −0 in open water
 }
 
 double bt_force_of(const bt_world *world, const void *series)

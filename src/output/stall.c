@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Windows in which the towed body stood still; what they are: output/stall.h.
+// Windows in which the towed body stood still; see output/stall.h.
 #include "output/stall.h"
 
 #include <math.h>
@@ -10,15 +10,15 @@
 
 void bt_stall_add(bt_stall *stall, double asked, double dt, const double at[2], double ice, double pull, double path)
 {
-    if (!stall->begun) { // where the body was before its first step is not known: the window begins after it
+    if (!stall->begun) { // the place before the first step is not known: the window begins after it
         stall->from_x = at[0], stall->from_y = at[1];
         stall->begun = true;
         return;
     }
-    if (!(asked > 0)) return; // a tow that holds asks for nothing
+    if (!(asked > 0)) return; // a resting tow asks for no motion
     stall->asked += asked;
     stall->spent += dt;
-    stall->ice += (isnan(ice) ? pull : ice) * dt; // no number: beyond any pull
+    stall->ice += (isnan(ice) ? pull : ice) * dt; // not a number: more than any pull
     stall->pull += pull * dt;
     if (stall->asked < path) return;
     const double way = bt_hypot(at[0] - stall->from_x, at[1] - stall->from_y);
@@ -52,7 +52,7 @@ static void add_overtaken(bt_stall *stall, const bt_world *world)
     const bool in = within(&world->bodies, bt_world_towed(world), tow->carriage_x - tow->travel_x,
                            tow->carriage_y - tow->travel_y);
     stall->outside = stall->outside || !in;
-    if (!in || !stall->outside) return; // a line fastened amidships may begin within
+    if (!in || !stall->outside) return; // a line fastened amidships may begin inside the hull
     if (stall->inside == 0) stall->inside_from = tow->time;
     stall->inside += world->par.dt;
 }

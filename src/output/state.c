@@ -33,7 +33,7 @@ static const bt_state_row world_rows[] = {
 };
 
 #define PAR(member, units, check, meaning) BT_STATE_ONE(bt_params, #member, F64, member, units, check, meaning)
-/// Of the last step where they change with time; the others show that the case is the one of the checkpoint.
+/// Parameters: of the last step if they change with time; the others show that the case is that of the checkpoint.
 static const bt_state_row par_rows[] = {
     PAR(dt, "s", FINITE, "time step"),
     PAR(x0, "m", FINITE, "low corner of the domain, x"),
@@ -183,7 +183,7 @@ enum {
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
-/// What a body carries from step to step. Everything else about it follows from the case and
+/// State that a body carries from step to step. All else follows from the case and
 /// the field.
 typedef struct {
     double pose[3], vel[3], path, exposure[3];
@@ -237,7 +237,7 @@ static void put_row(bt_world *world, bt_idx i, const body_row *row)
     bodies->disturbed[i] = row->disturbed != 0;
 }
 
-/// A column of rows of `size` bytes, to or from an array of its own.
+/// Copy a column of rows of `size` bytes to or from a separate array.
 static void column(const bt_state_row *row, char *rows, size_t size, int64_t n, char *array, bool out)
 {
     const size_t bytes = bt_item_size(row->type) * (size_t)row->width;
@@ -247,7 +247,7 @@ static void column(const bt_state_row *row, char *rows, size_t size, int64_t n, 
     }
 }
 
-/// Rows that a column is taken from at a time.
+/// Rows from which a column is copied at a time.
 enum { PORTION = 4096 };
 
 static void save_columns(bt_snapshot *snap, const char *group, const bt_state_row *columns, int n_columns, void *rows,
@@ -266,7 +266,7 @@ static void save_columns(bt_snapshot *snap, const char *group, const bt_state_ro
     }
 }
 
-/// n < 0: as many rows as there are. The rows in new memory.
+/// Load columns as rows in new memory. n < 0: any number of rows.
 static void *load_columns(bt_snapshot *snap, const char *group, const bt_state_row *columns, int n_columns, size_t size,
                           int64_t *n)
 {
@@ -289,7 +289,7 @@ static bt_status save_bodies(const bt_world *world, const bt_comm *comm, bt_snap
     const bt_bodies *bodies = &world->bodies;
     const int64_t count = comm->rank == 0 ? bodies->n_global : 0;
     bt_idx n = 0;
-    // every id has a row, also those of floes that have split and of pieces yet to come: zeros, from rank 0
+    // every id has a row, also floes that have split and future pieces: zeros, from rank 0
     const size_t most = (size_t)(world->splitting ? bodies->n_global : bodies->n);
     bt_gid *gid = bt_alloc(most, sizeof *gid);
     bt_idx *body = bt_alloc(most, sizeof *body);
@@ -346,7 +346,7 @@ static void save_splitting(const bt_splitting *splitting, bt_snapshot *snap)
     bt_snapshot_add(snap, "splits/vertices", BT_ITEM_F64, splitting->n_vertices, 2, splitting->vertex);
 }
 
-/// The history, and pieces in the place of the floes that have split.
+/// Load the history, and put pieces in place of the floes that have split.
 static void load_splitting(bt_world *world, bt_snapshot *snap)
 {
     bt_splitting *splitting = world->splitting;
@@ -383,13 +383,13 @@ static const bt_state_row memory_columns[] = {
     MEMORY("law", U16, 1, law, "1", "contact", ANY, "index of the contact law that has the memory"),
 };
 
-/// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
+/// Clear the numbers of a missing second point, which are stale: states with the same future must look the same.
 static void blank(bt_memory *memory)
 {
     if (memory->n_points < 2) memory->feature[1] = 0, memory->value[1] = 0;
 }
 
-/// Names of the laws that a program has added, in the order of their numbers; "" without any. The caller frees it.
+/// Names of the added laws, in the order of their numbers; "" without any. The caller frees it.
 static char *added_laws(const bt_world *world)
 {
     bt_text text;
@@ -399,7 +399,7 @@ static char *added_laws(const bt_world *world)
     return bt_text_end(&text);
 }
 
-/// Records name their law by its number, and the numbers of added laws follow from the order of their registration.
+/// Check the added laws: records name their law by its number, which follows from the order of registration.
 static void check_added_laws(const bt_world *world, bt_snapshot *snap)
 {
     if (!bt_snapshot_find(snap, ADDED_LAWS)) return; // none
@@ -414,7 +414,7 @@ static void check_added_laws(const bt_world *world, bt_snapshot *snap)
     free(now);
 }
 
-/// Names of the force laws of a program that have acted, in the order in which they add.
+/// Names of the added force laws that have acted, in the order in which they add.
 static char *added_forces(const bt_forces *forces)
 {
     bt_text text;
@@ -428,8 +428,8 @@ static char *added_forces(const bt_forces *forces)
     return bt_text_end(&text);
 }
 
-/// Without a force the run would be another run, and with another order of sums it would have other bits. Forces that
-/// come later are welcome.
+/// Check the added forces: without one the run would be another run, and another order of sums would change bits.
+/// Further forces may be added.
 static void load_added_forces(bt_forces *forces, bt_snapshot *snap)
 {
     if (!bt_snapshot_find(snap, ADDED_FORCES)) return; // none
@@ -523,7 +523,7 @@ static const char *rows_not_finite(const char *group, const bt_state_row *row, i
     return NULL;
 }
 
-/// What a collision under way is made of; its corner is NaN where there is none.
+/// Are the numbers of an open collision finite? Its corner is NaN if there is none.
 static bool open_finite(const bt_impact_open *o)
 {
     const double real[] = {o->so_far.time, o->so_far.x,         o->so_far.y, o->so_far.impulse, o->so_far.approach,

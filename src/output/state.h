@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a world as named arrays; what belongs to it, and what does not, is listed in output/checkpoint.h.
+// The state of a world as named arrays; output/checkpoint.h lists what belongs to it and what does not.
 #ifndef BT_STATE_H
 #define BT_STATE_H
 
@@ -16,26 +16,26 @@
 /// BT_ERR_NUMERIC (bodies lost).
 bt_status bt_state_save(const bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err);
 
-/// Collective. The state into a world that bt_setup_world has made from the same case and field, all of it on every
+/// Collective. Load the state into a world that bt_setup_world has made from the same case and field, complete on every
 /// rank; it is distributed to the ranks here. `snap` is the same on all ranks. Errors: BT_ERR_CASE (not of this case,
 /// or of another version), BT_ERR_NUMERIC (the state does not have the hash it was saved with).
 bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err);
 
-/// The first number of world, step, tow, window and collisions that is NaN or infinite, by its name in a checkpoint
-/// ("tow/vessel_vx"); NULL = all are numbers. Those of the bodies are not looked at.
+/// Name in a checkpoint ("tow/vessel_vx") of the first number of world, step, tow, window and collisions that is NaN or
+/// infinite; NULL = all are finite. Numbers of the bodies are not checked.
 const char *bt_state_not_finite(const bt_world *world, char name[64]);
 
-/// Collective. The ice field at time zero, on rank 0. Its outlines are those of the bodies, which keep them to the bit:
-/// field->vertices may be NULL. Errors: BT_ERR_NUMERIC.
+/// Collective. Save the ice field at time zero, on rank 0. Its outlines are taken from the bodies, which keep them to
+/// the bit: field->vertices may be NULL. Errors: BT_ERR_NUMERIC.
 bt_status bt_state_save_field(const bt_field *field, const bt_world *world, const bt_comm *comm, bt_snapshot *snap,
                               bt_errors *err);
 void bt_state_load_field(bt_field *field, bt_snapshot *snap);
 
-/// What floes that split have come to (bt_split_totals): in checkpoints, and keys of summary.json.
+/// Totals of splitting floes (bt_split_totals), in checkpoints and as keys of summary.json.
 extern const bt_state_row bt_split_total_rows[];
 extern const int bt_n_split_total_rows;
 
-/// Structs of the run beside the world, by their tables.
+/// Save or load structs of the run outside the world, by their tables.
 void bt_state_save_lead(const bt_lead_stats *stats, bt_snapshot *snap);
 void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap);
 void bt_state_save_stall(const bt_stall *stall, bt_snapshot *snap);
@@ -43,8 +43,8 @@ void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 
 // --- rows of members (private to state.c and state_field.c) ----------------------------------------------------------
 
-/// A member that is saved: where it is, what it is for a reader of the file (h5dataset.h), and what must be true of it
-/// by itself. What members must be to each other: state_check.c.
+/// A saved member: its place, its description for a reader of the file (h5dataset.h), and the check of its value.
+/// Checks between members: state_check.c.
 #define BT_STATE_MEMBER(struct_, label, type_, width_, member, units_, axes_, check_, meaning_) \
     {label, BT_ITEM_##type_, width_, offsetof(struct_, member), units_, meaning_, axes_, BT_ROW_##check_, NULL}
 #define BT_STATE_ONE(struct_, label, type_, member, units_, check_, meaning_) \
@@ -53,7 +53,7 @@ void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 
 // --- its check -------------------------------------------------------------------------------------------------------
 
-// Is what was taken from a checkpoint a state that steps can leave? (private to state.c)
+// Is the state in a checkpoint one that steps can leave? (private to state.c)
 
 /// Are all n numbers neither NaN nor infinite?
 static inline bool bt_state_finite(const double *x, int64_t n)
@@ -63,15 +63,15 @@ static inline bool bt_state_finite(const double *x, int64_t n)
     return true;
 }
 
-/// Complains into `snap` of the first thing that is wrong with a field, whose arrays have the lengths that the first
-/// two give.
+/// Report in `snap` the first error in a field; n_offsets and n_vertices are the lengths of its arrays.
 void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_vertices, bt_snapshot *snap);
 
-/// The same for a world before it is distributed, and for the memory of contacts [n]; impacts: those were taken too.
+/// The same for a world before it is distributed, and for the memory of contacts [n]; impacts: whether collisions were
+/// loaded.
 void bt_state_check(const bt_world *world, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *snap);
 
 struct bt_split_record;
-/// The same for the history of splits [n] with its vertices, for a world as it was in the beginning.
+/// The same for the history of splits [n] with its vertices, for a world with its original bodies.
 void bt_state_check_splits(const bt_world *world, const struct bt_split_record *rows, int64_t n, const double *vertex,
                            int64_t n_vertices, bt_snapshot *snap);
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What a checkpoint may hold: the bounds within which every step leaves its state.
+// Valid contents of a checkpoint: bounds that the state after any step satisfies.
 //
-// The checksum shows that a file is as it was written, not that it was written by a run: a file made by hand, or by a
-// program with an error, can be protected by a checksum too, and the hash of the state leaves much of it out (labels,
-// impulses, counters). Its numbers become indices, lengths of arrays and ends of loops. So each that does is held
-// against what steps keep true before it is used, and every other real number must be finite. Nothing here is an
-// estimate: a bound that a sound run could exceed would take its checkpoint away from it.
+// The checksum shows that a file is as written, not that a run has written it: a file made by hand, or by a faulty
+// program, can have a checksum too, and the hash of the state does not cover all of it (labels, impulses, counters).
+// Its numbers become indices, lengths of arrays and ends of loops. So each of these is checked against the invariants
+// of steps before it is used, and every other real number must be finite. Nothing here is an estimate: a bound that a
+// sound run could exceed would make its checkpoint useless.
 #include "output/state.h"
 
 #include <math.h>
@@ -24,11 +24,11 @@
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 
-static const int32_t FAR = 1000000000; // cells, periods: as labels of cells are limited (cells.c)
+static const int32_t FAR = 1000000000; // cells, periods: the limit of cell labels (cells.c)
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
-/// To less than the reader of fields asks, since outlines have been centred and cut meanwhile.
+/// Is floe i valid? Less strict than the reader of fields, since outlines have been centred and cut meanwhile.
 static bool is_floe(const bt_field *field, bt_idx i)
 {
     const int n = (int)(field->offsets[i + 1] - field->offsets[i]);
@@ -80,8 +80,8 @@ void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_ve
     if (snap->faulty) return;
     bt_snapshot_want(snap, field->concentration >= 0 && field->concentration <= 1 + 1e-9, "field/concentration", -1,
                      "is not a concentration");
-    // Floes outside the ice region have no part in its concentration, and a file that was read may have such; a field
-    // without floes may have no ice region, and so no area.
+    // Floes outside the ice region, which a field file may contain, do not count in its concentration; a field without
+    // floes may have no ice region, and so no area.
     const bool outside = field->outlines.outside_area > 0 || field->outlines.own_area > 0;
     const double within = outside ? bt_min(sum, field->concentration * field->ice_area) : sum;
     if ((field->n > 0 || field->ice_area != 0) &&
@@ -95,7 +95,7 @@ typedef struct {
     const char *side, *wrap, *low, *n;
 } cell_names;
 
-/// One direction of the cells: as src/space/cells.c chooses them. in_cells: there are floes in them.
+/// Check one direction of the cells, as chosen by src/space/cells.c. in_cells: there are floes in them.
 static void check_direction(bt_snapshot *snap, const cell_names *name, bool in_cells, double period, double side,
                             int32_t wrap, int32_t low, int32_t n)
 {
@@ -129,7 +129,7 @@ static void check_cells(const bt_world *world, bt_snapshot *snap)
                      "and n_y are more cells than are made for so many floes");
     bt_snapshot_want(snap, cells->margin_max > 0 && isfinite(cells->margin_max), "cells/margin_max", -1,
                      "is not a margin");
-    // Rounding: another build may have made the radii.
+    // Allow for rounding: another build may have computed the radii.
     bt_snapshot_want(snap, cells->reach >= widest * (1 - 1e-9), "cells/reach", -1,
                      "is less than the radius of a floe");
     double slack = INFINITY;
@@ -210,7 +210,7 @@ static void check_tow(const bt_world *world, bt_snapshot *snap)
                      "is not a number of way-points passed");
 }
 
-/// Places of floes that enter a window are found from the drift.
+/// Check undisturbed ice: places of floes that enter a window follow from its drift.
 static void check_undisturbed(const bt_world *world, bt_snapshot *snap)
 {
     const bt_undisturbed *ice = world->undisturbed;
@@ -252,7 +252,7 @@ static void check_events(const bt_world *world, bt_snapshot *snap)
 
 // --- floes that split ------------------------------------------------------------------------------------------------
 
-/// A floe that splits is there, its pieces have outlines, and they share its area.
+/// Check a split: its floe exists, the pieces have outlines, and they share its area.
 static void check_split(const bt_world *world, const bt_split_record *record, int64_t k, const double *v,
                         uint8_t *there, bt_snapshot *snap)
 {
@@ -302,7 +302,7 @@ void bt_state_check_splits(const bt_world *world, const bt_split_record *rows, i
 
 void bt_state_check(const bt_world *world, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *snap)
 {
-    if (snap->faulty) return; // then arrays are missing
+    if (snap->faulty) return; // arrays are missing
     check_cells(world, snap);
     if (!snap->faulty) check_bodies(world, snap);
     if (!snap->faulty) check_contacts(world, memory, n, snap);

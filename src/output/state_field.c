@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The parts of a run beside its world as named arrays: the ice field at time zero, its lead, and what tells that the
-// body stands still.
+// Parts of a run outside its world as named arrays: the ice field at time zero, its lead, and the stall detection.
 #include "output/state.h"
 
 #include <stdio.h>
@@ -91,21 +90,21 @@ void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap)
 {
     int32_t mode = 0;
     bt_snapshot_take(snap, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
-    // before it is taken as one
+    // before it is used as an enum
     bt_snapshot_want(snap, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is not a kind of lead");
     if (!snap->faulty) bt_snapshot_take_rows(snap, "lead", lead_rows, BT_N_OF(lead_rows), stats);
 }
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
-/// Collective. Outlines of the floes of the field, which are the first n bodies. `offset`: on rank 0.
+/// Collective. Save the outlines of the floes of the field, the first n bodies. `offset`: on rank 0.
 static bt_status save_outlines(const bt_world *world, const bt_comm *comm, bt_gid n, const int64_t *offset,
                                bt_snapshot *snap, bt_errors *err)
 {
     enum { FLOES = 1024 }; // at a time
     const bt_bodies *bodies = &world->bodies;
     const bt_splitting *splitting = world->splitting;
-    int64_t *split = bt_alloc((size_t)n, sizeof *split); // 1 + the split of a floe that is gone, 0 = none
+    int64_t *split = bt_alloc((size_t)n, sizeof *split); // 1 + the split of a floe that has split, 0 = none
     double most = 0;
     for (bt_idx i = 0; i < bodies->n; i++)
         if (bodies->gid[i] < n) most = bt_max(most, bt_body_corners(bodies, i));
@@ -197,6 +196,6 @@ void bt_state_load_field(bt_field *field, bt_snapshot *snap)
     field->cap_vertices = n_vertices;
     bt_state_check_field(field, n, n_vertices, snap);
     if (!snap->faulty) return;
-    bt_field_free(field); // nothing of it is to be trusted
+    bt_field_free(field); // none of it can be trusted
     bt_field_init(field);
 }

@@ -19,7 +19,7 @@
 
 const char *const bt_verdict_names[] = {"steady", "not steady", "too short"};
 
-/// load: its independent samples count for the length of the window. always: there in every run with a towed body.
+/// load: its independent samples decide whether the window is long enough. always: in every run with a towed body.
 static const struct { const char *name, *key; bt_column column; bool load, always; } reported[BT_N_REPORTED] = {
     [BT_REPORTED_ICE] = {"ice resistance", "ice_resistance", BT_COL_ICE, true, true},
     [BT_REPORTED_TOW] = {"tow force", "tow_force", BT_COL_TOW, true, true},
@@ -29,8 +29,7 @@ static const struct { const char *name, *key; bt_column column; bool load, alway
     [BT_REPORTED_THRUST] = {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST, true, false},
 };
 
-/// Where a reason of this verdict goes. Those of one verdict stand one after the other; one of a run that is not steady
-/// takes the place of one of a window too short.
+/// Place for a reason of this verdict. Reasons of one verdict are listed; `not steady` replaces reasons of `too short`.
 static bt_errors *because(bt_steady *steady, bt_verdict verdict)
 {
     if (steady->verdict == BT_NOT_STEADY && verdict == BT_TOO_SHORT) return NULL;
@@ -46,7 +45,7 @@ static int64_t first_at_or_after(const bt_history *history, double time)
     return i;
 }
 
-/// A series that the run has from step `first` to its end.
+/// Does the run have the series from step `first` to its end?
 static bool is_there(const double *x, int64_t first, int64_t n)
 {
     for (int64_t i = first; i < n; i++)
@@ -54,7 +53,8 @@ static bool is_there(const double *x, int64_t first, int64_t n)
     return n > first;
 }
 
-/// Of a branch that has parted only the peaks are left: its mean is one of tension and zeros, or of zeros alone.
+/// Has the branch of this series broken? Then only its peaks are valid: its mean would be of tension and zeros, or of
+/// zeros alone.
 static bool has_parted(const bt_run_totals *totals, bt_reported_series k)
 {
     bool parted = false;
@@ -65,8 +65,9 @@ static bool has_parted(const bt_run_totals *totals, bt_reported_series k)
     return parted;
 }
 
-/// How many equal stretches the sum of |x[n]| above `base` is worth: with R_i the sum over a stretch between two steps
-/// of next to nothing, (Σ R_i)² / Σ R_i². A stretch of more steps than `length` is cut into pieces of that.
+/// Equivalent number of equal stretches in the sum of |x[n]| above `base`: (Σ R_i)² / Σ R_i², with R_i the sum over a
+/// stretch between two steps with almost nothing. A stretch longer than `length` steps is cut into pieces of that
+/// length.
 static double stretches(const double *x, int64_t n, double base, double length)
 {
     double mean = 0, sum = 0, squares = 0, piece = 0;
@@ -84,7 +85,7 @@ static double stretches(const double *x, int64_t n, double base, double length)
     return squares > 0 ? sum * sum / squares : 0;
 }
 
-/// What |x[n]| is above in nine steps of ten: a floe that is carried on the bow, say.
+/// The value that |x[n]| exceeds in nine steps of ten, such as the load of a floe carried on the bow.
 static double always_there(const double *x, int64_t n)
 {
     if (n < 1) return 0;
@@ -96,17 +97,17 @@ static double always_there(const double *x, int64_t n)
     return base;
 }
 
-/// Stretches of contact that the mean of a window of the ice resistance is worth. A long push is one, up to a sixtieth
-/// of the window, so that contact without end is worth six times as many as are asked for, and what is always there is
-/// none. Not cut to the correlation: short collisions make that short, and a push of some minutes would be hundreds;
-/// where a body meets floes one by one nearly all steps are independent, and say nothing of a mean that is made of
-/// three hits. What is slow in dense ice is in n_eff.
+/// Equivalent number of stretches of contact in a window of the ice resistance. A long push is one stretch, up to a
+/// sixtieth of the window, so that continuous contact is worth six times as many as required; a constant load does not
+/// count. Stretches are not cut to the correlation time: short collisions make it short, and a push of some minutes
+/// would count as hundreds; where a body meets floes one by one nearly all steps are independent, but say nothing about
+/// a mean made of three hits. Slow variation in dense ice is covered by n_eff.
 static double contacts(const double *x, const bt_mean *mean)
 {
     return stretches(x, mean->n, always_there(x, mean->n), (double)mean->n / (6 * BT_STEADY_STRETCHES));
 }
 
-/// Does a series vary by more than matters, or is it too short to tell?
+/// Does a series vary significantly, or is it too short to tell?
 static bool varies(const bt_mean *mean)
 {
     return mean->n < BT_STEADY_INDEPENDENT || !(mean->sd <= BT_STEADY_MATERIAL * fabs(mean->mean));
@@ -126,13 +127,13 @@ static int64_t find_start(bt_steady *steady, const bt_history *history, const bt
     steady->earliest = bt_case_earliest_window(input);
     const int64_t earliest = first_at_or_after(history, steady->earliest);
     int64_t first = earliest;
-    int settles = -1; // which series
+    int settles = -1; // index of a series
     if (steady->given || earliest >= history->n) return first;
     const double *ice = history->column[BT_COL_ICE];
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = history->column[reported[k].column];
-        // Where a few collisions are left nothing tells them from those before, nor in a tow force that is their sum
-        // with a constant.
+        // If only few collisions remain, they cannot be distinguished from earlier ones, nor in a tow force that is
+        // their sum with a constant.
         const bool collisions = k == BT_REPORTED_ICE || (k == BT_REPORTED_TOW && input->tow.mode == BT_TOW_SPEED);
         if (!is_there(x, earliest, history->n)) continue;
         const int64_t start = bt_stats_steady_start(x, history->n, earliest, BT_STEADY_MATERIAL);
@@ -179,7 +180,7 @@ static void reduce(bt_steady *steady, const bt_history *history, const bt_run_to
                         : pauses(x, ice)                   ? stretches(x, steady->n, 0, 2 * ice->tau)
                                                            : INFINITY;
     if (most < ice->n_eff && (most > 0 || totals->concentration > 0)) ice->n_eff = most;
-    // A body that met no ice has a mean of 0, and nothing says how far from it that of a longer tow is.
+    // A body that met no ice has a mean of 0, and its distance from the mean of a longer tow is unknown.
     if (ice->sd == 0 && ice->mean == 0 && totals->concentration > 0) ice->se = ice->low = ice->high = NAN;
     for (int64_t i = steady->first; i < history->n; i++) {
         steady->unconverged += (history->column[BT_COL_UNCONVERGED][i] != 0) / (double)steady->n;
@@ -187,7 +188,7 @@ static void reduce(bt_steady *steady, const bt_history *history, const bt_run_to
         steady->residual = bt_max_seen(steady->residual, history->column[BT_COL_RESIDUAL][i]);
     }
     steady->at_least = steady->no_load > 0;
-    if (!steady->at_least) return; // a lower bound has no interval; the tow force is none on a line
+    if (!steady->at_least) return; // a lower bound has no interval; on a line the tow force is not a bound
     ice->se = ice->low = ice->high = NAN;
     bt_mean *tow = &steady->series[BT_REPORTED_TOW].mean;
     if (isnan(steady->series[BT_REPORTED_TENSION_1].peak)) tow->se = tow->low = tow->high = NAN;
@@ -232,7 +233,7 @@ static void judge_solver(bt_steady *steady, const bt_case *input, const bt_run_t
                 steady->residual, BT_STEADY_RESIDUAL, speed);
 }
 
-/// Way of the towing end after this time, m. A vessel need not keep to its programme: it goes as far as its body.
+/// Distance of the towing end after this time, m. A vessel may fall behind its programme: it goes as far as its body.
 static double led_after(const bt_history *history, const bt_case *input, double time)
 {
     const double *t = history->column[BT_COL_TIME], *vx = history->column[BT_COL_VX], *vy = history->column[BT_COL_VY];
@@ -243,12 +244,12 @@ static double led_after(const bt_history *history, const bt_case *input, double 
     return way;
 }
 
-#define COURSE_LEFT 0.1 // rad of a turn that is left where the body counts as being on its new course, assumed
+#define COURSE_LEFT 0.1 // rad of a turn left when the body counts as on its new course, assumed
 
 static double half_tan(double angle) { return bt_sin(0.5 * angle) / bt_cos(0.5 * angle); }
 
-/// Way of the end from a turn until the body on its line has followed, m. The angle θ between body and end goes down as
-/// tan θ/2 ~ exp(−s/L) (a tractrix); a line's length at least.
+/// Distance of the end from a turn until the body on its line has followed, m. The angle θ between body and end decays
+/// as tan θ/2 ~ exp(−s/L) (a tractrix); at least the length of the line.
 static double followed_in(const bt_case *input, double turn)
 {
     if (input->tow.mode == BT_TOW_SPEED) return 0;
@@ -265,7 +266,7 @@ static double passed_at(const bt_run_totals *totals, int k)
 }
 
 /// Angle between the mean courses of the body in the first and the last tenth of the window, rad: a heavy body swings
-/// out and comes on to its new course later than its line leads it there.
+/// out and reaches its new course later than its line.
 static double swing(const bt_steady *steady, const bt_history *history)
 {
     const int64_t n = (steady->n + 9) / 10;
@@ -278,7 +279,7 @@ static double swing(const bt_steady *steady, const bt_history *history)
     return fabs(bt_atan2(v[0][0] * v[1][1] - v[0][1] * v[1][0], v[0][0] * v[1][0] + v[0][1] * v[1][1]));
 }
 
-/// Turns at way-points, by the way of the end: from the beginning of the arc until the body has followed.
+/// Judge turns at way-points, by the path of the end: from the beginning of the arc until the body has followed.
 static void judge_course(bt_steady *steady, const bt_history *history, const bt_case *input,
                          const bt_run_totals *totals)
 {
@@ -314,7 +315,7 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
     steady->turns = true;
 }
 
-/// What happened within the window that no mean goes across.
+/// Judge events within the window across which no mean is valid.
 static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_totals *totals)
 {
     const double *p = input->tow.programme;
@@ -344,8 +345,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
                 100 * (double)totals->window->missed / places);
 }
 
-/// Way that the body has come on over ground within the window, along the leg of the tow that it is on, m; NaN = not
-/// known.
+/// Distance made good over ground by the body within the window, along its present leg of the tow, m; NaN = not known.
 static double come_on(const bt_steady *steady, const bt_history *history, const bt_case *input,
                       const bt_run_totals *totals)
 {
@@ -363,7 +363,7 @@ static double come_on(const bt_steady *steady, const bt_history *history, const 
     return way;
 }
 
-/// Ice that the body has opened itself, water beyond the ice, or a body that does not come on.
+/// Judge the track: ice that the body has already opened, water beyond the ice, or a body that does not advance.
 static void judge_track(bt_steady *steady, const bt_history *history, const bt_case *input, const bt_run_totals *totals)
 {
     const double *x = history->column[BT_COL_IN_ICE_X], *y = history->column[BT_COL_IN_ICE_Y];
@@ -386,7 +386,7 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
                 "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
                 "jams",
                 totals->stall.time, steady->end);
-    else if (way < BT_STALL_SHARE * asked && !steady->turns) { // else the body may be on the leg before
+    else if (way < BT_STALL_SHARE * asked && !steady->turns) { // with turns the body may be on the previous leg
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NO_HEADWAY,
                 "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
                 "makes no headway",
@@ -395,14 +395,14 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
     }
 }
 
-/// The first of the reported series with a trend that matters: the others mostly follow from it.
+/// Report the first series with a significant trend: the others mostly follow from it.
 static void judge_trends(bt_steady *steady)
 {
     char change[32], low[32], high[32];
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &steady->series[k];
         const bt_trend *trend = &r->trend;
-        // that a few collisions came early or late is no trend
+        // a few collisions, early or late, are not a trend
         if (steady->stretches < BT_STEADY_STRETCHES && (k == BT_REPORTED_ICE || k == BT_REPORTED_TOW)) continue;
         if (!r->present || !trend->significant || !(fabs(trend->change) > BT_STEADY_MATERIAL * fabs(r->mean.mean)))
             continue;
@@ -421,8 +421,8 @@ static void judge_trends(bt_steady *steady)
     }
 }
 
-/// A body that no floe has touched tells nothing of the ice, however long the window, and one that a few have touched
-/// little.
+/// Judge contact: a body that no floe has touched tells nothing about the ice, however long the window, and with few
+/// contacts little.
 static void judge_contact(bt_steady *steady, const bt_run_totals *totals)
 {
     const bt_mean *ice = &steady->series[BT_REPORTED_ICE].mean;
@@ -444,7 +444,7 @@ static void judge_contact(bt_steady *steady, const bt_run_totals *totals)
                 steady->start, steady->end, steady->stretches, BT_STEADY_STRETCHES);
 }
 
-/// The load that is known worst, of those that vary; and a body on a line that has had no time to swing.
+/// Judge the length: by the least known of the varying loads, and by a body on a line that has had no time to swing.
 static void judge_length(bt_steady *steady, const bt_case *input, double dt)
 {
     const double swings = BT_RAMP_PERIODS * bt_case_line_period(input), length = (double)steady->n * dt;
@@ -455,7 +455,7 @@ static void judge_length(bt_steady *steady, const bt_case *input, double dt)
     const bt_reported *worst = NULL;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &steady->series[k];
-        const double n = (double)steady->n / (2 * r->mean.tau); // stretches of contact are judged before
+        const double n = (double)steady->n / (2 * r->mean.tau); // stretches of contact have been judged already
         if (!reported[k].load || !r->present || !varies(&r->mean) || n >= BT_STEADY_INDEPENDENT) continue;
         if (!worst || r->mean.tau > worst->mean.tau) worst = r;
     }

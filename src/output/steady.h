@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// One window of a run for all its reported series, and a verdict on whether their means are those of a steady tow.
+// One window of a run for all its reported series, and a verdict on whether they are those of a steady tow.
 //
 //     | ramp |  start-up  |  window: means, intervals, percentiles, peaks  |
 //     0    earliest     start                                             end
 //
-// Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that
-// bt_stats_steady_start finds (MSER-5), halfway to the end of the run at the latest, and of these the latest: the ice
-// resistance may be steady long before the tension of the line is.
+// Start. Given by output.window_start; otherwise the latest of the points that bt_stats_steady_start finds (MSER-5) in
+// each reported series between the end of the ramp and halfway to the end of the run: the ice resistance may be steady
+// long before the tension of the line.
 // Verdict:
 //     not steady   the window begins within the ramp, a reported series has a trend, the tow, its course or the body
-//                  changes within the window, the body comes to its own wake, leaves the ice (case/track.h) or stands
-//                  still, or the contacts were not solved: the mean is that of this stretch of time, and says nothing
+//                  changes within the window, the body enters its own wake, leaves the ice (case/track.h) or stands
+//                  still, or the contacts were not solved: the mean is valid for this time only, and says nothing
 //                  of a longer tow
-//     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load, of
-//                  contact with ice that is worth fewer than BT_STEADY_STRETCHES equal stretches, or of less than two
+//     too short    there is no window, or it has fewer than BT_STEADY_INDEPENDENT independent samples of some load,
+//                  contact with ice worth fewer than BT_STEADY_STRETCHES equal stretches, or less than two
 //                  swings of a body on its line
 //     steady       none of these was found
 #ifndef BT_STEADY_H
@@ -23,10 +23,11 @@
 #include "output/history.h"
 #include "output/totals.h"
 
-/// below it the interval covers in less than 93 % of all cases (measured, src/base/stats.c)
+/// with fewer the interval covers the mean in less than 93 % of all cases (measured, src/base/stats.c)
 #define BT_STEADY_INDEPENDENT 20
-/// likewise of contact, in equal stretches: of 200 fields each of 2, 5, 10 and 20 % ice the interval holds the mean of
-/// the others in 53, 87 and 91 % of windows worth up to 3, 3 to 7 and 7 to 10, and in 94 % of those worth more
+/// likewise for contact, in equal stretches: in 200 fields each of 2, 5, 10 and 20 % ice the interval contains the mean
+/// of the others in 53, 87 and 91 % of windows worth up to 3, 3 to 7 and 7 to 10 stretches, and in 94 % of those worth
+/// more
 #define BT_STEADY_STRETCHES 10
 #define BT_STEADY_MATERIAL 0.02     ///< change over the window / mean below which a trend does not matter, assumed
 #define BT_STEADY_UNCONVERGED 0.01  ///< largest share of unconverged steps in the window, assumed
@@ -58,7 +59,7 @@ typedef struct bt_reported {
     bt_trend trend;         ///< N
     double quarter[4];      ///< means of the window's quarters, N
     double peak;            ///< largest step mean in the window, N
-    double start_peak;      ///< largest before it, N; NaN without a step there
+    double start_peak;      ///< largest before the window, N; NaN without steps there
 } bt_reported;
 
 typedef struct bt_steady {
@@ -68,14 +69,14 @@ typedef struct bt_steady {
     double correlation_time;      ///< of the ice resistance, s
     double unconverged;           ///< share of the steps in the window that did not converge
     double residual;              ///< largest of them, m/s
-    double no_load;               ///< share of the steps in the window in which the load of the body is no number
+    double no_load;               ///< share of the steps in the window in which the load of the body is not a number
     bool at_least;                ///< there are such steps: means, percentiles and peaks of the loads are lower bounds
-    double stretches;             ///< of contact with ice that the mean is worth, INFINITY where it hardly varies
-    bool met_no_ice;              ///< there is ice, and none has touched the body within the window
-    bool given;                   ///< by output.window_start, not found
+    double stretches;             ///< equivalent number of stretches of contact with ice, INFINITY if it hardly varies
+    bool met_no_ice;              ///< there is ice, but none has touched the body within the window
+    bool given;                   ///< start given by output.window_start, not found
     int64_t first, n;             ///< steps
     int64_t put_off;              ///< steps from the earliest possible start to the first
-    double led[2];                ///< way of the towing end at start and end, m (bt_path_at); mode speed: of the body
+    double led[2];                ///< path of the towing end at start and end, m (bt_path_at); mode speed: of the body
     bool turns;                   ///< the course of the tow changes within the window, or that of the body behind it
     bt_reported series[BT_N_REPORTED];
 } bt_steady;
@@ -83,10 +84,10 @@ typedef struct bt_steady {
 /// The larger of the two branches' peaks in the window, or before it, N; NaN without a line.
 double bt_steady_peak_tension(const bt_steady *steady, bool before);
 
-/// Of a run without a towed body: nothing is known.
+/// For a run without a towed body: all unknown.
 void bt_steady_none(bt_steady *steady);
 
-/// The window of a run with a towed body.
+/// Find the window of a run with a towed body.
 void bt_steady_find(bt_steady *steady, const bt_history *history, const bt_case *input, const bt_run_totals *totals);
 
 #endif

@@ -28,9 +28,9 @@
 
 // --- the moving window -----------------------------------------------------------------------------------------------
 
-// What the moving window did, and when its ice is not that of a long domain.
+// Results of the moving window, and warnings if its ice differs from that of a long domain.
 
-#define SHARE_LIMIT 0.01 // of the floes that went round as they were, or are missing, above which it is reported
+#define SHARE_LIMIT 0.01 // share of kept or missed floes above which there is a warning
 
 void bt_summary_window_print(const bt_window *window)
 {
@@ -81,8 +81,7 @@ static void summary_window_warn(bt_errors *warnings, const bt_window *window)
 #define MOMENTUM_LIMIT 1e-9
 /// Overlap above this fraction of the mean floe size is reported.
 #define OVERLAP_LIMIT 0.01
-/// Crush above this fraction of it is reported: outlines stay as they were, and floes that have gone so far into each
-/// other part sideways.
+/// Crush above this fraction of it is reported: outlines do not change, and deeply overlapping floes separate sideways.
 
 /// Percentile by linear interpolation between order statistics (numpy's default) of sorted x[n].
 static double percentile(const double *x, int64_t n, double percent)
@@ -98,7 +97,7 @@ static bt_mean mean_over(const bt_summary *summary, const bt_history *history, b
     return bt_stats_mean(history->column[k] + summary->window.first, summary->window.n);
 }
 
-/// A number of steps first to end by the rule of its quantity.
+/// Reduce the values of steps first to end by the rule of their quantity.
 static double reduce(const double *x, int64_t first, int64_t end, bt_keep keep)
 {
     if (first >= end) return NAN;
@@ -151,7 +150,7 @@ static void reduce_window(bt_summary *summary, const bt_history *history)
     summary->budget_closure_relative = largest > 0 ? other / largest : other == 0 ? 0 : NAN;
     if (n == 0) return;
 
-    if (summary->window.at_least) return; // neither balance is one of numbers
+    if (summary->window.at_least) return; // neither balance has valid numbers
     if (fabs(summary->closure_relative) > CLOSURE_LIMIT)
         bt_warn(&summary->warnings, BT_WARN_BODY_BALANCE,
                 "the mean ice resistance differs from %s by %.2g of the largest of them; the momentum balance of "
@@ -164,7 +163,7 @@ static void reduce_window(bt_summary *summary, const bt_history *history)
                 fabs(summary->budget_closure_relative));
 }
 
-/// A line that broke changes what the means stand for.
+/// Warn of events: a broken line changes the meaning of the means.
 static void warn_of_events(bt_summary *summary, const bt_events *events)
 {
     for (int64_t i = 0; events && i < events->n; i++) {
@@ -179,8 +178,8 @@ static void warn_of_events(bt_summary *summary, const bt_events *events)
     }
 }
 
-/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start, its width and
-/// its length.
+/// Warn of a verdict other than "steady", and of doubts about a mean from the case itself: its start, its width and its
+/// length.
 static void warn_of_window(bt_summary *summary, const bt_case *input, const bt_run_totals *totals)
 {
     if (summary->window.verdict != BT_STEADY) {
@@ -194,10 +193,10 @@ static void warn_of_window(bt_summary *summary, const bt_case *input, const bt_r
     summary->arch = bt_arch_of(input, totals->concentration, totals->mean_size);
     bt_arch_warn(&summary->arch, &summary->warnings);
     const bt_packing packing = bt_packing_of(input, totals->concentration);
-    bt_packing_warn(&packing, summary->sim_time, &summary->warnings); // where its window ends, too
+    bt_packing_warn(&packing, summary->sim_time, &summary->warnings); // also at the end of its window
 }
 
-/// How the steps were solved.
+/// Warn of steps that were not solved well.
 static void warn_of_solver(bt_summary *summary, const bt_history *history, const bt_run_totals *totals)
 {
     if (history->unconverged)
@@ -234,7 +233,7 @@ static void warn_of_solver(bt_summary *summary, const bt_history *history, const
                 (long long)history->positive_work, (long long)history->n);
 }
 
-/// What the bodies came to.
+/// Warn of splits.
 static void warn_of_splits(bt_summary *summary, const bt_run_totals *totals)
 {
     const bt_split_totals *p = &totals->splitting->total;
@@ -296,7 +295,7 @@ static void warn_of_bodies(bt_summary *summary, const bt_history *history, const
                 (long long)totals->floes_outside);
 }
 
-/// tow.direction is 0 by default and nothing drifts along it: what resists along it is no number of a free body.
+/// Without a tow: tow.direction is 0 by default and has no meaning, so a free body has no resistance along it.
 static void without_tow(bt_summary *summary, const bt_case *input)
 {
     if (input->tow.mode != BT_TOW_NONE) return;
@@ -308,9 +307,8 @@ static void without_tow(bt_summary *summary, const bt_case *input)
             input->tow.direction * 180 / BT_PI);
 }
 
-/// The conditions of the estimates as the case orders them over the window: at the mean speed of the programme there,
-/// on the course there. The estimate says when that turns within the window, for the body too. tow: velocity ordered
-/// over ground, m/s.
+/// Conditions of the estimates over the window as ordered by the case: mean speed and course of the programme there.
+/// The estimate reports a turn within the window, also of the body. tow: velocity ordered over ground, m/s.
 static void order_window(bt_summary *summary, const bt_history *history, const bt_case *input, double tow[2])
 {
     const bt_steady *steady = &summary->window;
@@ -327,12 +325,12 @@ static void order_window(bt_summary *summary, const bt_history *history, const b
             bt_path_at(&path, steady->led[0], a, first);
             bt_path_at(&path, steady->led[1], b, last);
             straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);
-            // at a set speed a body keeps its yaw; on a line it follows its course, as in src/case/arch.c
+            // at a prescribed speed a body keeps its yaw; on a line it follows its course, as in src/case/arch.c
             if (input->tow.mode != BT_TOW_SPEED) straight.body.yaw += straight.tow.direction - input->tow.direction;
             bt_path_free(&path);
         }
     }
-    // As the body lay, which on a line or free need not be as it began; a mean across a turn would be of two courses.
+    // The mean yaw, which on a line or of a free body may differ from the start; in a turn it mixes two courses.
     const double yaw = mean_over(summary, history, BT_COL_YAW).mean;
     if (isfinite(yaw) && !steady->turns) straight.body.yaw = yaw;
     bt_estimate_conditions(&straight, in);
@@ -341,8 +339,8 @@ static void order_window(bt_summary *summary, const bt_history *history, const b
     tow[1] = straight.tow.speed * bt_sin(straight.tow.direction);
 }
 
-/// Speeds of the window, where they are known: what the estimates take. Nothing tows a body that is adrift. tow: as
-/// ordered over ground, m/s.
+/// Measured speeds of the window, if known, for the estimates. A drifting body is not towed. tow: as ordered over
+/// ground, m/s.
 static void measure_speeds(bt_summary *summary, const bt_history *history, const bt_case *input,
                            const bt_run_totals *totals, const double tow[2])
 {
@@ -358,8 +356,7 @@ static void measure_speeds(bt_summary *summary, const bt_history *history, const
     if (adrift) {
         in->speed = in->along = in->water_speed = in->water_along = NAN;
     } else if (isfinite(ice[0]) && !isnan(in->along)) {
-        // Less the drift of the ice over ground within the window: that of a current that changes is not the mean of
-        // the run.
+        // Less the drift of the ice over ground within the window: not its mean over the run.
         const double speed = bt_hypot(tow[0], tow[1]), made[2] = {mean_over(summary, history, BT_COL_VX).mean,
                                                                   mean_over(summary, history, BT_COL_VY).mean};
         const double along = (made[0] * tow[0] + made[1] * tow[1]) / speed;

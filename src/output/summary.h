@@ -10,13 +10,13 @@
 #include "output/steady.h"
 #include "step/window.h"
 
-enum { BT_EVENTS_REPORTED = 40 }; ///< one by one; all are in result.h5
+enum { BT_EVENTS_REPORTED = 40 }; ///< most events listed; all are in result.h5
 
 typedef struct bt_summary {
-    bool body;                        ///< there is a towed body: the forces have a meaning
+    bool body;                        ///< there is a towed body, so that forces are defined
     double sim_time;                  ///< s
     bt_steady window;
-    bt_arch arch;                     ///< width of the domain against ice and body, as made; nothing without a body
+    bt_arch arch;                     ///< width of the domain against ice and body, as made; empty without a body
     bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
     /// reductions of the registered quantities over the window, without a towed body over all steps
@@ -29,7 +29,7 @@ typedef struct bt_summary {
     double ns_per_floe_step;
     bt_estimate_input estimate;       ///< conditions of the estimates: the case's, with the ice as made
     double reference_ratio;           ///< mean ice / measured mean, NaN without a reference
-    const struct bt_impact_count *impacts; ///< collisions over the window, NULL = none told apart
+    const struct bt_impact_count *impacts; ///< collisions over the window, NULL = not evaluated
     bt_errors warnings;
 } bt_summary;
 
@@ -40,16 +40,16 @@ char *bt_summary_json(const bt_summary *summary, const bt_history *history, cons
                       const bt_run_totals *totals, bt_idx n_floes);
 void bt_summary_print(const bt_summary *summary, const bt_history *history, const bt_case *input,
                       const bt_run_totals *totals, bt_idx n_floes);
-/// Mean ice resistance that estimates are held against, N; NaN where the body met no ice in the window.
+/// Mean ice resistance with which estimates are compared, N; NaN if the body met no ice in the window.
 double bt_summary_held_against(const bt_summary *summary);
 void bt_summary_free(bt_summary *summary);
 
 // --- the moving window -----------------------------------------------------------------------------------------------
 
-// The moving window in the summary: table, warnings. Nothing where there is none (NULL).
+// The moving window in the summary: table, warnings. Nothing without a window (NULL).
 
 void bt_summary_window_print(const bt_window *window);
-/// Of a moving window that goes, or is to go, so many times its length through the ice.
+/// Warn of a moving window that travels, or will travel, this many times its length through the ice.
 void bt_summary_window_warn_laps(bt_errors *warnings, double laps);
 
 #endif

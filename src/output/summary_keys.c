@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of summary.json. Keys, order and meaning are those that scripts rely on: a row is added, none is renamed.
+// The table of summary.json. Scripts rely on keys, order and meaning: rows may be added, but not renamed.
 #include "output/summary_keys.h"
 
 #include <assert.h>
@@ -22,7 +22,7 @@ typedef bt_summary_view view;
 enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_UNDISTURBED, FROM_IMPACTS, FROM_SPLITTING,
        N_FROM };
 
-// --- what is no member of a struct -----------------------------------------------------------------------------------
+// --- values that are not members of a struct -------------------------------------------------------------------------
 
 static double number_or_nan(bool there, double x) { return there ? x : NAN; }
 
@@ -131,7 +131,7 @@ static void write_reported(bt_json *json, const char *key, const view *from, con
     bt_json_open(json, key, '{');
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *reported = &from->s->window.series[k];
-        // Of a branch that has parted its peaks, without a mean.
+        // A broken branch has peaks but no mean.
         if (from->s->window.n == 0 || (!reported->present && isnan(reported->peak) && isnan(reported->start_peak)))
             continue;
         bt_json_open(json, reported->key, '{');
@@ -448,7 +448,7 @@ static const bt_json_key rows[] = {
     WRITTEN("warnings", write_warnings, "doubts about the numbers: [{code, text, values}]"),
 };
 
-/// Saved members that are keys, too.
+/// Add keys for saved members.
 static int keys_of_rows(bt_json_key *key, const bt_state_row *row, int n, int from)
 {
     for (int i = 0; i < n; i++)
@@ -537,7 +537,7 @@ bt_status bt_summary_check_added(bt_errors *err)
     return err->n > before ? BT_ERR_USAGE : BT_OK;
 }
 
-// --- what they mean --------------------------------------------------------------------------------------------------
+// --- meanings --------------------------------------------------------------------------------------------------------
 
 static bt_meaning meaning_of(const bt_json_key *key)
 {

@@ -14,7 +14,7 @@
 #include "case/case_derived.h"
 #include "case/warning.h"
 
-/// Shares of the wall time in one line, and in another how much of each phase several threads shared.
+/// Print the shares of the wall time in one line, and in another the share of each phase done by several threads.
 static void print_phases(const bt_run_totals *totals)
 {
 #define NAME(name, text) #name,
@@ -37,7 +37,7 @@ static void print_phases(const bt_run_totals *totals)
                i + 1 < n ? "," : "\n");
 }
 
-/// Reported series that not every run has, and what the table calls them.
+/// Reported series that not every run has, and their labels in the table.
 static const struct { bt_reported_series series; const char *label; } of_the_line[] = {
     {BT_REPORTED_TENSION_1, "  line tension"},
     {BT_REPORTED_TENSION_2, "  second branch"},
@@ -67,7 +67,7 @@ static void print_mean(const char *label, const bt_mean *mean, bool at_least)
            bt_force_text(b, mean->low), bt_force_text(d, mean->high), bt_force_text(e, mean->sd));
 }
 
-/// Registered quantities: forces among the forces, all others after them.
+/// Print registered quantities: forces among the forces, all others after them.
 static void print_added(const bt_summary *summary, bool forces)
 {
     for (int k = 0; k < summary->n_added; k++) {
@@ -124,7 +124,7 @@ static void print_forces(const bt_summary *summary, const bt_case *input)
     if (steady->series[BT_REPORTED_ICE].start_peak > summary->peak)
         printf("      start           the largest, %s, lies before the window\n",
                bt_force_text(a, steady->series[BT_REPORTED_ICE].start_peak));
-    if (!steady->at_least) // neither balance is one of numbers
+    if (!steady->at_least) // neither balance has valid numbers
         printf("    from balances     %s by %s, %s by momentum\n", bt_force_text(a, summary->balance),
                bt_balance_words(), bt_force_text(b, summary->budget.mean));
     print_mean("  tow force", &summary->tow, steady->at_least && input->tow.mode == BT_TOW_SPEED);

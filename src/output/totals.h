@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers of a whole run that the series do not hold.
+// Numbers of a whole run that are not in the series.
 #ifndef BT_TOTALS_H
 #define BT_TOTALS_H
 
@@ -25,9 +25,9 @@ typedef struct bt_call {
 #undef BT_MEMBER_OF_CALL
 } bt_call;
 
-/// Numbers of the end of the run that the series do not hold.
+/// Numbers at the end of the run that are not in the series.
 typedef struct bt_run_totals {
-    int64_t n_steps, whole_steps; ///< taken, and of the whole duration
+    int64_t n_steps, whole_steps; ///< done, and of the whole duration
     int ranks, threads;
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m
@@ -35,27 +35,27 @@ typedef struct bt_run_totals {
     /// weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double mean_thickness, mean_radius;
     double concentration;        ///< as made
-    bt_lead_stats lead;          ///< what was cut into it then
+    bt_lead_stats lead;          ///< the lead cut into it
     double ice_area;             ///< of all floes in the run, m²
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     bt_stall stall;              ///< of the towed body
     bt_outline_counts outlines;  ///< of a field that was read
     uint64_t state_hash;
-    const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
-    const struct bt_undisturbed *undisturbed; ///< ice, at the end of the run; NULL where no body is towed
-    const struct bt_splitting *splitting; ///< at the end of the run, NULL where floes do not split
-    bt_phases phases, shared; ///< the second: of it, in passes that several threads share
+    const struct bt_window *window; ///< at the end of the run, NULL if the domain is fixed
+    const struct bt_undisturbed *undisturbed; ///< ice, at the end of the run; NULL without a towed body
+    const struct bt_splitting *splitting; ///< at the end of the run, NULL if floes do not split
+    bt_phases phases, shared; ///< shared: the part in passes shared by several threads
     bt_call call;                ///< `end` is that of the summary's own time
     double stepped;              ///< bt_clock after the last step of this call
-    // what the division among ranks has cost (domain.h); 0 for one rank
+    // costs of the division among ranks (domain.h); 0 for one rank
     int64_t divisions, undivided_steps, moved_floes;
     double imbalance, worst_imbalance, repartition_imbalance, worst_repartition_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
-    /// what a sweep goes through for a contact point of the last step: batches and velocities, B; NaN without contacts
+    /// bytes read by a sweep per contact point of the last step: batches and velocities, B; NaN without contacts
     double sweep_bytes_per_contact;
-    const bt_events *events;     ///< what happened, or NULL
-    const char *stopped;         ///< why the run ended early, or NULL
+    const bt_events *events;     ///< events, or NULL
+    const char *stopped;         ///< reason of an early end, or NULL
 } bt_run_totals;
 
 #endif

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: MIT
-// The frames for ParaView: an XML description of what is in result.h5.
+// The frames for ParaView: an XML description of the datasets in result.h5.
 //
-// ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame as they are drawn, in single
-// precision (xdmf.h); the polygons never change, and their connectivity is stored once:
+// ParaView cannot move cells by a pose, so result.h5 also holds the drawn vertices of every frame, in single precision
+// (xdmf.h); the polygons never change, and their connectivity is stored once:
 //     /xdmf/floes, /xdmf/bodies     mixed topology
-//     /xdmf/floe_id                 ids: a filter of ParaView numbers the cells that it leaves anew
+//     /xdmf/floe_id                 ids: a filter of ParaView renumbers the cells that it keeps
 //     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity,net_force}, floe_force     frame NNNNNN
 //     /xdmf/NNNNNN/pieces, piece_...                                             pieces of floes that have split
-// A floe that has split shrinks to a point there: its cell stays, as ids are places in the list.
-// Thickness and height are those of /floes and /bodies; what belongs to a few bodies (ids, which one is towed) and the
-// ends of the tow line stand in the XML itself. Vectors have a third component, 0, as ParaView's vectors have.
-// Floes and other bodies are two blocks, because only floes have the largest force of a contact. Each frame has
-// datasets of its own: as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its
-// Xdmf2 reader, which keeps a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf,
-// so that the folder can be moved.
+// A floe that has split shrinks to a point: its cell stays, as ids are indices in the list.
+// Thickness and height are those of /floes and /bodies; data of a few bodies (ids, the towed one) and the ends of the
+// tow line are in the XML itself. Vectors have a third component, 0, as ParaView's vectors have. Floes and other bodies
+// are two blocks, because only floes have the largest force of a contact. Each frame has its own datasets: ParaView
+// 5.11's Xdmf3 reader does not read hyperslabs of one large dataset, and its Xdmf2 reader, which caches a geometry by
+// its path, complains. result.h5 is named relative to frames.xdmf, so that the folder can be moved.
 #include "output/xdmf.h"
 
 #include <inttypes.h>
@@ -25,12 +24,12 @@
 
 // --- axes ------------------------------------------------------------------------------------------------------------
 
-// How the world lies on what is drawn of it elsewhere; what for: xdmf.h.
+// Axes of drawings of the world; reasons in xdmf.h.
 //
-// Programs that draw hold coordinates in single precision, 24 bits. At a northing of 8,676 km that leaves steps of 1 m,
+// Drawing programs hold coordinates in single precision, 24 bits. At a northing of 8,676 km the resolution is then 1 m,
 // and floes of 0.4 m have no area. So the origin is the middle of the domain, rounded towards 0 to the least power of
-// ten that is no less than the domain: 0, 0 for most cases, and never farther from the ice than ten domains, where a
-// step is below a millionth of the domain.
+// ten that is no less than the domain: 0, 0 for most cases, and never farther from the ice than ten domains, where the
+// resolution is below a millionth of the domain.
 
 static double rounded(double middle, double extent)
 {
@@ -77,7 +76,7 @@ static void begin_attribute(FILE *f, const char *name, const char *type)
 
 static void end_attribute(FILE *f) { fputs("\n          </Attribute>\n", f); }
 
-/// An attribute of the cells in a dataset of the file.
+/// Write an attribute of the cells, in a dataset of the file.
 static void attribute(FILE *f, int64_t n, const char *name, const char *type, int bytes, const char *dataset)
 {
     begin_attribute(f, name, "Scalar");
@@ -85,7 +84,7 @@ static void attribute(FILE *f, int64_t n, const char *name, const char *type, in
     end_attribute(f);
 }
 
-/// One in a dataset of the frame.
+/// The same in a dataset of the frame.
 static void of_frame(FILE *f, int64_t n, const char *name, int width, int64_t frame, const char *kind,
                      const char *quantity)
 {
@@ -103,7 +102,7 @@ static void begin_xml(FILE *f, int64_t n, int width, const char *type, int bytes
     fprintf(f, "\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">", type, bytes);
 }
 
-/// Floes or other bodies of one frame: kind "floe" or "body". topology: the dataset.
+/// Write floes or other bodies of one frame: kind "floe" or "body". topology: the dataset.
 static void begin_block(FILE *f, const char *name, const char *kind, const char *topology, int64_t cells,
                         int64_t points, int64_t frame)
 {
@@ -133,7 +132,7 @@ static void floes(FILE *f, const bt_xdmf *xdmf, int64_t frame)
     fputs("        </Grid>\n", f);
 }
 
-/// The pieces of floes that are there.
+/// Write the existing pieces of floes.
 static void pieces(FILE *f, const bt_xdmf *xdmf, int64_t frame)
 {
     if (!xdmf->pieces || xdmf->pieces[frame].cells == 0) return;
@@ -148,7 +147,7 @@ static void pieces(FILE *f, const bt_xdmf *xdmf, int64_t frame)
     fputs("        </Grid>\n", f);
 }
 
-/// A number of each of the other bodies: their ids, or 1 for the one that is towed.
+/// Write a number for each of the other bodies: its id, or 1 for the towed body.
 static void in_xml(FILE *f, const bt_xdmf *xdmf, const char *name, bool ids)
 {
     begin_attribute(f, name, "Scalar");
@@ -169,7 +168,7 @@ static void bodies(FILE *f, const bt_xdmf *xdmf, int64_t frame)
     fputs("        </Grid>\n", f);
 }
 
-/// The branches of the tow line, each of two points.
+/// Write the branches of the tow line, each of two points.
 static void line(FILE *f, const bt_xdmf *xdmf, int64_t frame)
 {
     const int k = xdmf->branches;
@@ -198,7 +197,7 @@ static void line(FILE *f, const bt_xdmf *xdmf, int64_t frame)
     fputs("        </Grid>\n", f);
 }
 
-/// What the coordinates are, for a reader of the file: ParaView passes over it.
+/// Describe the coordinates for a reader of the file; ParaView ignores this.
 static void information(FILE *f, const bt_map_axes *axes)
 {
     fprintf(f,

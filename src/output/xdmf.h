@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The frames for ParaView: an XML description of what is in result.h5.
+// The frames for ParaView: an XML description of the datasets in result.h5.
 #ifndef BT_XDMF_H
 #define BT_XDMF_H
 
@@ -9,21 +9,21 @@
 
 // --- axes ------------------------------------------------------------------------------------------------------------
 
-// How the world lies on what is drawn of it elsewhere: east to the right and north up, about an origin near the ice.
+// Axes of drawings of the world: east to the right and north up, about an origin near the ice.
 
-/// Drawn coordinates are (y, x) of the geographic frame, that is east and north, and (x, y) of the basin's, each less
-/// that of the origin.
+/// Drawn coordinates are (y, x) of the geographic frame, that is east and north, and (x, y) of the basin's, each
+/// relative to the origin.
 typedef struct bt_map_axes {
     bool swapped;        ///< geographic: seen from above its x and y run clockwise
-    double origin[2];    ///< x, y of the case where the drawing has 0, 0, m
-    char crs[112];       ///< in which the place of the origin is known, for PROJ; "": in none
+    double origin[2];    ///< x, y of the case at the origin of the drawing, m
+    char crs[112];       ///< reference system in which the origin is known, for PROJ; "" if none
     double crs_place[2]; ///< first and second coordinate of the origin there, m
 } bt_map_axes;
 
-/// Of a case and the map of its field; counts: NULL without one.
+/// Axes for a case and the map of its field; counts: NULL without a map.
 bt_map_axes bt_map_axes_of(const bt_case *input, const bt_outline_counts *counts);
 
-/// Of the two axes, for a reader of the file.
+/// Names of the two axes, for a reader of the file.
 static inline const char *bt_map_axes_names(const bt_map_axes *axes)
 {
     return axes->swapped ? "east (y), north (x)" : "x, y";
@@ -48,20 +48,20 @@ typedef struct bt_piece_count {
     int64_t cells, points;
 } bt_piece_count;
 
-/// Sizes of what result.h5 holds.
+/// Sizes of the datasets in result.h5.
 typedef struct bt_xdmf {
     int64_t n_floes, n_bodies;                 ///< cells: floes, other bodies
     int64_t floe_vertices, body_vertices;      ///< points
-    int64_t towed;                             ///< which of the other bodies, −1 = none
+    int64_t towed;                             ///< index among the other bodies, −1 = none
     int branches;                              ///< of the tow line
     bt_map_axes axes;
     const double *time;                        ///< [n_frames] s
-    const bt_frame_line *line;                 ///< [n_frames], where there are branches
+    const bt_frame_line *line;                 ///< [n_frames], if there are branches
     int64_t n_frames;
     const struct bt_piece_count *pieces;       ///< [n_frames] NULL: floes do not split
 } bt_xdmf;
 
-/// What stands before each polygon in XDMF's mixed topology: this, the number of its vertices, then the vertices.
+/// Cell type of a polygon in XDMF's mixed topology, followed by the number of its vertices and their indices.
 #define BT_XDMF_POLYGON 3
 
 #define BT_XDMF_HEAD                                                                                                   \

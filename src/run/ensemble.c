@@ -22,22 +22,22 @@
 #include "base/fileio.h"
 #include "base/process.h"
 
-// Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
+// Least wall time between updates of ensemble.h5, s, and the largest share of wall time that they may take.
 #define GATHER_SECONDS 1.0
 #define GATHER_SHARE 0.05
 // Two threads do 1.5 times the work of one at 10,000 floes, 1.7 to 1.9 times from 30,000 on (cases/scaling), two
 // processes twice at any size.
 #define FLOES_OF_A_THREAD 15000.0
 
-// A run has handlers of its own, which end it after a step; these are for the time between, and while it is set up.
+// A run has its own handlers, which end it after a step; these are for the time between runs and during set-up.
 static volatile sig_atomic_t stop_signal;
 static void on_signal(int number) { stop_signal = number; }
 
-/// A process that is killed between the end of a member and the line for it leaves that line out: here it is added. By
-/// one process at a time, with the lock of the folder.
+/// Add the journal lines that are missing because a process was killed between the end of a member and its line. By one
+/// process at a time, with the lock of the folder.
 static void complete_journal(const bt_ensemble *ensemble)
 {
-    // Whoever works on a member holds its lock until the line is written, so the locks are looked at first.
+    // A process that works on a member holds its lock until the line is written, so test the locks first.
     bool *lacking = bt_alloc((size_t)ensemble->n, sizeof *lacking);
     for (int64_t i = 0; i < ensemble->n; i++) {
         const bt_entry *entry = &ensemble->list[i];
@@ -51,10 +51,10 @@ static void complete_journal(const bt_ensemble *ensemble)
     free(lacking);
 }
 
-// --- who does what ---------------------------------------------------------------------------------------------------
+// --- assignment of members -------------------------------------------------------------------------------------------
 
-/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is reported at the end,
-/// and is tried again by the next call.
+/// Settle a member that has failed; if not even that can be recorded (a full disk), it stays open, is reported at the
+/// end, and the next call tries it again.
 static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status status, const bt_errors *why)
 {
     bt_errors unrecorded = {0};
@@ -67,13 +67,13 @@ static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status stat
     bt_errors_free(&unrecorded);
 }
 
-/// A suspect that is run beside another member takes that with it when it ends the program, and again at every call,
-/// until both are given up. So one at a time is run, once nothing else is left to begin.
+/// May this group run suspects? A suspect that ends the program would also end another member run beside it, at every
+/// call, until both are given up. So suspects are run one at a time, when nothing else is left to begin.
 static bool may_take_suspects(bt_ensemble *ensemble)
 {
     if (ensemble->alone >= 0) return true;
     const int fd = bt_member_open(ensemble->o->dir, "suspects.lock", O_RDWR | O_CREAT);
-    if (fd < 0) return true; // better than never
+    if (fd < 0) return true; // better unprotected than never
     if (bt_member_take_lock(fd, false)) ensemble->alone = fd;
     else close(fd);
     return ensemble->alone >= 0;
@@ -86,8 +86,8 @@ static void drop_member(bt_ensemble *ensemble, const bt_entry *entry)
     ensemble->lock = ensemble->run_lock = -1;
 }
 
-/// Make the folder of a member and take its locks; false: somebody is at it, an ensemble or a `bergtow resume`, or it
-/// has failed by that.
+/// Make the folder of a member and take its locks; false if another process works on it, an ensemble or `bergtow
+/// resume`, or if this failed, which settles the member.
 static bool lock_member(bt_ensemble *ensemble, bt_entry *entry)
 {
     bt_errors why = {0};
@@ -111,7 +111,8 @@ static bool lock_member(bt_ensemble *ensemble, bt_entry *entry)
     return false;
 }
 
-/// With a limit of steps each group has members of its own: one that has paused looks like one that waits.
+/// Does the member belong to another group? With a limit of steps members are divided among groups, because a paused
+/// member looks like a waiting one.
 static bool is_for_another(const bt_ensemble *ensemble, const bt_entry *entry)
 {
     return ensemble->o->max_steps > 0 && (entry->paused || entry->index % ensemble->n_groups != ensemble->of_group);
@@ -119,8 +120,8 @@ static bool is_for_another(const bt_ensemble *ensemble, const bt_entry *entry)
 
 enum { NONE = -1, CHANGED = -2 };
 
-/// Take the lock of the next member that is free; NONE, or CHANGED: what it would be made with is not what others were
-/// made with. On the first rank of a group.
+/// Take the lock of the next free member; NONE if there is none, CHANGED if the files that the study names have
+/// changed. On the first rank of a group.
 static int64_t claim(bt_ensemble *ensemble)
 {
     if (bt_study_files_same(&ensemble->files, ensemble->err) != BT_OK) return CHANGED;
@@ -130,15 +131,14 @@ static int64_t claim(bt_ensemble *ensemble)
         if (entry->settled || is_for_another(ensemble, entry) ||
             (bt_entry_is_suspect(entry) && !may_take_suspects(ensemble))) continue;
         if (!lock_member(ensemble, entry)) continue;
-        bt_entry_look(entry); // it may have been finished between the look and the lock
+        bt_entry_look(entry); // it may have finished before the lock was taken
         if (!entry->settled) return i;
         drop_member(ensemble, entry);
     }
     return NONE;
 }
 
-/// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts
-/// anew.
+/// Collective over the group. Run a member, from its checkpoint if it was stopped; if that is refused, from the start.
 static bt_status run_or_go_on(const bt_comm *group, const bt_case *input, const bt_run_options *options, bt_errors *why)
 {
     int kept = group->rank == 0 && bt_checkpoint_there(options->dir);
@@ -151,8 +151,8 @@ static bt_status run_or_go_on(const bt_comm *group, const bt_case *input, const 
     return bt_run(group, input, options, why);
 }
 
-/// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as
-/// errors, which are reported at the end.
+/// Make ensemble.h5, one process at a time. wait: wait for the turn and report errors; otherwise leave both to the
+/// process at work, or to the end.
 static bt_status gather(bt_ensemble *ensemble, bool wait)
 {
     bt_status status = BT_OK;
@@ -185,7 +185,7 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
     if (first) {
         if (entry->attempts == 0) bt_member_forget_attempts(entry->folder);
         if (entry->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(entry->folder);
-        if (entry->attempts > 0) gather(ensemble, false); // its process may die again, and the file should say so
+        if (entry->attempts > 0) gather(ensemble, false); // its process may die again; the file should show its state
         bt_ensemble_journal(ensemble, BT_EVENT_START, &entry->m, 0, 0);
     }
     status = bt_comm_agree(ensemble->group, status);
@@ -250,7 +250,7 @@ static bt_status work(bt_ensemble *ensemble)
     }
 }
 
-/// Failed members that are to be tried again.
+/// Forget failures, so that failed members are tried again.
 static void forget_failures(const bt_ensemble *ensemble)
 {
     for (int64_t i = 0; i < ensemble->n; i++) {
@@ -259,8 +259,8 @@ static void forget_failures(const bt_ensemble *ensemble)
     }
 }
 
-/// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or
-/// die. looks: how many there were before; the first are close together, for a short member ends soon.
+/// Collective. Nothing is left to begin: wait a moment if other processes work on members, which may finish or die;
+/// false if none do. looks: calls so far; the first waits are short, as short members end soon.
 static bool wait_for_others(bt_ensemble *ensemble, int looks)
 {
     int64_t n = 0;
@@ -278,7 +278,7 @@ static bool wait_for_others(bt_ensemble *ensemble, int looks)
     return true;
 }
 
-/// Collective. As for a run of the base case. *open: nobody has asked for a number.
+/// Collective. Number of threads as for a run of the base case. *open: neither options nor environment set it.
 static bt_status choose_threads(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                                 int *threads, bool *open, bt_errors *err)
 {
@@ -292,8 +292,8 @@ static bt_status choose_threads(const bt_comm *comm, const bt_study *study, cons
     return status;
 }
 
-/// Members have as many threads as their floes keep busy, and the other cores go to other members. open: the number of
-/// threads is.
+/// Give members as many threads as their floes keep busy, and the other cores to other members. open: as of
+/// choose_threads.
 static void share_cores(bt_ensemble *ensemble, bool open)
 {
     const bt_ensemble_options *options = ensemble->o;
@@ -339,7 +339,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
 
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)study->ranks, &group);
-    // ranks that make no whole group
+    // ranks left over after whole groups
     const bool idle = comm->rank / (int)study->ranks >= comm->size / (int)study->ranks;
     bt_ensemble ensemble = {.world = comm,
                          .group = &group,
@@ -372,7 +372,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
         fflush(stdout);
     }
     if (comm->rank == 0 && !options->job) warn_fixed(&ensemble);
-    if (comm->rank == 0) gather(&ensemble, false); // after a kill the file may be behind
+    if (comm->rank == 0) gather(&ensemble, false); // after a kill the file may be out of date
     struct sigaction before[BT_N_CAUGHT];
     stop_signal = 0;
     bt_halt_catch(on_signal, NULL, before);

@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: MIT
-// ensemble.h5: one row a member, gathered from the members' folders.
+// ensemble.h5: one row per member, gathered from the members' folders.
 //
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
-//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a
+//     /members/name, state_hash, reason [M]              texts, "" if there is none; reason: of a failure; that a
 //                                                        waiting member's process died, or that its result is not sound
-//     /members/hole [M]                                  which of these, by a name that stays: failed, no_solution
+//     /members/hole [M]                                  which of these, by a permanent name: failed, no_solution
 //                                                        (failed by guard.no_solution), died, unsound, unreadable
-//     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the
+//     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" if the
 //                                                        case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or
-//                                                        machine; nested ones as A_B; NaN where there is none; the
+//                                                        machine; nested ones as A_B; NaN if there is none; the
 //                                                        verdict as a number;
-//                                                        attributes: key (A.B), order, and as registered units,
+//                                                        attributes: key (A.B), order and, as registered, units,
 //                                                        description; of an estimate also its name, label, kind
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
-//     /events/member, time, kind, subject, value [E]     as /events of result.h5 has them, kind by its name; no group
-//                                                        without one
+//     /events/member, time, kind, subject, value [E]     as in /events of result.h5, kind by its name; no group
+//                                                        without events
 //     /warnings, /reasons, /codes                        ensemble_record.h
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members,
 //                                                        n_finished, n_failed
 //
-// Made whole each time under a temporary name, protected by a checksum and renamed: a reader finds the old or the new
-// one. Only members whose files fit their record (ensemble_record.h) are taken in. Members are written in their order,
-// columns in that of their first appearance, so the file depends on the set of finished members alone.
+// Each time the whole file is made under a temporary name, protected by a checksum and renamed: a reader finds the old
+// or the new file. Only members whose files match their record (ensemble_record.h) are included. Members are written in
+// their order, columns in the order of their first appearance, so the file depends on the set of finished members
+// alone.
 #include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
@@ -49,7 +50,7 @@ enum { N_SERIES = sizeof series / sizeof *series };
 #define VERDICT "window.verdict"
 
 typedef struct {
-    char *name, *key; ///< A_B, and A.B as it is registered
+    char *name, *key; ///< A_B, and A.B as registered
     double *value;    ///< [M]
 } column;
 
@@ -60,10 +61,10 @@ typedef struct {
     bt_member_notes warnings, reasons;
     column *column;
     int n_columns;
-    int64_t unread; ///< members that have finished and could not be read
+    int64_t unread; ///< finished members that could not be read
 } table;
 
-/// What is known of each member: numbers, and texts, which have no units.
+/// Data of each member: numbers, and texts, which have no units.
 static const struct {
     const char *path, *units, *meaning;
     size_t offset;
@@ -99,7 +100,7 @@ static double *column_of(table *t, const char *name, const char *key)
     return c->value;
 }
 
-/// 0, 1 or 2; NaN of what is no verdict.
+/// Verdict as 0, 1 or 2; NaN for other texts.
 static double verdict_number(const char *name)
 {
     for (int k = 0; name && k <= BT_TOO_SHORT; k++)
@@ -107,7 +108,7 @@ static double verdict_number(const char *name)
     return NAN;
 }
 
-/// prefix: of the registered key, with its dots.
+/// Add the numbers of a summary, nested ones too. prefix: of the registered key, with its dots.
 static void take_numbers(table *t, int64_t m, const json_t *object, const char *prefix)
 {
     const char *key;
@@ -139,8 +140,8 @@ static bt_status take_summary(table *t, int64_t m, const char *folder, bt_errors
     return BT_OK;
 }
 
-/// A column of a member's result.h5; returns its length, 0 when there is none. A read that fails is kept in `h5`: the
-/// numbers of a member that has finished are there, and a row without them would be taken for one that has not.
+/// Read a column of a member's result.h5; returns its length, 0 if there is none. `h5` keeps a read error: a row
+/// without the numbers of a finished member would be taken for an unfinished one.
 static hsize_t read_column(bt_h5 *h5, const char *folder, const char *group, const char *column_name, double **out)
 {
     *out = NULL;
@@ -201,7 +202,7 @@ static void write_series(bt_h5 *h5, const table *t, const char *dir)
     }
 }
 
-/// Events of all members: of a line that parted the statistics ask when, and which.
+/// Write the events of all members: statistics ask when a line broke, and which.
 static void write_events(bt_h5 *h5, const table *t, const char *dir)
 {
     static const char *const names[] = {"time", "kind", "subject", "value"};
@@ -250,7 +251,7 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
     bt_events_free(&all);
 }
 
-/// A parameter as numbers, or as texts where it is a choice or a name.
+/// Write a parameter as numbers, or as texts if it is a choice or a name.
 static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
 {
     const bt_study_parameter *parameter = &study->parameter[p];
@@ -287,7 +288,7 @@ static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
     free(value);
 }
 
-/// Status of a member that says it has finished: it has when its files are sound, and else waits, with the reason.
+/// Status of a member recorded as finished: finished if its files are sound, otherwise waiting, with the reason.
 static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt_member_records *records)
 {
     bt_errors why = {0};
@@ -347,7 +348,7 @@ static void release(table *t)
     free(t->column);
 }
 
-/// What is registered of a number, as attributes.
+/// Write the registered properties of a number as attributes.
 static void describe(bt_h5 *h5, const char *name, const char *key, int order)
 {
     const bt_meaning meaning = bt_summary_meaning(key);

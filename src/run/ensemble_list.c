@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The members of a study in the order in which they are taken, and whether those that are there are sound.
+// The members of a study in the order in which they are run, and checks of finished members.
 #include "run/ensemble_list.h"
 
 #include <fcntl.h>
@@ -33,7 +33,7 @@ static const char *const event_name[] = {
     [BT_EVENT_UNSOUND] = "unsound",
 };
 
-/// Add a line, in one write: lines of several processes do not mix. A line that cannot be written is left out.
+/// Add a line, in one write: lines of several processes do not mix. If it cannot be written, it is left out.
 void bt_ensemble_journal(const bt_ensemble *ensemble, bt_member_event event, const bt_member *member, double wall,
                          int code)
 {
@@ -55,7 +55,7 @@ void bt_ensemble_journal(const bt_ensemble *ensemble, bt_member_event event, con
 void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *lacking)
 {
     bool *ended = bt_alloc((size_t)n, sizeof *ended);
-    // Line by line: a journal may be longer than the texts that bt_file_read takes.
+    // Line by line: a journal may be longer than bt_file_read allows.
     const int fd = bt_member_open(dir, JOURNAL, O_RDONLY);
     FILE *f = fd < 0 ? NULL : fdopen(fd, "r");
     char *line = NULL;
@@ -67,12 +67,12 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
         int64_t condition = 0, repeat = 0;
         const bool known = name && event && sscanf(name, "c%" SCNd64 "-r%" SCNd64, &condition, &repeat) == 2;
         const int64_t i = (condition - 1) * repeats + repeat - 1;
-        // with fewer repeats than before there are lines of members that are no longer asked for
+        // after a reduction of repeats there are lines of members no longer in the study
         if (known && i >= 0 && i < n && repeat >= 1 && repeat <= repeats)
             ended[i] = !strcmp(event, event_name[BT_EVENT_FINISHED]);
         json_decref(entry);
     }
-    const bool whole = f && !ferror(f); // what cannot be read may say anything
+    const bool whole = f && !ferror(f); // the unread rest may say anything
     for (int64_t i = 0; i < n; i++) lacking[i] = lacking[i] && whole && !ended[i];
     free(line);
     free(ended);
@@ -82,8 +82,8 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
 
 // --- the folder ------------------------------------------------------------------------------------------------------
 
-/// The folder is of this study, or new; old: which of these. digest: of the text that the folder keeps, which may have
-/// the comments of another version of the program. The caller holds its lock.
+/// Check that the folder belongs to this study (*old), or is new. digest: of the text that the folder keeps, which may
+/// have the comments of another program version. The caller holds its lock.
 static bt_status keep_resolved(const char *dir, const char *text, bool *old, char digest[BT_DIGEST_TEXT],
                                bt_errors *err)
 {
@@ -117,7 +117,7 @@ bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_op
     bt_study_files_find(&files, study);
     bt_status status = bt_file_make_dir(members, err);
     const int fd = status == BT_OK ? bt_member_open(options->dir, "lock", O_RDWR | O_CREAT) : -1;
-    if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
+    if (fd >= 0) bt_member_take_lock(fd, true); // for calls that begin together
     if (status == BT_OK) status = keep_resolved(options->dir, text, &old, digest, err);
     if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, &warnings, err);
     if (status == BT_OK) status = bt_file_write(copy, study->text, err);
@@ -139,7 +139,7 @@ static int by_turn(const void *a, const void *b)
 {
     const bt_entry *p = a, *q = b;
     const int doubt[2] = {(p->attempts > 0) + bt_entry_is_suspect(p), (q->attempts > 0) + bt_entry_is_suspect(q)};
-    if (doubt[0] != doubt[1]) return doubt[0] - doubt[1]; // those whose process died come last
+    if (doubt[0] != doubt[1]) return doubt[0] - doubt[1]; // members whose process has died come last
     if (p->turn != q->turn) return p->turn < q->turn ? -1 : 1;
     if (p->first != q->first) return p->first > q->first ? -1 : 1;
     return p->index < q->index ? -1 : 1;
@@ -154,7 +154,7 @@ void bt_entry_look(bt_entry *entry)
 
 enum { SOUND, DAMAGED, UNREADABLE };
 
-/// Check a member that says it has finished. What is damaged is taken away, unless somebody is at it already.
+/// Check a member recorded as finished. A damaged result is removed, unless another process works on the member.
 static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warnings)
 {
     bt_errors why = {0};
@@ -162,15 +162,15 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
     if (status == BT_ERR_CASE) {
         const int fd = bt_member_open(entry->folder, "lock", O_RDWR | O_CREAT);
         bt_errors again = {0};
-        bool busy = false; // with a run of its own, as of `bergtow resume`
+        bool busy = false; // with a single run, as by `bergtow resume`
         const int run =
             fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(entry->folder, &busy, &again) : -1;
         bt_errors_free(&again);
         if (run < 0 || bt_ensemble_state(entry->folder, NULL, NULL, NULL) != BT_MEMBER_FINISHED) {
-            bt_errors_free(&why); // another process has found it out, too, or is at it
+            bt_errors_free(&why); // another process has found this too, or works on it
         } else if (bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &again) ==
                    BT_OK) {
-            bt_errors_free(&why); // and made it good meanwhile
+            bt_errors_free(&why); // another process has repaired it meanwhile
             status = BT_OK;
         } else {
             status = bt_member_record_forget(entry->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
@@ -200,7 +200,7 @@ void bt_ensemble_share_records(bt_ensemble *ensemble)
     bt_comm_reduce(ensemble->world, NULL, 0, NULL, 0, ensemble->records.seen, (int)ensemble->records.n);
 }
 
-/// Collective. Every finished member is read once, by one of the ranks; the list is still in the order of the study.
+/// Collective. Check every finished member once, by one of the ranks; the list is still in the order of the study.
 static void check_members(bt_ensemble *ensemble)
 {
     enum { PER_WORD = 32 }; // two bits each
@@ -234,7 +234,7 @@ static int by_digest(const void *a, const void *b)
     return strcmp(p->digest, q->digest);
 }
 
-/// Which conditions have their ice in common, by that of the first field of each; in the order of the study.
+/// Find conditions that share their ice, by the ice of the first field of each; in the order of the study.
 static void find_shared(bt_ensemble *ensemble, ice_of *ice, int64_t n)
 {
     qsort(ice, (size_t)n, sizeof *ice, by_digest);
@@ -260,7 +260,7 @@ void bt_ensemble_list(bt_ensemble *ensemble)
         entry->index = i;
         bt_study_member(ensemble->s, i, &entry->m);
         entry->folder = bt_text_of("%s/members/%s", ensemble->o->dir, entry->m.name);
-        // fields of one condition cost the same; a case that cannot be read fails when its turn comes
+        // fields of one condition cost the same; an unreadable case fails when its turn comes
         if (entry->m.condition != priced) {
             bt_case input;
             bt_errors unheard = {0};
@@ -301,9 +301,9 @@ void bt_ensemble_count_settled(bt_ensemble *ensemble)
 
 // --- the report ------------------------------------------------------------------------------------------------------
 
-// What an ensemble prints while it works and at its end.
+// Messages of an ensemble while it works and at its end.
 
-/// The wall time that is left, s; infinite where none was given.
+/// Remaining wall time, s; infinite without a limit.
 double bt_ensemble_wall_left(const bt_ensemble *ensemble)
 {
     return ensemble->o->max_wall > 0 ? ensemble->o->max_wall - (bt_clock() - ensemble->began) : INFINITY;
@@ -340,7 +340,7 @@ typedef struct {
     int64_t finished, failed, left, at_work, unsound;
 } counts;
 
-/// One member's part in the end: counted, and reported where it is a hole.
+/// Count one member at the end, and report it if it is a hole.
 static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, counts *n, bt_errors *err)
 {
     int code;
@@ -359,7 +359,7 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
         status = BT_ERR_IO;
     } else if (state == BT_MEMBER_FINISHED) {
         n->finished++;
-        if (bt_checkpoint_there(entry->folder)) bt_checkpoint_remove(entry->folder); // killed between the two
+        if (bt_checkpoint_there(entry->folder)) bt_checkpoint_remove(entry->folder); // killed before its removal
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
         if (n->failed++ < BT_MOST_REPORTED)
@@ -379,7 +379,7 @@ static int by_index(const void *a, const void *b)
     return ((const bt_entry *)a)->index < ((const bt_entry *)b)->index ? -1 : 1;
 }
 
-/// What members warn of: of each code the text of the first, and how many others there are.
+/// Report the warnings of members: for each code the text of the first, and the number of others.
 static void report_warnings(const bt_ensemble *ensemble)
 {
     const bt_member_notes *notes = &ensemble->warnings;

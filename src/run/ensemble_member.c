@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// State of a member of an ensemble, by its files.
+// State of a member of an ensemble, from its files.
 #include "run/ensemble_list.h"
 
 #include <errno.h>
@@ -137,7 +137,7 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **failure,
     if (bt_file_there(folder, "finished")) return BT_MEMBER_FINISHED;
     for (int k = 0; k < 2; k++)
         if (read_failure(folder, k, code, failure, why)) return BT_MEMBER_FAILED;
-    // the one under way has no end yet
+    // the present attempt has not ended yet
     const int n = why ? bt_member_attempts(folder) : 0, died = n > 0 && bt_member_held(folder) ? n - 1 : n;
     if (died > 0)
         *why = bt_text_of("its process died in %d attempt%s without a checkpoint; it is tried again after all others, "

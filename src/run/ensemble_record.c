@@ -119,7 +119,7 @@ void bt_member_records_end(bt_member_records *records)
     *records = (bt_member_records){0};
 }
 
-/// What tells that no file has changed since it was looked at: 0 where one is missing.
+/// Stamp of the files of a member, which shows whether any has changed; 0 if one is missing.
 static uint64_t stamp(const char *folder)
 {
     uint64_t part[N_FILES + 1][6];
@@ -139,7 +139,7 @@ static uint64_t stamp(const char *folder)
     return all ? all : 1;
 }
 
-/// The record that the files ask for. Errors: BT_ERR_CASE, one is missing; BT_ERR_IO.
+/// Make the record of the present files. Errors: BT_ERR_CASE, a file is missing; BT_ERR_IO.
 static bt_status make(const bt_member_records *records, const char *name, const char *folder, char text[MOST_TEXT],
                       bt_errors *err)
 {
@@ -174,7 +174,7 @@ bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
     return status;
 }
 
-/// Is it the summary of a whole run? One that is cut short, or of a run that stopped, is not.
+/// Is it the summary of a whole run, neither truncated nor of a stopped run?
 static bt_status check_summary(const char *folder, bt_errors *err)
 {
     static const char *const numbers[] = {"n_steps", "n_floes", "sim_time_s", NULL};
@@ -218,7 +218,7 @@ bt_status bt_member_record_write(bt_member_records *records, int64_t m, const ch
     return status == BT_OK ? BT_OK : BT_ERR_IO;
 }
 
-/// The value behind "key" in its line of a record, "" where there is none.
+/// The value after "key" in its line of a record, "" if there is none.
 static void line_of(const char *text, const char *key, char out[128])
 {
     const size_t n = strlen(key);
@@ -228,7 +228,7 @@ static void line_of(const char *text, const char *key, char out[128])
             snprintf(out, 128, "%.*s", (int)bt_min((double)strcspn(at, "\n"), 127), at);
 }
 
-/// Why a record is not the one that the files ask for, in words.
+/// Report how a record differs from that of the present files.
 static void report(const char *folder, const char *kept, const char *wanted, bt_errors *err)
 {
     static const char *const whose[] = {"name", "study"};
@@ -260,7 +260,7 @@ bt_status bt_member_record_check(bt_member_records *records, int64_t m, const ch
     size_t size = 0;
     int64_t bytes;
     bt_errors why = {0};
-    bt_status status = bt_checksum_digest_file(path, digest, &bytes, &why); // is there one that can be read at all?
+    bt_status status = bt_checksum_digest_file(path, digest, &bytes, &why); // is there a readable record?
     if (status == BT_OK) status = bt_file_read_to(path, "a record", MOST_TEXT, &kept, &size, &why);
     if (status == BT_OK) status = make(records, name, folder, text, &why);
     if (status == BT_OK && (size != strlen(text) || memcmp(kept, text, size))) {
@@ -276,11 +276,11 @@ bt_status bt_member_record_check(bt_member_records *records, int64_t m, const ch
 
 bt_status bt_member_record_forget(const char *folder, bt_errors *err)
 {
-    char *path = bt_file_join(folder, RECORD); // first: without it the member waits, whatever else is left
+    char *path = bt_file_join(folder, RECORD); // first: without it the member is waiting, whatever else is left
     const bt_status status = bt_file_remove(path, err);
     free(path);
     if (status != BT_OK) return status;
-    bt_errors unheard = {0}; // what a new run replaces anyway
+    bt_errors unheard = {0}; // a new run replaces these files anyway
     for (int k = 0; k < N_FILES; k++) {
         path = bt_file_join(folder, files[k]);
         bt_file_remove(path, &unheard);

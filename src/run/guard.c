@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Guards of a run; what they look at is in guard.h.
+// Guards of a run; see guard.h.
 #include "run/guard.h"
 
 #include <inttypes.h>
@@ -22,7 +22,7 @@
 
 // --- limits ----------------------------------------------------------------------------------------------------------
 
-/// What drives the bodies of a case; equations in guard.h.
+/// The drivers of the bodies of a case; equations in guard.h.
 typedef struct {
     double prescribed, water, wind; ///< v_p, U_w, D, m/s
     double slope;                   ///< a, m/s²
@@ -47,7 +47,7 @@ static drivers drivers_of(const bt_case *input)
     };
 }
 
-/// a/b, where nothing over nothing is nothing.
+/// a/b, with 0/0 = 0.
 static double ratio(double a, double b) { return a > 0 ? a / b : 0; }
 
 /// v of body i, m/s.
@@ -60,7 +60,7 @@ static double driven_speed(const drivers *d, const bt_world *world, bt_idx i)
     const double pushed = d->slope + bt_hypot(load.fx, load.fy) / bodies->mass[i],
                  drawn = ratio(bt_hypot(load.jx, load.jy), load.g);
     const double mass = bodies->mass[i], width = 2 * bodies->radius[i];
-    // at worst the lee of others takes all form drag of the water, and none of the wind
+    // at worst the lee of others removes all form drag of the water, and none of the wind
     const double form = world->par.lee > 0 && drag->water_skin > 0 && bodies->gid[i] != world->towed
                         ? 0 : drag->water_form;
     const double alpha = form > 0 || drag->water_form == 0
@@ -79,7 +79,7 @@ static double energy_of(double mass, double inertia, double vx, double vy, doubl
     return 0.5 * (mass * (vx * vx + vy * vy) + inertia * turn * turn);
 }
 
-/// E_0 + Σ ½ M v². Of a run that goes on, too, E_0 is that of time zero.
+/// E_0 + Σ ½ M v². E_0 is that of time zero in a resumed run, too.
 static double driven_energy(const bt_case *input, const bt_world *world, const bt_roster *roster)
 {
     const drivers d = drivers_of(input);
@@ -89,7 +89,7 @@ static double driven_energy(const bt_case *input, const bt_world *world, const b
         if (bodies->motion[i] != BT_DYNAMIC || !bt_domain_owns(world, i)) continue;
         double start = 0;
         const bt_gid by_hand = bt_roster_row(roster, bodies->gid[i]) - roster->n_free;
-        // A velocity that is not given is that of free drift, below the driven speed.
+        // A velocity not given is that of free drift, below the driven speed.
         if (bodies->gid[i] == world->towed)
             start = energy_of(bodies->mass[i], bodies->inertia[i], bt_case_start(input->body.vx),
                               bt_case_start(input->body.vy), input->body.yaw_rate);
@@ -128,7 +128,7 @@ void bt_guard_begin(bt_guard *guard, const bt_case *input, const bt_world *world
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
-/// The domain of now, m.
+/// The present domain, m.
 typedef struct { double low[2], high[2]; bool wall[2], open[2]; double depth; } range;
 
 static range range_of(const bt_guard *guard, const bt_world *world)
@@ -143,8 +143,8 @@ static range range_of(const bt_guard *guard, const bt_world *world)
     return limits;
 }
 
-/// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them
-/// only where they stand.
+/// Is a place beyond a wall? A body that has left by an open edge may move around behind the walls of the other edges:
+/// it is beyond these only where they stand.
 static bool beyond(const range *limits, double x, double y)
 {
     if (x >= limits->low[0] && x <= limits->high[0] && y >= limits->low[1] && y <= limits->high[1]) return false;
@@ -156,7 +156,7 @@ static bool beyond(const range *limits, double x, double y)
     return false;
 }
 
-/// The highest ids among the bodies of cell k into the maxima: what is broken, what is gone.
+/// Highest ids in cell k, as maxima: of a body that is not finite, and of a body beyond a wall.
 static void look_at(const bt_world *world, bt_idx k, const range *limits, bt_totals *totals)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -177,7 +177,8 @@ static void look_at(const bt_world *world, bt_idx k, const range *limits, bt_tot
     }
 }
 
-/// As in the step: what drifts with water at rest has not moved. BT_ASLEEP_NEW has, and has come to rest in it.
+/// As in the step: bodies at rest in still water have not moved. In a cell BT_ASLEEP_NEW they have, and came to rest in
+/// this step.
 static void look_at_moved(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     const bt_cells *ts = world->cells;

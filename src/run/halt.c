@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Signals, stop file and limits of wall time; what they ask for is in halt.h.
+// Signals, stop file and limits of wall time; see halt.h.
 #include "run/halt.h"
 
 #include <inttypes.h>
@@ -11,7 +11,7 @@
 
 #define STOP_FILE "stop"
 #define LOOK_SECONDS                                                                                                   \
-    0.25 // wall time between looks for the stop file: a look is a call of the system, on a cluster one of the network
+    0.25 // s of wall time between tests for the stop file: each is a system call, on a cluster over the network
 // below them a bit for each signal
 static const uint64_t by_file = UINT64_C(1) << 48, by_clock = UINT64_C(1) << 49, save = UINT64_C(1) << 50;
 
@@ -24,7 +24,7 @@ static void on_save(int number)
     saves_asked = (saves_asked + 1) & 0xffff;
 }
 
-// Of the process: the handlers stay from the first run that has them to the end of the last.
+// Runs in this process with handlers, which stay from the first such run to the end of the last.
 static int users;
 static struct sigaction before_all[BT_N_CAUGHT];
 
@@ -33,7 +33,7 @@ static const int caught[BT_N_CAUGHT] = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGUSR
 void bt_halt_catch(void (*stops)(int), void (*saves)(int), struct sigaction before[BT_N_CAUGHT])
 {
     for (int k = 0; k < BT_N_CAUGHT; k++) {
-        // SA_RESTART: on a network disk a call would else fail by the very signal that asks for a checkpoint
+        // SA_RESTART: otherwise a call on a network disk would fail because of the signal that asks for a checkpoint
         struct sigaction act = {.sa_handler = caught[k] == SIGUSR1 ? saves : stops, .sa_flags = SA_RESTART};
         sigemptyset(&act.sa_mask);
         sigaction(caught[k], NULL, &before[k]);

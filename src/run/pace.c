@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// How many threads work at a run: fewer than it was given while others use the cores.
+// Number of working threads of a run: fewer than assigned while other programs use the cores.
 //
-// Threads wait for each other in every pass, some hundred times a step. When other programs want the cores, the system
-// takes the thread that all wait for off its core for milliseconds, each time; a run with two threads then took ten
-// times as long as with one. No way of waiting helps, as the one waited for does not run.
+// Threads wait for each other in every pass, some hundred times per step. When other programs want the cores, the
+// system may suspend the thread that all wait for, for milliseconds each time; a run with two threads then took ten
+// times as long as with one. No way of waiting helps, since the awaited thread is not running.
 //
-// So threads are tried out: where they get too little of the processors, half of them work for a moment, and go on so
-// if more gets done in a second of wall time; later twice as many are tried. Trials that fail become rare. The result
-// does not depend on the number of threads (docs/architecture.md), and so this may go by the clock.
+// So the number of threads is tried out: if they get too little processor time, half of them work for a moment, and
+// continue so if more work is done per second of wall time; later twice as many are tried. Failed trials make the next
+// ones rarer. The result does not depend on the number of threads (docs/architecture.md), so the clock may decide.
 //
-// Rejected: to go by the load average, which is a minute late and counts whom the scheduler ranks lower.
+// Rejected: the load average, which is a minute late and counts processes of lower priority.
 #include "run/pace.h"
 
 static const double window = 0.1;  // s of wall time for a rate
-static const double busy = 0.6;    // of the threads' time on a core: more, and nothing is wrong
-static const double gain = 1.1;    // more threads are to do this much more, and fewer not clearly less
+static const double busy = 0.6;    // share of the threads' time on a core: above this, nothing is wrong
+static const double gain = 1.1;    // more threads must do this much more, and fewer not clearly less
 static const double less = 0.97;
 static const double shortest = 1, longest = 16; // s between trials
 
@@ -24,7 +24,7 @@ void bt_pace_begin(bt_pace *pace, int threads, bool varies)
     if (!varies) pace->most = 1;
 }
 
-/// Threads of a trial in the direction that is next; as many as now where there is none.
+/// Number of threads of the next trial; the present number if there is none.
 static int trial(const bt_pace *pace, double use)
 {
     if (pace->fewer) return use < busy ? (pace->now + 1) / 2 : pace->now;

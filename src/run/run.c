@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A run as the commands make it: all its steps, from the start or from a checkpoint, and what is kept of it when it
-// fails.
+// A whole run, as the commands do it: all steps, from the start or from a checkpoint, and the state kept if it fails.
 #include "bergtow/run.h"
 
 #include <inttypes.h>
@@ -15,12 +14,12 @@
 #include "revision.h"
 #include "run/run_parts.h"
 
-// --- what a folder holds ---------------------------------------------------------------------------------------------
+// --- contents of a folder --------------------------------------------------------------------------------------------
 
-// What a result folder holds to go on from: its last checkpoint, one that is named, or the case of a run that was
+// The point in a result folder from which a run can resume: its last checkpoint, a named one, or the case of a run
 // killed before its first.
 
-/// What the user should know of the checkpoint that is taken.
+/// Warn the user about the checkpoint in use.
 static void report(const bt_snapshot *snap, const char *said)
 {
     if (said) bt_errors_warn("warning: %s", said);
@@ -31,7 +30,7 @@ static void report(const bt_snapshot *snap, const char *said)
                        snap->path, (const char *)item->data, BT_REVISION);
 }
 
-/// Rank 0. The folder is ours, and what it holds is read; but for the case.
+/// Rank 0. Lock the folder and read its contents, except for the case.
 static bt_status open_folder(bt_resume *resume, const bt_run_options *options, bt_errors *err)
 {
     if (!bt_file_there(options->dir, "."))
@@ -50,7 +49,7 @@ static bt_status open_folder(bt_resume *resume, const bt_run_options *options, b
     return status;
 }
 
-/// Rank 0. Before the case is read: what is wrong in one that was edited is of no concern.
+/// Rank 0. Before the case is read, check that it was not edited: errors in an edited case are irrelevant.
 static bt_status check_itself(const char *path, const char *dir, bt_errors *err)
 {
     char *text = NULL;
@@ -61,7 +60,7 @@ static bt_status check_itself(const char *path, const char *dir, bt_errors *err)
     return status;
 }
 
-/// Collective. The case that the run began with, at time zero, and the files that it names.
+/// Collective. Read the case with which the run began, at time zero, and check the files that it names.
 static bt_status start_again(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
     char *path = bt_file_join(options->dir, "case.resolved.yml");
@@ -75,13 +74,13 @@ static bt_status start_again(bt_resume *resume, const bt_comm *comm, const bt_ru
     return status;
 }
 
-/// Collective. The case of the checkpoint, and whether any step of it is left.
+/// Collective. Read the case of the checkpoint, and find whether any of its steps are left.
 static bt_status go_on(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
     bt_snapshot_share(comm, &resume->s);
     resume->s.err = err;
     const bt_status status = bt_comm_agree(comm, bt_running_load_case(&resume->c, &resume->s, err));
-    // without its summary it was stopped between its last checkpoint and that: no step is left, but the end is
+    // without a summary it was stopped after its last checkpoint: no steps are left, but the end of the run is
     int ended = comm->rank == 0 && bt_file_there(options->dir, "summary.json");
     bt_comm_bcast(comm, &ended, sizeof ended);
     resume->finished = status == BT_OK && ended &&
@@ -108,7 +107,7 @@ void bt_resume_end(bt_resume *resume)
 
 // --- a run -----------------------------------------------------------------------------------------------------------
 
-/// Collective. *failed: the step that was not sound, −1 = none.
+/// Collective. Do a run. *failed: the step that was not sound, −1 = none.
 static bt_status run_case(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
                           bt_run_manner *manner, int64_t *failed, bt_errors *err)
 {
@@ -120,7 +119,7 @@ static bt_status run_case(const bt_comm *comm, const bt_case *input, const bt_ru
     return status;
 }
 
-/// Collective. A call that is ended before its time, by a limit of its job or by hand, has said what it knew.
+/// Collective. Print messages now, in case the call is ended early, by a limit of its job or by hand.
 static void tell(const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
     if (!options->aloud) return;
@@ -169,7 +168,7 @@ void bt_run_keep_failure(const bt_comm *comm, const bt_case *input, const bt_run
     free(said);
 }
 
-/// Collective. A run, and what is kept of it when it fails. held: the caller has locked the folder.
+/// Collective. A run, and the state kept if it fails. held: the caller has locked the folder.
 static bt_status run_guarded(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
                              bt_snapshot *kept, bool held, double start, bt_errors *err)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a run beside that of its world, and the order in which a checkpoint is made and taken up.
+// The state of a run besides that of its world, and the order of steps in writing and loading a checkpoint.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +26,7 @@ double bt_running_frame_interval(const bt_case *input)
     return input->output.frame_interval > 0 ? input->output.frame_interval : input->run.duration / FRAMES_BY_DEFAULT;
 }
 
-/// Where the state comes from; for people and for the comparison of programs, not for the run.
+/// Save the origin of the state, for people and for comparing programs, not for the run.
 static void save_origin(const bt_running *running, bt_snapshot *snap)
 {
     char text[64] = "unknown";
@@ -87,7 +87,7 @@ bt_status bt_running_save(bt_running *running, bt_snapshot *snap, const char *na
         save_origin(running, snap);
         save_case(running->c, snap);
     }
-    // agreed so far
+    // the same on all ranks so far
     if (status == BT_OK) status = bt_state_save_field(&running->field, running->w, running->comm, snap, err);
     if (running->comm->rank == 0) {
         bt_state_save_lead(&running->totals.lead, snap);
@@ -107,7 +107,7 @@ bt_status bt_running_save(bt_running *running, bt_snapshot *snap, const char *na
 
 bt_status bt_running_checkpoint(bt_running *running, const char *name, bt_errors *err)
 {
-    // The result first: it may hold more than the checkpoint counts on, never less.
+    // The result first: it may hold more than the checkpoint refers to, never less.
     bt_status status = bt_record_publish(running->record, err);
     if (status != BT_OK) return status;
     bt_snapshot snap = {0};
@@ -146,7 +146,7 @@ bt_status bt_running_load_case(bt_case *input, bt_snapshot *snap, bt_errors *err
     if (status != BT_OK) return status;
     const int64_t step = bt_snapshot_int(snap, "world/step");
     bt_snapshot_want(snap, step >= 0 && step <= bt_case_steps(input), "world/step", -1, "is not a step of its case");
-    free(input->text); // the result shows the case as it was given
+    free(input->text); // the result shows the case as given
     input->text = bt_text_copy(given);
     return snap->faulty ? BT_ERR_CASE : BT_OK;
 }
@@ -158,8 +158,8 @@ bt_status bt_running_load_field(bt_field *field, bt_lead_stats *lead, bt_snapsho
     return snap->faulty ? BT_ERR_CASE : BT_OK;
 }
 
-/// Frames are by the interval, and a program may ask for others (bt_simulation_frame), before a step as many as it has
-/// edits. That result.h5 holds them is seen where it is read.
+/// Frames are taken by the interval, and a program may take others (bt_simulation_frame), several between two steps if
+/// it edits bodies. Whether result.h5 holds them is checked where it is read.
 static void check_frames(const bt_running *running, bt_snapshot *snap)
 {
     const int64_t step = bt_snapshot_int(snap, "world/step"), first = bt_running_draws(running->c);
@@ -175,7 +175,7 @@ static void check_frames(const bt_running *running, bt_snapshot *snap)
                      "run/frames_due", -1, "is not the number of the next frame");
 }
 
-/// What the loop of the run goes by.
+/// Check the counters that control the run.
 static void check_counters(const bt_running *running, bt_snapshot *snap)
 {
     double sum = 0, shared = 0;

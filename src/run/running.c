@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // A run in its three parts: begin (field, world, record), step, and end (summary, last checkpoint). The commands and
-// the library (bergtow/simulation.h) go through the same three.
+// the library (bergtow/simulation.h) use the same three.
 //
-// Ranks. Whatever can differ between ranks (an error, a signal) is agreed on once a step, after the sample and before
-// the frame, so that all leave the loop after the same step; every other collective call is made with an agreed status.
+// Ranks. Ranks agree on everything that may differ between them (an error, a signal) once per step, after the sample
+// and before the frame, so that all leave the loop after the same step; every other collective call is made with an
+// agreed status.
 #include <inttypes.h>
 #include <math.h>
 #include <omp.h>
@@ -47,7 +48,7 @@ static void clock_part(run *running, double *part)
     running->clocked = now;
 }
 
-/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it.
+/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead; then all ranks get the field.
 /// lead: on rank 0.
 static bt_status make_field(const bt_comm *comm, const bt_case *input, const char *fields, bt_field *field,
                             bt_lead_stats *lead, bt_errors *err)
@@ -56,7 +57,7 @@ static bt_status make_field(const bt_comm *comm, const bt_case *input, const cha
     if (comm->rank == 0)
         status = bt_cost_fits(input, bt_case_floes_made(input) + input->n_floes, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_field_load_kept(fields, input, field, err);
-    // a field that was read has only now a number
+    // the number of floes in a field file is known only now
     if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(input, field->n, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(input, field, lead, err);
     bt_comm_rest(comm);
@@ -65,14 +66,14 @@ static bt_status make_field(const bt_comm *comm, const bt_case *input, const cha
     return status;
 }
 
-/// Collective. kept: go on from there, or NULL for a fresh run.
+/// Collective. Open the record. kept: the checkpoint to resume from, or NULL for a fresh run.
 static bt_status open_record(run *running, bt_snapshot *kept, bt_errors *err)
 {
     bt_record_bodies bodies;
     bt_status status = bt_gather_bodies(running->comm, running->w, &running->roster, &bodies, err);
     if (status != BT_OK) return status;
     bodies.outlines = &running->totals.outlines;
-    // steps that are made again leave the result that they belong to
+    // repeated steps must not replace the existing result
     const bool again = kept || running->until >= 0;
     status =
         again ? bt_record_reopen(&running->record, running->comm, running->o->dir, running->c, &bodies,
@@ -112,7 +113,7 @@ static bt_status record_frame(run *running, bt_errors *err)
     return status;
 }
 
-/// Numbers of the run that follow from the field, which only rank 0 keeps from then on.
+/// Set the numbers of the run that follow from the field; from then on only rank 0 keeps the field.
 static void keep_field(run *running, bt_field *field, const bt_lead_stats *lead, int threads)
 {
     double thickness, radius;
@@ -142,7 +143,7 @@ static void keep_field(run *running, bt_field *field, const bt_lead_stats *lead,
     *field = (bt_field){0};
 }
 
-/// Collective. The folder is this call's alone, or has been its caller's. *lock: on rank 0.
+/// Collective. Lock the folder for this call, unless the caller holds it. *lock: on rank 0.
 static bt_status take_folder(const bt_comm *comm, const char *dir, bool held, int *lock, bt_errors *err)
 {
     bt_status status = BT_OK;
@@ -159,12 +160,12 @@ int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked)
 {
     if (asked > 0) return asked;
     if (input->run.threads > 0) return (int)input->run.threads;
-    const int share = bt_cores_share(comm); // by all ranks, whatever the environment of each
+    const int share = bt_cores_share(comm); // called by all ranks, whatever the environment of each
     return getenv("OMP_NUM_THREADS") ? omp_get_max_threads() : share;
 }
 
-// Ranks wait for each other, and what one of them gains in a second says little. The validation build has all threads
-// at work, for the thread sanitizer.
+// Not with several ranks, which wait for each other, so that the gain of one says little; nor in the validation build,
+// where all threads work for the thread sanitizer.
 #ifdef BT_VALIDATE
 enum { PACED = 0 };
 #else
@@ -183,7 +184,7 @@ static void start_threads(int n)
     pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
-/// Field, world and cells, distributed to the ranks. kept: as it left them, or NULL.
+/// Set up field, world and cells, distributed to the ranks. kept: the checkpoint with their state, or NULL.
 static bt_status set_up(run *running, bt_snapshot *kept, bt_errors *err)
 {
     const int threads = bt_run_threads(running->comm, running->c, running->o->threads);
@@ -215,7 +216,7 @@ static bt_status set_up(run *running, bt_snapshot *kept, bt_errors *err)
     return status;
 }
 
-/// The record is open, and the steps of this call are known.
+/// Begin the steps of this call once the record is open: last step, progress, guards, first frame.
 static bt_status begin_steps(run *running, bool fresh, bt_errors *err)
 {
     const int64_t whole = bt_case_steps(running->c), asked = running->first_step + running->o->max_steps;
@@ -224,7 +225,7 @@ static bt_status begin_steps(run *running, bool fresh, bt_errors *err)
     running->progress = (bt_progress){.interval = running->c->output.progress, .n_steps = running->end_step,
                                       .quiet = running->o->quiet};
     bt_progress_start(&running->progress, running->w->step);
-    const double energy = running->guard.energy; // of the start, from a checkpoint
+    const double energy = running->guard.energy; // from a checkpoint: that of the start
     bt_guard_begin(&running->guard, running->c, running->w, &running->roster);
     if (energy > 0) running->guard.energy = energy;
     clock_part(running, &running->totals.call.record);
@@ -253,14 +254,14 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
     running->until = manner->until;
     running->clocked = options->began > 0 ? options->began : manner->start;
     clock_part(running, &running->totals.call.program);
-    // before the field is made, which may take long: of what has been read
+    // before the field is made, which may take long: digests of the files as read
     if (running->halt.first && options->dir && !manner->kept) running->digests = bt_case_digests(input);
     bt_status status = set_up(running, manner->kept, err);
-    // Only now: a case that is refused leaves nothing behind.
+    // Only now: a rejected case leaves nothing behind.
     if (status == BT_OK && options->dir && !manner->held)
         status = take_folder(comm, options->dir, options->held, &manner->lock, err);
     if (status != BT_OK) return status;
-    bt_halt_begin(&running->halt); // before the record, which says to whoever looks that the run has begun
+    bt_halt_begin(&running->halt); // before the record, which shows that the run has begun
     if (options->dir) status = open_record(running, manner->kept, err);
     running->begun = status == BT_OK;
     if (running->begun) return begin_steps(running, !manner->kept, err);
@@ -270,7 +271,7 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
 
 // --- step ------------------------------------------------------------------------------------------------------------
 
-/// Collective, once a step. The worst status of all ranks, and what any of them was asked for.
+/// Collective, once per step. The worst status of all ranks, and the requests to any of them.
 static bt_status agree(run *running, bt_status status)
 {
     running->asked = bt_halt_look(&running->halt, running->w->step);
@@ -288,7 +289,7 @@ static void add_phases(bt_run_totals *totals, const bt_step_stats *st)
 #undef ADD
 }
 
-/// A frame at the first step at or after each multiple of the interval, and at the end.
+/// Take a frame at the first step at or after each multiple of the interval, and at the end.
 static bt_status frame_if_due(run *running, double time, bt_errors *err)
 {
     if (!bt_running_draws(running->c)) return BT_OK;
@@ -301,7 +302,7 @@ static bt_status frame_if_due(run *running, double time, bt_errors *err)
     return record_frame(running, err);
 }
 
-/// A force law could not say what it does.
+/// Report the force laws that have failed.
 static bt_status tell_failed(const bt_forces *forces, bt_errors *err)
 {
     return bt_fail(err, BT_ERR_NUMERIC, "force %s: %s; the run ends here", forces->failed->name, forces->why);
@@ -312,7 +313,7 @@ bool bt_running_goes_on(const bt_running *running)
     return running->w->step < running->end_step && !bt_halt_stops(running->asked);
 }
 
-/// s of all threads of this process on a core.
+/// Processor time of all threads of this process, s.
 static double processor_time(void)
 {
     struct timespec t;
@@ -324,7 +325,7 @@ static void step_at_pace(bt_world *world, bt_pace *pace)
     if (pace->now != omp_get_max_threads()) start_threads(pace->now);
     const double wall = bt_clock(), cpu = processor_time();
     bt_world_step(world);
-    // not in the step itself: fields are shaken by steps that are not meant to converge
+    // not in the step itself: steps that shake fields are not meant to converge
     const bt_lock lock = world->stats.converged ? (bt_lock){0} : bt_locked(world);
     world->stats.locked = lock.found;
     world->stats.no_load = lock.towed;
@@ -359,7 +360,7 @@ bt_status bt_running_step(bt_running *running, bt_errors *err)
     bt_stall_step(&running->totals.stall, world, sample->ice_resistance, sample->tow_force, running->roster.mean_size);
     const bt_status sound = world->forces->failed ? tell_failed(world->forces, err)
                                                   : bt_guard_check(&running->guard, world, sample, err);
-    // what is not has been reported, and the series hold numbers only
+    // faults have been reported, and the series hold valid numbers only
     const bool writable = sound == BT_OK || !bt_sample_fault(sample, bt_observe_applies(world));
     if (status == BT_OK && running->record && writable) status = bt_record_sample(running->record, sample, err);
     if (status == BT_OK && running->record) status = bt_record_events(running->record, &world->events, err);
@@ -367,7 +368,7 @@ bt_status bt_running_step(bt_running *running, bt_errors *err)
     status = agree(running, status);
     if (status == BT_ERR_NUMERIC) bt_guard_name(&running->guard, world, err);
     if (status == BT_OK) status = frame_if_due(running, sample->time, err);
-    const bool saves = running->record && bt_halt_saves(running->asked); // at the end one is written anyway
+    const bool saves = running->record && bt_halt_saves(running->asked); // at the end a checkpoint is written anyway
     if (status == BT_OK && saves && bt_running_goes_on(running))
         status = bt_running_checkpoint(running, BT_CHECKPOINT_FILE, err);
     bt_progress_step(&running->progress, world->step, sample->time, sample->ice_resistance);
@@ -378,7 +379,7 @@ bt_status bt_running_step(bt_running *running, bt_errors *err)
 
 // --- end -------------------------------------------------------------------------------------------------------------
 
-/// Collective. Floes whose centroid has left the domain where it is not periodic.
+/// Collective. Number of floes whose centroid has left the domain across an edge that is not periodic.
 static int64_t count_outside(const run *running)
 {
     const bt_bodies *bodies = &running->w->bodies;
@@ -397,7 +398,7 @@ static int64_t count_outside(const run *running)
     return all;
 }
 
-/// Collective.
+/// Collective. Record how the field was divided among ranks.
 static void note_division(run *running)
 {
     const bt_domain_stats stats = bt_domain_get_stats(running->w);
@@ -412,7 +413,7 @@ static void note_division(run *running)
     bt_comm_before(running->comm, stats.moved, &running->totals.moved_floes);
 }
 
-/// Collective. Peak memory of all ranks, and the bytes that a sweep goes through for a contact point.
+/// Collective. Peak memory of all ranks, and the bytes that a sweep reads per contact point.
 static void measure_memory(run *running)
 {
     const bt_cells *cells = running->w->cells;
@@ -433,7 +434,7 @@ static void measure_memory(run *running)
         bt_sum_value(&sums[2]) > 0 ? bt_sum_value(&sums[1]) / bt_sum_value(&sums[2]) : NAN;
 }
 
-/// Numbers of the end of the run.
+/// Set the totals at the end of the run.
 static void total_up(run *running)
 {
     running->totals.n_steps = running->w->step;
@@ -450,9 +451,9 @@ static void total_up(run *running)
     note_division(running);
 }
 
-/// Collective. Guards and deepest overlap of the state that the last step has left, which no further step looks at. Its
-/// contacts are looked for as the next step would, so the number is the same after any resume and on any ranks; the
-/// state has been saved, and none of it is written from here on.
+/// Collective. Guards and deepest overlap of the state after the last step, which no further step checks. Contacts are
+/// detected as the next step would, so the number is the same after any resume and on any ranks; the state has been
+/// saved, and nothing of it is written afterwards.
 static bt_status look_last(run *running, bt_errors *err)
 {
     const double overlap = bt_contacts_overlap(running->w);
@@ -468,13 +469,13 @@ static bool ends_early(const run *running)
     return bt_halt_stops(running->asked) && running->w->step < running->end_step;
 }
 
-/// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order.
+/// Collective. Write record, summary and last checkpoint of a run whose steps ended normally.
 static bt_status finish(run *running, bt_errors *err)
 {
     char stopped[96] = "";
     bt_snapshot snap = {0};
     const double t0 = bt_clock();
-    bt_status status = bt_running_save(running, &snap, BT_CHECKPOINT_FILE, err); // before what is still open is closed
+    bt_status status = bt_running_save(running, &snap, BT_CHECKPOINT_FILE, err); // before open events are closed
     clock_part(running, &running->totals.call.steps);
     running->totals.phases.output += running->clocked - t0;
     running->totals.wall_time += running->clocked - running->began;
@@ -500,7 +501,7 @@ static bt_status finish(run *running, bt_errors *err)
     return status;
 }
 
-/// Collective. status: of the last step.
+/// Collective. End the steps and the record. status: of the last step.
 static bt_status close_steps(run *running, bt_status status, bt_errors *err)
 {
     bt_progress_end(&running->progress);
@@ -510,7 +511,7 @@ static bt_status close_steps(run *running, bt_status status, bt_errors *err)
     } else if (status == BT_OK) {
         status = running->record ? finish(running, err) : look_last(running, err);
     } else if (running->record) {
-        bt_errors more = {0}; // after a failed write another one says nothing new
+        bt_errors more = {0}; // after a failed write further errors say nothing new
         bt_record_close(running->record, NULL, NULL, false, status == BT_ERR_IO ? &more : err);
         bt_errors_free(&more);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Builds the world of a case; every derived mass, drag and frame term is formed here and nowhere else.
+// Builds the world of a case; all derived masses, drag coefficients and frame terms are formed here and nowhere else.
 #include "run/setup.h"
 #include "base/inside.h"
 
@@ -26,15 +26,16 @@
 
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
 #define LARGE_RATIO                                                                                                    \
-    8.0 // a floe with more than this times the mean radius is in no cell: cells fit the largest of the others
+    8.0 // factor on the mean radius: larger floes are in no cell, so that cells fit the largest of the others
 
 bt_params bt_setup_params(const bt_case *input, double size)
 {
     const double f = 2 * EARTH_RATE * bt_sin(input->water.latitude);
     // Seen from above the geographic frame (x north, y east) is left-handed: dVx/dt = −f Vy, dVy/dt = +f Vx; the
-    // basin's frame is right-handed and the signs swap. In both a body turns right in the north.
+    // basin's frame is right-handed and the signs swap. In both a body is deflected to the right in the northern
+    // hemisphere.
     const double turn = input->domain.frame == BT_FRAME_GEOGRAPHIC ? f : -f;
-    double water[2], air[2]; // at time zero; where they change, each step sets its own
+    double water[2], air[2]; // at time zero; if they change, each step sets its own
     bt_environment_at(input, true, 0, water);
     bt_environment_at(input, false, 0, air);
     bt_params par = {
@@ -115,7 +116,7 @@ bt_tow *bt_setup_tow(const bt_case *input)
         memcpy(tow->programme, input->tow.programme, (size_t)tow->n_programme * 2 * sizeof *tow->programme);
     }
     char why[200];
-    // Straight on needs no path, but for the vessel, which has to find its place on it.
+    // A straight course needs no path, except for the vessel, which has to find its place on it.
     if (input->tow.n_waypoints > 0 || thrust) bt_case_tow_path(input, &tow->path, why);
     if (thrust) {
         const double speed = bt_tow_speed(tow, 0);
@@ -158,7 +159,7 @@ static void add_field(const bt_case *input, const bt_field *field, bt_world *wor
         bt_body_def def = {.motion = BT_DYNAMIC, .x = pose[0], .y = pose[1], .yaw = pose[2]};
         const int n = (int)(field->offsets[i + 1] - first);
         floe_def(input, n, field->vertices + 2 * first, field->thickness[i], &def);
-        // The parts follow from the outline alone: the same on every rank, and nothing that a field file need hold.
+        // The parts follow from the outline alone: they are the same on every rank, and need not be in a field file.
         bt_parts parts;
         if (field->outlines.split && !bt_outline_convex(n, def.vertices) && bt_outline_split(n, def.vertices, &parts))
             def.parts = &parts;
@@ -167,7 +168,7 @@ static void add_field(const bt_case *input, const bt_field *field, bt_world *wor
     }
 }
 
-/// Turn the outline by yaw and move it to (x, y), or back.
+/// Rotate the outline by yaw and move it to (x, y), or back.
 static void carry(int n, double *v, double x, double y, double yaw, bool back)
 {
     double s, c;
@@ -179,8 +180,7 @@ static void carry(int n, double *v, double x, double y, double yaw, bool back)
     }
 }
 
-/// Outlines of the floes by hand [n_floes], about their places: those of fixed ones that lie flush have common
-/// vertices.
+/// Outlines of the floes by hand [n_floes], relative to their places: fixed floes that lie flush share vertices.
 static bt_welded *outlines_by_hand(const bt_case *input, const bt_world *world)
 {
     bt_welded *all = bt_alloc((size_t)input->n_floes, sizeof *all),
@@ -287,7 +287,7 @@ static void add_wall(const bt_case *input, bt_world *world, double x, double y, 
     bt_world_add(world, &def);
 }
 
-/// Does body i begin with its free drift?
+/// Does body i start with its free drift?
 static bool begins_adrift(const bt_case *input, const bt_world *world, bt_idx i, const bt_roster *roster)
 {
     const bt_gid g = world->bodies.gid[i], row = bt_roster_row(roster, g);
@@ -296,9 +296,9 @@ static bool begins_adrift(const bt_case *input, const bt_world *world, bt_idx i,
            (g == world->towed ? isnan(input->body.vx) : isnan(input->floes[row - roster->n_free].vx));
 }
 
-/// Free drift to the floes of the field, and to floes by hand and a free body whose velocity is not given.
-/// Ice between walls has nowhere to drift across them: it has been there for long, and lies against one of them. False
-/// when it was not found.
+/// Give free drift to the floes of the field, and to floes by hand and a free body without a given velocity.
+/// Ice between walls does not drift across them: it has been there for long, and lies against one of them. False if no
+/// balance was found.
 static bool begin_drift(const bt_case *input, bt_world *world, const bt_roster *roster, bt_errors *err)
 {
     bt_bodies *bodies = &world->bodies;
@@ -320,8 +320,8 @@ static bool begin_drift(const bt_case *input, bt_world *world, const bt_roster *
     return lost == 0;
 }
 
-/// Floes in company. In a field their lee and their drift follow from each other: from the drift of lone floes, in
-/// rounds, every floe with the factors of all (exposure.h), which undisturbed ice keeps.
+/// Free drift of floes in each other's lee. Lee and drift depend on each other: iterate from the drift of single floes,
+/// every floe with the mean factors of all (exposure.h), which undisturbed ice keeps.
 static bool begin_sheltered(const bt_case *input, bt_world *world, const bt_roster *roster, bt_errors *err)
 {
     enum { ROUNDS = 2 };
@@ -338,7 +338,7 @@ static bool begin_sheltered(const bt_case *input, bt_world *world, const bt_rost
     return found;
 }
 
-/// A world with one round floe of this size and thickness, with the lee of others at this concentration.
+/// A world with one round floe of this size and thickness (m), in the lee of others at this concentration.
 static bt_world *one_floe(const bt_case *input, double size, double thickness, double concentration)
 {
     bt_params par = bt_setup_params(input, size);
@@ -361,7 +361,7 @@ void bt_setup_drift(const bt_case *input, double size, double thickness, double 
     bt_world *world = one_floe(input, size, thickness, concentration);
     double thicknesses[2];
     bt_roster alone = {.n_floes = 1, .n_free = 1, .thickness = thicknesses};
-    bt_errors unfound = {0}; // NaN says it
+    bt_errors unfound = {0}; // NaN reports it
     if (input->body.shape != BT_BODY_ABSENT) add_towed_body(input, world, &alone);
     if (begin_drift(input, world, &alone, &unfound)) {
         floe[0] = world->bodies.vel[0].x, floe[1] = world->bodies.vel[0].y;
@@ -372,7 +372,7 @@ void bt_setup_drift(const bt_case *input, double size, double thickness, double 
     bt_world_free(world);
 }
 
-/// Along which axes undisturbed ice rests, as step/window.h says.
+/// The axes along which undisturbed ice rests (step/window.h).
 static void held_ice(const bt_case *input, double concentration, bool held[2])
 {
     const bool dense = concentration >= BT_BOUND_CONCENTRATION - BT_MADE_OFF,
@@ -392,7 +392,7 @@ bt_track bt_setup_track(const bt_case *input, double size, double thickness, dou
     bt_world *world = one_floe(&coarse, size, thickness, concentration);
     world->environment = bt_environment_create(&coarse);
     bt_errors unfound = {0};
-    // where it is not found from rest, as undisturbed ice goes on
+    // if not found, from rest; undisturbed ice continues from there
     begin_drift(&coarse, world, &(bt_roster){.n_floes = 1, .n_free = 1}, &unfound);
     bt_errors_free(&unfound);
     bool held[2];
@@ -425,8 +425,8 @@ void bt_setup_track_free(bt_track *track)
 
 static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
 
-/// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners. Each pair of
-/// bodies touches as one image: around a period a wall goes on for as far as any body reaches beyond the seam.
+/// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners. A pair of
+/// bodies touches at one image only: along a period a wall extends as far as any body reaches beyond the seam.
 static int add_walls(const bt_case *input, bt_world *world, const char *names[4])
 {
     double thick = bt_max(0.1 * bt_max(input->domain.length, input->domain.width), 5 * world->par.size);
@@ -453,7 +453,7 @@ static int add_walls(const bt_case *input, bt_world *world, const char *names[4]
     return n;
 }
 
-/// Ids for the pieces of floes: each split makes one floe more, of two new ids.
+/// Number of ids reserved for pieces of floes: each split adds one floe and takes two new ids.
 static bt_gid kept_ids(const bt_case *input, const bt_field *field)
 {
     if (!(input->ice.splitting.toughness > 0)) return 0;
@@ -521,11 +521,11 @@ bt_status bt_setup_world(const bt_case *input, const bt_field *field, bt_world *
     if (!begin_sheltered(input, world, roster, err)) return BT_ERR_CASE;
     bool held[2];
     held_ice(input, field->concentration, held);
-    // floes by hand are no ice beside a field
+    // besides a field, floes by hand do not count as ice
     if (with_body) bt_undisturbed_create(world, field->n > 0 ? field->n : roster->n_floes + roster->n_kept, held);
     if (input->domain.ends == BT_BOUND_MOVING && with_body)
         bt_window_create(world, bt_case_tow_sign(input), input->domain.ahead, roster->n_floes);
-    // all have just been looked at: what rests needs no first step to show it
+    // velocities are known: bodies at rest need no first step to show it
     memset(world->bodies.disturbed, 0, (size_t)world->bodies.n);
     return BT_OK;
 }

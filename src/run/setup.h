@@ -11,19 +11,19 @@
 #include "tow/tow.h"
 
 /// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:
-/// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
+/// BT_ERR_CASE (from a field file: a floe outside the domain or overlapping the body).
 bt_status bt_setup_world(const bt_case *input, const bt_field *field, bt_world **world, bt_roster *roster,
                          bt_errors *err);
 
-/// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) in ice of this concentration,
-/// whose lee is estimated (force/exposure.h), into floe, and of the towed body into body, m/s; NaN where ice.start, the
-/// tow or a velocity that is given has it otherwise.
+/// Free drift at time zero (force/drift.h), m/s: `floe`, of a round floe of this size and thickness (m) in ice of this
+/// concentration, with an estimated lee (force/exposure.h); `body`, of the towed body. NaN if ice.start, the tow or a
+/// given velocity sets it otherwise.
 void bt_setup_drift(const bt_case *input, double size, double thickness, double concentration, double floe[2],
                     double body[2]);
 
-/// Track of the towed body through the ice as the tow is planned (the end of a line in place of the body that it
-/// pulls), with the mean floe, round, of this size and thickness (m), in free drift, in ice of this concentration.
-/// Empty without a tow. Release with bt_setup_track_free.
+/// Planned track of the towed body through the ice (with a line, the track of its end), where the ice is in free drift:
+/// a round mean floe of this size and thickness (m) at this concentration. Empty without a tow. Release with
+/// bt_setup_track_free.
 bt_track bt_setup_track(const bt_case *input, double size, double thickness, double concentration);
 void bt_setup_track_free(bt_track *track);
 
@@ -32,15 +32,15 @@ bt_params bt_setup_params(const bt_case *input, double size);
 
 // --- parts of it (private to setup*.c) -------------------------------------------------------------------------------
 
-/// Is the field one of this domain, and is there room for it until walls have closed? Otherwise a message.
+/// Does the field belong to this domain, and does it have room until walls have closed? Otherwise a message.
 bool bt_setup_check_field(const bt_case *input, const bt_field *field, bt_errors *err);
 
 /// Are the bodies apart, also on prescribed paths, and does each have room within a period? Otherwise messages.
-/// first_wall: the walls are the bodies from there on.
+/// first_wall: index of the first wall; walls are the last bodies.
 bool bt_setup_check_bodies(const bt_case *input, bt_world *world, const bt_roster *roster, bt_idx first_wall,
                            bt_errors *err);
 
-/// The tow at time zero of a case that was checked; release with bt_tow_free.
+/// The tow at time zero of a checked case; release with bt_tow_free.
 bt_tow *bt_setup_tow(const bt_case *input);
 
 #endif

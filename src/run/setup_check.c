@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a case is refused for once its ice and its bodies are known: floes outside the domain, bodies that overlap or
+// Checks that can reject a case once its ice and bodies are known: floes outside the domain, bodies that overlap or
 // meet on prescribed paths, and domains without room.
 #include "run/setup.h"
 
@@ -15,7 +15,7 @@
 
 // --- the field -------------------------------------------------------------------------------------------------------
 
-/// Floes of a field that was read may belong to another domain.
+/// The floes of a field file may belong to another domain.
 static bool check_inside(const bt_case *input, const bt_field *field, bt_errors *err)
 {
     // A managed lead may cut a floe that reaches over an open edge, and leave a piece beyond it.
@@ -33,7 +33,7 @@ static bool check_inside(const bt_case *input, const bt_field *field, bt_errors 
     return true;
 }
 
-/// Walls that leave less room than the ice takes end any run; who has set guard.overlap: 0 wants to see it.
+/// Walls that leave less room than the ice needs end any run, so reject them; guard.overlap: 0 permits it.
 static bool check_closing(const bt_case *input, const bt_field *field, bt_errors *err)
 {
     const double made = field->n > 0 ? bt_field_floe_area(field) : bt_case_made_area(input),
@@ -55,8 +55,8 @@ bool bt_setup_check_field(const bt_case *input, const bt_field *field, bt_errors
 
 // --- the bodies ------------------------------------------------------------------------------------------------------
 
-/// Are the parts p of a and q of b, which lies d from a, apart, also while a moves on by (dx, dy) relative to b?
-/// Separating axes of the convex hull of both ends of the path: edge normals of a and of b, and the normal of the path.
+/// Are the parts p of a and q of b, at offset d from a, apart, also while a moves by (dx, dy) relative to b? Separating
+/// axes of the convex hull of both ends of the path: edge normals of a and of b, and the normal of the path.
 static bool parts_apart_on_path(const bt_world *world, bt_idx a, int p_first, bt_idx b, int q_first, const double d[2],
                                 double dx, double dy)
 {
@@ -97,7 +97,7 @@ static bool apart_on_path(const bt_world *world, bt_idx a, bt_idx b, const doubl
     return true;
 }
 
-/// The same for a displaced by from, and all images of b around the periods.
+/// The same for a displaced by `from`, and all images of b around the periods.
 static bool images_apart(const bt_world *world, bt_idx a, bt_idx b, const double from[2], double dx, double dy)
 {
     const double period[2] = {world->par.period_x, world->par.period_y}, way[2] = {dx, dy};
@@ -107,7 +107,7 @@ static bool images_apart(const bt_world *world, bt_idx a, bt_idx b, const double
     for (int k = 0; k < 2; k++) {
         d[k] -= from[k];
         if (!(period[k] > 0)) continue;
-        const double reach = world->bodies.radius[a] + world->bodies.radius[b]; // at either end of the way
+        const double reach = world->bodies.radius[a] + world->bodies.radius[b]; // at either end of the path
         low[k] = (int64_t)ceil((bt_min(way[k], 0) - reach - d[k]) / period[k]);
         high[k] = (int64_t)floor((bt_max(way[k], 0) + reach - d[k]) / period[k]);
     }
@@ -121,7 +121,7 @@ static bool images_apart(const bt_world *world, bt_idx a, bt_idx b, const double
     return apart;
 }
 
-/// Displacement from the start after this way of the tow, m.
+/// Displacement from the start, m, after this distance along the tow, m.
 static void tow_displacement(const bt_case *input, const bt_tow *tow, double way, double d[2])
 {
     d[0] = way * bt_cos(input->tow.direction);
@@ -134,14 +134,14 @@ static void tow_displacement(const bt_case *input, const bt_tow *tow, double way
     d[1] -= start[1];
 }
 
-/// Displacement of body m, of prescribed velocity, from the start until time t.
+/// Displacement of the prescribed body m from the start to time t, m.
 static void displacement(const bt_case *input, const bt_world *world, bt_idx m, double t, double d[2])
 {
     d[0] = world->bodies.vel[m].x * t, d[1] = world->bodies.vel[m].y * t;
     if (m == bt_world_towed(world)) tow_displacement(input, world->tow, bt_case_tow_led(input, t), d);
 }
 
-/// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
+/// Does j, on its path relative to i, meet it? A changing course is divided into straight pieces.
 static bool meet(const bt_case *input, const bt_world *world, bt_idx i, bt_idx j, bool wall)
 {
     const bool bent = input->tow.n_waypoints > 0 && (i == bt_world_towed(world) || j == bt_world_towed(world));
@@ -160,7 +160,7 @@ static bool meet(const bt_case *input, const bt_world *world, bt_idx i, bt_idx j
     return false;
 }
 
-/// Two bodies of infinite mass pass through each other without a contact: no prescribed path may cross such a body.
+/// Two bodies of infinite mass would pass through each other without a contact: no prescribed path may do so.
 static bool check_prescribed(const bt_case *input, const bt_world *world, const bt_roster *roster, bt_idx first_wall,
                              bt_errors *err)
 {
@@ -172,7 +172,7 @@ static bool check_prescribed(const bt_case *input, const bt_world *world, const 
             if (bodies->motion[j] == BT_DYNAMIC || i >= first_wall) continue;
             const bool towed = i == bt_world_towed(world) || j == bt_world_towed(world);
             if (j == bt_world_towed(world) || j >= first_wall) {
-                // Walls that stand may hold fixed bodies (piers) and were checked with the tow.
+                // Standing walls may overlap fixed bodies (piers), and were checked with the tow.
                 if (!meet(input, world, i, j, j >= first_wall)) continue;
                 bt_errors_add(
                     err,
@@ -196,12 +196,12 @@ static double reach_along(const bt_bodies *bodies, bt_idx i, int axis)
 }
 
 /// A pair has one contact, with the nearest image: across a period there must be room for both images apart. Fixed
-/// bodies do not turn, and do not meet each other.
+/// bodies do not rotate, and do not meet each other.
 static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_field, bt_idx first_wall,
                           bt_errors *err)
 {
     const bt_bodies *bodies = &world->bodies;
-    double first = 0, second = 0, fixed[2] = {0, 0}; // the two largest radii, and what fixed bodies reach
+    double first = 0, second = 0, fixed[2] = {0, 0}; // the two largest radii, and the reach of fixed bodies
     bt_idx longest[2] = {-1, -1};
     for (bt_idx i = 0; i < first_wall; i++) {
         for (int k = 0; k < 2 && bodies->motion[i] == BT_STATIC; k++) {
@@ -238,7 +238,7 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
     return sound;
 }
 
-/// What a body is to the user.
+/// Name of a body for messages.
 static void name_body(const bt_roster *roster, bt_gid gid, char out[64])
 {
     const bt_gid row = bt_roster_row(roster, gid);
@@ -247,8 +247,8 @@ static void name_body(const bt_roster *roster, bt_gid gid, char out[64])
     else snprintf(out, 64, "%s", roster->names[row - roster->n_floes]);
 }
 
-/// Nothing lies in anything else by more than the position projection takes out. Generated fields are free of overlap
-/// by construction; a field that was read, floes given by hand, body and walls may not be.
+/// Check that no bodies overlap by more than the position projection removes. Generated fields are free of overlap by
+/// construction; a field file, floes given by hand, body and walls may not be.
 static bool check_apart(const bt_case *input, bt_world *world, const bt_roster *roster, bt_errors *err)
 {
     const double allowed = bt_max(world->par.slop, 1e-9 * roster->mean_size);

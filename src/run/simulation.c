@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A simulation that a program steps; see bergtow/simulation.h. Steps are those of a run (run_parts.h); what stands here
-// is the way in and out of it: options, texts of errors, arrays by the ids of bodies.
+// A simulation that a program steps; see bergtow/simulation.h. Steps are those of a run (run_parts.h); this file has
+// the interface: options, texts of errors, arrays by the ids of bodies.
 #include "bergtow/simulation.h"
 
 #include <math.h>
@@ -32,13 +32,13 @@
 struct bt_simulation {
     bt_case c;
     bt_run_options o;
-    char *dir, *from, *command_line; ///< what o points to
+    char *dir, *from, *command_line; ///< texts to which o points
     bt_running r;
     bt_run_manner m;
     bt_status status;         ///< of the last step
-    char *why;                ///< it failed, or NULL
-    bool *moved;              ///< [bodies] put elsewhere since the last step; NULL = none
-    bool alone;               ///< no force was applied in any step
+    char *why;                ///< reason of a failure, or NULL
+    bool *moved;              ///< [bodies] moved by hand since the last step; NULL = none
+    bool alone;               ///< no applied force in any step
 };
 
 // --- texts of errors -------------------------------------------------------------------------------------------------
@@ -47,7 +47,7 @@ static char *last_error;
 
 const char *bt_last_error(void) { return last_error ? last_error : ""; }
 
-/// Keep and release the texts of a call; the status goes through.
+/// Keep the texts of a call for the program, release them here, and return the status.
 static bt_status reported(bt_status status, bt_errors *err)
 {
     bt_comm_errors(bt_comm_world(), err);
@@ -69,7 +69,7 @@ static bt_status refuse(const char *why)
     return reported(BT_ERR_USAGE, &err);
 }
 
-/// Whose step is under way: forces and quantities that it calls may look at it, and must leave it as it is.
+/// The simulation whose step is in progress: forces and quantities that it calls may read it, but not change it.
 static const bt_simulation *stepping;
 
 static bt_status refuse_within(void)
@@ -96,7 +96,7 @@ static bt_status read_case(bt_case *input, const bt_simulation_options *options,
 
 static char *copy_of(const char *text) { return text ? bt_text_copy(text) : NULL; }
 
-/// A place as an absolute path: the program may change its working folder while the simulation lasts.
+/// A path as an absolute path: the program may change its working folder while the simulation lasts.
 static char *place_of(const char *path)
 {
     char *here = path && *path && *path != '/' ? getcwd(NULL, 0) : NULL;
@@ -153,7 +153,7 @@ static bt_status check_numbers(const bt_simulation_options *options, bt_errors *
                    options->threads, BT_MOST_THREADS);
 }
 
-/// The end of create and resume.
+/// Common end of create and resume.
 static bt_status hand_out(bt_simulation **out, bt_simulation *sim, bt_status status, bt_errors *err)
 {
     *out = status == BT_OK ? sim : NULL;
@@ -204,7 +204,7 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
     return hand_out(out, sim, status, &err);
 }
 
-/// Can the state before the step that failed be made again from what the folder holds, and nothing else?
+/// Can the state before the failed step be computed again from the folder alone?
 static bool keeps_failure(const bt_simulation *sim)
 {
     const bool unsound = sim->status == BT_ERR_NUMERIC && sim->r.w->step > sim->r.first_step;
@@ -220,7 +220,7 @@ static void forget_moved(bt_simulation *sim)
 bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
 {
     bt_errors err = {0};
-    if (stepping) return refuse_within(); // of any: applied forces have the bodies of one world at a time
+    if (stepping) return refuse_within(); // of any simulation: applied forces hold the bodies of one world at a time
     if (sim->status != BT_OK) return refuse("a step has failed before; end the simulation");
     sim->alone = sim->alone && !bt_force_is_applied();
     if (n > 0) forget_moved(sim);
@@ -239,7 +239,7 @@ bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
     return status;
 }
 
-/// Collective. The parts, and the state before a step that was not sound.
+/// Collective. End the run, and keep the state before a step that was not sound.
 static bt_status close_parts(bt_simulation *sim, bt_status status, bt_errors *err)
 {
     const bool keep = keeps_failure(sim);
@@ -248,7 +248,7 @@ static bt_status close_parts(bt_simulation *sim, bt_status status, bt_errors *er
     return status;
 }
 
-/// Texts that stand one a line in `text`.
+/// Add the texts in the lines of `text`.
 static void add_lines(bt_errors *err, const char *text)
 {
     char *copy = bt_text_copy(text), *rest = copy;
@@ -371,7 +371,7 @@ int64_t bt_simulation_outline(const bt_simulation *sim, int64_t id, double *xy, 
 
 #define NO_EDIT "a step has failed, or was the last: there is no next one for which a body could be changed"
 
-/// What a frame or a checkpoint has of this step is no longer the state.
+/// After an edit, a frame or checkpoint of this step no longer shows the state.
 static bt_status edited(bt_simulation *sim, bt_status status, bt_errors *err)
 {
     if (status == BT_OK) {
@@ -426,7 +426,7 @@ bt_status bt_simulation_quantity(const bt_simulation *sim, const char *name, dou
     return BT_OK;
 }
 
-/// Arms from body a, from their components along normal and tangent: r·n = r×t, r·t = −r×n.
+/// Columns of a contact; arms from body a follow from r·n = r×t, r·t = −r×n.
 static void columns_of(const bt_bodies *bodies, const bt_contact *contact, double *out)
 {
     const bt_pose *pose = &bodies->pose[contact->a];
@@ -443,7 +443,7 @@ static void columns_of(const bt_bodies *bodies, const bt_contact *contact, doubl
            BT_CONTACT_COLUMNS * sizeof *out);
 }
 
-/// Its bodies are where the last step left them: of one that was put elsewhere the contact is over.
+/// Are both bodies where the last step left them? Moving a body by hand ends its contacts.
 static bool still_there(const bt_simulation *sim, const bt_contact *contact)
 {
     const bt_gid *gid = sim->r.w->bodies.gid;
@@ -480,7 +480,7 @@ bt_status bt_case_check_text(const bt_simulation_options *options, char **resolv
 
 char *bt_case_unused(const char *text)
 {
-    double row[2][3] = {{0}, {1e300}}; // in place of tables that the text names
+    double row[2][3] = {{0}, {1e300}}; // replaces tables that the text names
     const bt_table table = {.n = 2, .row = row[0]};
     bt_errors unheard = {0};
     bt_case input;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Members of a study: which values each takes.
+// Members of a study: the values that each takes.
 #include "bergtow/study.h"
 
 #include <inttypes.h>
@@ -102,7 +102,7 @@ void bt_member_free(bt_member *member)
     *member = (bt_member){0};
 }
 
-/// A title of the study names its members, which that of the base, of one condition, would name wrongly.
+/// Title of a member from that of the study; the title of the base case, of one condition, would be wrong.
 static void name_member(const bt_study *study, const bt_member *member, bt_case *input)
 {
     for (int i = 0; i < member->n_set; i++)
@@ -159,7 +159,7 @@ bool bt_study_resolved_alike(const char *a, const char *b)
     return true;
 }
 
-/// A choice of a study, as it is written.
+/// The word for a choice in a study.
 static const char *word(const char *key, unsigned choice)
 {
     return bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, key)].choices[choice];
@@ -203,9 +203,9 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err)
     return bt_text_end(&text);
 }
 
-// --- what some members alone get -------------------------------------------------------------------------------------
+// --- keys that only some members get ---------------------------------------------------------------------------------
 
-// What a study gives to some of its members alone; reasons in study.h.
+// Keys that only some members get; reasons in study.h.
 
 static bt_study_setting *add_sets(bt_study_setting *to, const bt_study_variant *variant, int n, const char *section)
 {
@@ -216,7 +216,7 @@ static bt_study_setting *add_sets(bt_study_setting *to, const bt_study_variant *
     return to;
 }
 
-/// All of them, those of parameters first; the caller frees the list.
+/// List all such keys, those of parameters first; the caller frees the list.
 static bt_study_setting *study_settings(const bt_study *study, int *n)
 {
     size_t most = (size_t)study->n_parameters + 1;
@@ -253,7 +253,7 @@ const char *bt_study_varied(const bt_study *study, const char *key)
     return section;
 }
 
-/// Those of one key together, in the order of the list.
+/// Order that brings equal keys together, in the order of the list.
 static int by_key_in_list(const void *a, const void *b)
 {
     const bt_study_setting *p = *(const bt_study_setting *const *)a, *q = *(const bt_study_setting *const *)b;
@@ -284,7 +284,7 @@ void bt_study_check_axes(const bt_study *study, bt_errors *err)
     free(list);
 }
 
-/// What no condition looked at so far contradicts.
+/// The verdict that the conditions read so far leave open.
 typedef struct {
     bt_study_setting *list;
     bool *idle; ///< [n] the key has no effect
@@ -343,7 +343,7 @@ void bt_study_check_ice(const bt_study *study, bt_errors *err)
 
 // The files that the cases of a study name; reasons in study.h.
 
-/// Take over a path. A file that cannot be read is left out.
+/// Take over a path. A file that cannot be read is skipped.
 static void add(bt_study_files *files, char *path)
 {
     bt_named_file file = {.path = path};
@@ -365,7 +365,7 @@ static char *text_of(const bt_key *key, const bt_case *input)
     return text ? bt_text_copy(text) : NULL;
 }
 
-/// The file that a text says for a key that stands in a study; the path is relative to the base case, as in a member.
+/// The file that a value names for a key in a study; its path is relative to the base case, as in a member.
 static char *file_of(const bt_study *study, const bt_key *key, const char *value)
 {
     bt_case scratch;
@@ -466,7 +466,7 @@ bt_status bt_study_files_same(bt_study_files *files, bt_errors *err)
     for (int i = 0; i < files->n; i++) {
         bt_named_file *file = &files->list[i], now = {0};
         bt_errors unheard = {0};
-        // of one that is gone a member says so
+        // a missing file is reported by a member
         if (stat(file->path, &now.seen) != 0 || same_stat(&file->seen, &now.seen)) continue;
         const bool read = bt_checksum_digest_file(file->path, now.digest, &now.bytes, &unheard) == BT_OK;
         bt_errors_free(&unheard);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What reading a study is made of, beside bergtow/study.h.
+// Parts of reading a study, besides bergtow/study.h.
 #ifndef BT_STUDY_H
 #define BT_STUDY_H
 
@@ -9,39 +9,39 @@
 #include "base/checksum.h"
 #include "base/tree.h"
 
-// --- what some members alone get -------------------------------------------------------------------------------------
+// --- keys that only some members get ---------------------------------------------------------------------------------
 
-// What a study gives to some of its members alone: keys of parameters, of variants, and of `with`.
+// Keys that a study gives only to some of its members: of parameters, of variants, and of `with`.
 
-/// A key that some members get. The texts are the study's.
+/// A key that only some members get. The texts belong to the study.
 typedef struct {
     const char *text;    ///< the key, or "key=value"
     int length;          ///< of the key
-    const char *at;      ///< where it stands, "FILE:LINE: "
+    const char *at;      ///< its place, "FILE:LINE: "
     const char *section; ///< parameters, variants or with
     int axis;            ///< the parameter that decides who gets it
 } bt_study_setting;
 
-/// The section in which a key is given to some members alone, NULL = none.
+/// The section in which a key is given to only some members, NULL = none.
 const char *bt_study_varied(const bt_study *study, const char *key);
 
-/// A member has one value of a key: an error for each key that two parameters decide, of which the study would run one
-/// and record the other.
+/// Add an error for each key that two parameters set: a member has one value of a key, so the study would run one and
+/// record the other.
 void bt_study_check_axes(const bt_study *study, bt_errors *err);
 
-/// Errors for what makes members that are the same run: more than one field where no condition has ice that depends on
-/// the seed, and keys of how ice is made where all conditions read theirs. Reads conditions until one has neither; what
-/// is wrong with a case is not said here.
+/// Add errors if members would be the same run: more than one field although no condition has ice that depends on the
+/// seed, or keys for making ice although all conditions read theirs. Reads conditions until one rules out both; errors
+/// in a case are not reported here.
 void bt_study_check_ice(const bt_study *study, bt_errors *err);
 
 // --- files that a study names ----------------------------------------------------------------------------------------
 
-// The files that the cases of a study name: fields, outlines, tables. A case says their paths alone, so what they hold
-// is kept beside study.resolved.yml, in the file study.files, a line each:
+// The files that the cases of a study name: fields, outlines, tables. A case holds only their paths, so digests of
+// their contents are kept beside study.resolved.yml, in the file study.files, one line each:
 //
 //     /home/me/current.csv: 312 bytes, xxh128 0123...
 //
-// Members made before and after a change of such a file are of two studies.
+// Members made before and after a change of such a file would belong to two studies.
 
 typedef struct {
     char *path; ///< absolute
@@ -55,57 +55,57 @@ typedef struct bt_study_files {
     int n;
 } bt_study_files;
 
-/// Those that the base case and the values of its keys name, each once, as far as they can be read: a member whose file
-/// is missing says so itself.
+/// Find the files that the base case and the values of its keys name, each once, as far as they can be read: a member
+/// whose file is missing reports it.
 void bt_study_files_find(bt_study_files *files, const bt_study *study);
 void bt_study_files_free(bt_study_files *files);
 
-/// Compare with DIR/study.files, and add there what it does not have; the caller holds DIR/lock. old: DIR has had
-/// members before, and a warning says of which file nothing tells what it was then. Errors: BT_ERR_CASE, a file has
-/// changed; BT_ERR_IO.
+/// Compare with DIR/study.files, and add missing entries; the caller holds DIR/lock. old: DIR has had members before,
+/// and a warning names files whose previous contents are unknown. Errors: BT_ERR_CASE, a file has changed; BT_ERR_IO.
 bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *warnings,
                               bt_errors *err);
 
-/// Are they what they were when they were found? Read again only where the system says that they have changed. Errors:
+/// Are the files unchanged since they were found? They are read again only if the system reports a change. Errors:
 /// BT_ERR_CASE.
 bt_status bt_study_files_same(bt_study_files *files, bt_errors *err);
 
 // --- values of its parameters ----------------------------------------------------------------------------------------
 
-// Values of a study, and what is wrong with them.
+// Values of a study, and their checks.
 
 /// A study that is being read.
 typedef struct {
     bt_study *s;
     bt_errors *err;
-    const char *place; ///< of what is read, in place of file and line; or NULL
+    const char *place; ///< place to report instead of file and line; or NULL
 } bt_study_reader;
 
-/// An error in a line of the study.
+/// Report an error in a line of the study.
 void bt_study_complain(const bt_study_reader *reader, int line, const char *fmt,
                        ...) __attribute__((format(printf, 3, 4)));
 
 /// Is it a single value? An error if not.
 bool bt_study_is_scalar(const bt_study_reader *reader, const bt_node *node, int line, const char *name);
 
-/// A whole number from lo to hi; out is left alone after an error.
+/// Read a whole number from lo to hi; out is unchanged after an error.
 void bt_study_read_whole(const bt_study_reader *reader, const bt_node *node, int line, const char *name, int64_t lo,
                          int64_t hi, int64_t *out);
 
 /// Is this text a value of the case key of index `key`? An error if not.
 bool bt_study_check_value(const bt_study_reader *reader, int line, const char *name, int key, const bt_node *value);
 
-/// Values of a parameter from a list, and from a range {from, to, n, scale, distribution, source}.
+/// Read the values of a parameter from a list; the next function reads a range {from, to, n, scale, distribution,
+/// source}.
 void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int line, bt_study_parameter *parameter);
 void bt_study_read_range(const bt_study_reader *reader, const bt_node *map, int line, bt_study_parameter *parameter);
 
-/// Does the parameter take whole numbers alone?
+/// Does the parameter take only whole numbers?
 bool bt_study_is_whole(const bt_study_parameter *parameter);
 
-/// Name of a distribution as a study writes it.
+/// Name of a distribution as written in a study.
 const char *bt_distribution_name(bt_distribution d);
 
-/// Which stratum of the hypercube each condition takes, of every parameter.
+/// Draw the stratum of the hypercube that each condition takes, for every parameter.
 void bt_study_draw_strata(bt_study *study);
 
 /// Text of parameter p in condition c; the caller frees it.

@@ -14,7 +14,7 @@
 #include "case/case_base.h"
 #include "case/schema.h"
 
-/// Members write no frames unless the study sets this: what it says comes later, and counts.
+/// Members write no frames unless the study sets this key: its settings come later, and prevail.
 static const char no_frames[] = "output.frame_interval=-1 s";
 
 static char *place_of(const bt_study *study, int line) { return bt_text_of("%s:%d: ", study->path, line); }
@@ -43,14 +43,14 @@ static int find_key(const bt_study_reader *reader, int line, const char *where, 
     return k;
 }
 
-/// Can a key be set to this in all members, or in some? A list of points is a text, which is read with the case.
+/// May a study set this key to this value? A list of points is a text, which is read with the case.
 static bool may_set(const bt_study_reader *reader, int line, const char *name, int key, const bt_node *value)
 {
     if (bt_case_keys[key].type == BT_KEY_POINTS && value->kind == BT_NODE_SCALAR) return true;
     return bt_study_check_value(reader, line, name, key, value);
 }
 
-/// A map of keys and values into a list "key=value", and where each stands.
+/// Read a map of keys and values into a list "key=value", with the place of each.
 static void read_set(const bt_study_reader *reader, const bt_node *map, int line, const char *where, char ***set,
                      char ***at, int *n)
 {
@@ -70,7 +70,7 @@ static void read_set(const bt_study_reader *reader, const bt_node *map, int line
     }
 }
 
-/// The place of `key` in the list of `set`; −1 where it is not there.
+/// Index of `key` in the list of `set`; −1 if it is not there.
 static int find_set(const bt_study *study, const char *key)
 {
     const size_t n = strlen(key);
@@ -79,7 +79,7 @@ static int find_set(const bt_study *study, const char *key)
     return -1;
 }
 
-/// Put "key=value" at the end of `set`, or at its beginning, where all that the study says comes later.
+/// Put "key=value" at the end of `set`, or at its beginning, where all settings of the study come later.
 static void add_set(bt_study *study, const char *text, const char *at, bool first)
 {
     study->set = bt_realloc(study->set, (size_t)study->n_set + 1, sizeof *study->set);
@@ -174,7 +174,7 @@ static void read_variants(const bt_study_reader *reader, const bt_node *map, int
     }
 }
 
-/// Parameter of which a `with` names a value, "key=value"; −1 after a complaint.
+/// Parameter whose value "key=value" a `with` names; −1 after a complaint.
 static int axis_of(const bt_study_reader *reader, int line, const char *name)
 {
     const bt_study *study = reader->s;
@@ -255,7 +255,7 @@ static const bt_key *row_of(const char *key)
     return &bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, key)];
 }
 
-/// The whole number given for a key, within the range of its row; out is left alone where there is none.
+/// Read the whole number given for a key, within the range of its row; out is unchanged if there is none.
 static bool read_number(const bt_study_reader *reader, const bt_node *root, const char *key, int64_t *out)
 {
     int line;
@@ -266,7 +266,7 @@ static bool read_number(const bt_study_reader *reader, const bt_node *root, cons
     return true;
 }
 
-/// Place of the word given for a key in its list, 0 where there is none.
+/// Index of the word given for a key in its list, 0 if there is none.
 static int read_choice(const bt_study_reader *reader, const bt_node *root, const char *key)
 {
     int line;
@@ -308,7 +308,7 @@ static void read_entries(const bt_study_reader *reader, const bt_node *root)
         bt_errors_add(reader->err, "%s: base: missing; name the case that is varied, as in base: ../basin/basin-80.yml",
                       study->path);
     }
-    study->sampling = (bt_sampling)read_choice(reader, root, "sampling"); // how values are understood depends on it
+    study->sampling = (bt_sampling)read_choice(reader, root, "sampling"); // the reading of values depends on it
     if ((node = entry(root, "set", &line)))
         read_set(reader, node, line, "set", &study->set, &study->set_at, &study->n_set);
     if ((node = entry(root, "report", &line))) read_report(reader, node, line);
@@ -351,7 +351,7 @@ bt_status bt_study_read(bt_study *study, const char *path, bt_errors *err)
     return err->n == before ? BT_OK : BT_ERR_CASE;
 }
 
-/// One "key=value" in place of, or beside, what `set` says.
+/// Replace an entry of `set` by "key=value", or add it.
 static void take_override(bt_study *study, const char *text, bt_errors *err)
 {
     const char *equals = strchr(text, '=');
@@ -368,7 +368,7 @@ static void take_override(bt_study *study, const char *text, bt_errors *err)
     const int key = find_key(&reader, 0, "", name);
     const bt_node node = {.kind = BT_NODE_SCALAR, .text = (char *)value, .plain = true};
     if (key < 0 || !may_set(&reader, 0, name, key, &node)) return;
-    const char *where = bt_study_varied(study, name); // that would win over `set`
+    const char *where = bt_study_varied(study, name); // which would override `set`
     if (where) {
         bt_study_complain(&reader, 0, "%s: stands under `%s` of %s, which would win; change it there", name, where,
                           study->path);

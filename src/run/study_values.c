@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Values of a study: single ones, those of a parameter as a list or as a range with the distribution that is drawn
-// from, and the one that a condition takes.
+// Values of a study: single values, lists, ranges with the distribution to draw from, and the values of a condition.
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -62,10 +61,10 @@ bool bt_study_check_value(const bt_study_reader *reader, int line, const char *n
     return good;
 }
 
-/// What a text of a list says: the number of a real or whole key, and otherwise the value as it is written back.
+/// The value of a text in a list: a number for a real or whole key, otherwise the text as written back.
 typedef struct {
     double number;
-    char *text; ///< NULL of a number
+    char *text; ///< NULL for a number
 } said;
 
 static said read_said(const bt_key *key, const bt_node *value)
@@ -73,7 +72,7 @@ static said read_said(const bt_key *key, const bt_node *value)
     bt_case scratch;
     bt_case_defaults(&scratch);
     char why[BT_WHY];
-    bt_value_read(key, &scratch, value->text, value->plain, why); // it has been looked at
+    bt_value_read(key, &scratch, value->text, value->plain, why); // it has been checked
     said x = {.number = bt_value_number(key, &scratch)};
     if (key->type != BT_KEY_REAL && key->type != BT_KEY_INT) {
         bt_text text;
@@ -85,11 +84,11 @@ static said read_said(const bt_key *key, const bt_node *value)
     return x;
 }
 
-/// 7 % and 0.07 are the same, whatever the last digit of a conversion.
+/// Are two values equal? 7 % and 0.07 are, whatever the last digit of the conversion.
 static bool same(const said *a, const said *b)
 {
     if (a->text && b->text) return !strcmp(a->text, b->text);
-    if (isnan(a->number) || isnan(b->number)) return isnan(a->number) && isnan(b->number); // none
+    if (isnan(a->number) || isnan(b->number)) return isnan(a->number) && isnan(b->number); // NaN: no value
     return fabs(a->number - b->number) <= 1e-12 * fabs(a->number);
 }
 
@@ -97,7 +96,7 @@ void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int 
 {
     if (list->n == 0)
         bt_study_complain(reader, line, "%s: the list is empty; give at least one value", parameter->name);
-    if (list->n > BT_MOST_VALUES) { // each is compared with all before it
+    if (list->n > BT_MOST_VALUES) { // each is compared with all previous ones
         bt_study_complain(reader, line, "%s: %d values, at most %d are read; take fewer, or a range", parameter->name,
                           list->n, BT_MOST_VALUES);
         return;
@@ -124,13 +123,13 @@ void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int 
 
 static const char *const distributions[] = {"uniform", "triangular", "normal", NULL};
 
-/// Standard deviations of a normal distribution between the middle and an end of its range: 95 % lie between the ends;
-/// and those to where it is cut off.
+/// Distance from the middle of a normal distribution to an end of its range, in standard deviations (95 % lie between
+/// the ends), and to where it is cut off.
 static const double ends_at = 1.959963984540054, cut_at = 3;
 
 static double normal_below(double z) { return 0.5 * bt_erfc(-z / sqrt(2)); }
 
-/// Place within a range, 0 at its beginning and 1 at its end, below which lies the share u of a distribution.
+/// Quantile u of a distribution, as a position in its range: 0 at the beginning, 1 at the end.
 static double quantile(bt_distribution d, double u)
 {
     if (d == BT_UNIFORM) return u;
@@ -153,14 +152,14 @@ static double between(double from, double to, bool logarithmic, double at)
     return logarithmic ? from * bt_pow(to / from, at) : from + at * (to - from);
 }
 
-/// x as a case takes it, in SI with all its digits: a bare number, but for angles, which would be degrees without their
+/// x as text for a case, in SI with all digits: a bare number, except for angles, which would be degrees without their
 /// unit (base/units.h).
 static char *value_text(const bt_study_parameter *parameter, double x)
 {
     const bt_unit kind = bt_case_keys[parameter->key].unit;
     const bool bare = kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;
     const char *unit = bare ? NULL : bt_units_symbol(kind);
-    int digits = 6; // 0.3, not 0.30000000000000004, where nothing is lost
+    int digits = 6; // 0.3, not 0.30000000000000004, if nothing is lost
     void *locale = bt_point_begin();
     for (char number[40]; digits < 17; digits++) {
         snprintf(number, sizeof number, "%.*g", digits, x);
@@ -170,21 +169,21 @@ static char *value_text(const bt_study_parameter *parameter, double x)
     return bt_text_of("%.*g%s%s", digits, x, unit ? " " : "", unit ? unit : "");
 }
 
-/// Value at a place of a range, 0 ... 1 between its ends.
+/// Value at a position of a range, 0 ... 1 between its ends.
 static char *range_value(const bt_study_parameter *parameter, double at)
 {
     const double x = between(parameter->from, parameter->to, parameter->logarithmic, at);
     return bt_study_is_whole(parameter) ? bt_text_of("%.0f", nearbyint(x)) : value_text(parameter, x);
 }
 
-/// Value below which the share u of what is drawn from a range lies. Each whole number stands for the half below and
-/// above it: rounded between the ends alone, these would come half as often as the others.
+/// Quantile u of the values drawn from a range. Each whole number stands for the half below and above it: rounding
+/// between the ends alone would draw the end values half as often as the others.
 static char *drawn_value(const bt_study_parameter *parameter, double u)
 {
     const double at = quantile(parameter->distribution, u);
     if (!bt_study_is_whole(parameter)) return range_value(parameter, at);
     const double x = floor(between(parameter->from - 0.5, parameter->to + 0.5, parameter->logarithmic, at) + 0.5);
-    // u can be rounded to 1
+    // u may round to 1
     return bt_text_of("%.0f", parameter->distribution == BT_NORMAL ? x : bt_min(x, parameter->to));
 }
 
@@ -199,7 +198,7 @@ static void read_distribution(const bt_study_reader *reader, const bt_node *valu
                            value->text);
 }
 
-/// Does all that a normal distribution draws beyond the ends of its range belong to the key? A complaint if not.
+/// Are all values that a normal distribution may draw, also beyond its range, valid for the key? A complaint if not.
 static bool in_range_of_key(const bt_study_reader *reader, int line, const bt_study_parameter *parameter)
 {
     if (parameter->distribution != BT_NORMAL) return true;
@@ -229,7 +228,7 @@ char *bt_study_distribution(const bt_study_parameter *parameter)
                       ? ", 95 % from" : " from", parameter->from, parameter->to);
 }
 
-/// An error where values of a range, which ascend, are the same: a grid would have conditions twice.
+/// Report equal values of a range, which ascend: a grid would have conditions twice.
 static void check_distinct(const bt_study_reader *reader, int line, const bt_study_parameter *parameter)
 {
     int i = 1;
@@ -301,9 +300,9 @@ void bt_study_read_range(const bt_study_reader *reader, const bt_node *map, int 
 
 const char *bt_distribution_name(bt_distribution d) { return distributions[d]; }
 
-// --- what a condition takes ------------------------------------------------------------------------------------------
+// --- values of a condition -------------------------------------------------------------------------------------------
 
-/// The numbers of parameter p in condition c.
+/// Random numbers of parameter p in condition c.
 static bt_rng draw(const bt_study *study, int p, int64_t c)
 {
     return bt_rng_start(study->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p);
@@ -321,7 +320,7 @@ static int by_lot(const void *a, const void *b)
     return (p->condition > q->condition) - (p->condition < q->condition);
 }
 
-/// A random permutation of the strata for each parameter, by sorting lots.
+/// A random permutation of the strata for each parameter, by sorting random numbers.
 void bt_study_draw_strata(bt_study *study)
 {
     lot *l = bt_alloc((size_t)study->n_conditions, sizeof *l);
@@ -342,13 +341,13 @@ char *bt_study_value(const bt_study *study, int p, int64_t c)
     const bt_study_parameter *parameter = &study->parameter[p];
     if (study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
         bt_rng rng = draw(study, p, c);
-        bt_rng_bits(&rng); // the first was for the stratum
+        bt_rng_bits(&rng); // the first number was for the stratum
         const double at = ((double)parameter->stratum[c] + bt_rng_uniform(&rng)) / (double)study->n_conditions;
         if (parameter->continuous) return drawn_value(parameter, at);
         const int i = (int)(at * parameter->n);
         return bt_text_copy(parameter->value[i < parameter->n ? i : parameter->n - 1]);
     }
-    // The last parameter runs fastest.
+    // The last parameter varies fastest.
     for (int i = study->n_parameters - 1; i > p; i--) c /= study->parameter[i].n;
     return bt_text_copy(parameter->value[c % parameter->n]);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Batches of four contacts; what for, in batch.h. Here: which cells have them, how contacts are dealt to batches, and
-// the way from their records into batches and back.
+// Batches of four contacts; reasons in batch.h. Here: which cells have them, how contacts are assigned to batches, and
+// copying from records into batches and back.
 #include "solve/batch.h"
 
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 #include "solve/batch_layout.h"
 #include "solve/rows.h"
 
-enum { OPEN = 8 }; // batches that wait for more contacts, when a cell is packed
+enum { OPEN = 8 }; // batches that are open for more contacts while a cell is packed
 
 static bt_batch_bounds *bounds_of(const bt_cell *cell)
 {
@@ -22,7 +22,7 @@ static size_t batch_bytes(const bt_cell *cell)
     return sizeof(bt_batch) + (cell->laws->limits ? sizeof(bt_batch_bounds) : 0);
 }
 
-/// Bytes of what n batches rest: whole records.
+/// Bytes for the rests of n batches, rounded up to whole records.
 static size_t rest_bytes(bt_idx n)
 {
     return ((size_t)n * sizeof(bt_rest) + sizeof(bt_contact) - 1) / sizeof(bt_contact) * sizeof(bt_contact);
@@ -66,7 +66,7 @@ static bt_batch_kind kind_of(const bt_cell *cell, const bt_contact *contact)
 
 typedef bt_idx held_bodies __attribute__((vector_size(2 * BT_LANES * sizeof(bt_idx))));
 
-/// The contacts of a batch, and those of their bodies that can be moved; NOBODY in places that are free.
+/// The contacts of a batch and their movable bodies; NOBODY in free places.
 typedef struct {
     held_bodies body;
     bt_idx contact[BT_LANES];
@@ -75,8 +75,8 @@ typedef struct {
 
 enum { NOBODY = -1, FIXED = -2 };
 
-/// What a thread needs to pack a cell, or to unpack it: on its stack unless there are many contacts. The records
-/// have to stand aside: they and the batches are in the same memory.
+/// Scratch of a thread that packs or unpacks a cell: on its stack unless there are many contacts. The records have to
+/// be copied aside, because batches use the same memory.
 typedef struct {
     place few_places[BT_FEW], *place;      // [n_list]
     bt_unknowns few_unknowns[BT_FEW], *of; // [n_contacts]
@@ -103,7 +103,7 @@ static void end_packing(packing *pack)
     if (pack->listed != pack->few_listed) free(pack->listed);
 }
 
-/// May a contact between bodies a and b, or FIXED, stand in a batch?
+/// May a contact between bodies a and b (or FIXED) join this batch?
 BT_INLINE bool fits(const place *slot, bt_batch_kind kind, bt_idx a, bt_idx b)
 {
     const held_bodies held = (slot->body == a) | (slot->body == b);
@@ -112,8 +112,8 @@ BT_INLINE bool fits(const place *slot, bt_batch_kind kind, bt_idx a, bt_idx b)
     return slot->kind == kind && (any[0] | any[1] | any[2] | any[3]) == 0;
 }
 
-/// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
-/// bodies that can be moved. Those that filled up leave the window. Returns the number of batches.
+/// Put each contact into the first of the last OPEN batches that is not full, is of its kind and has none of its
+/// movable bodies. Full batches leave the window. Returns the number of batches.
 BT_FOR_EACH_CPU
 static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv *inv, place *o)
 {
@@ -141,7 +141,7 @@ static bt_idx deal(const bt_cell *cell, const bt_contact *contacts, const bt_inv
     return n_batches;
 }
 
-/// What the last list hands on to the next one. A contact that was not in it has not been moved since.
+/// Take the previous unknowns from the last list. A contact that was not in it has not changed since.
 static void take_unknowns(const bt_cell *cell, packing *pack)
 {
     for (bt_idx j = 0; j < cell->n_listed; j++) {
@@ -153,7 +153,7 @@ static void take_unknowns(const bt_cell *cell, packing *pack)
     for (bt_idx k = 0; k < cell->work->n_last; k++) pack->of[cell->work->last[k].contact] = cell->work->last[k];
 }
 
-/// Masses of sheets one by one: they have a root.
+/// The effective masses of sheets are formed one by one: they contain a root.
 BT_INLINE void put_sheets(bt_batch *batch, const bt_contact *const contact[BT_LANES], const bt_limit *limits,
                           const bt_inv *inv)
 {
@@ -202,7 +202,7 @@ BT_INLINE void put(bt_batch *batch, const bt_contact *contacts, const bt_limit *
     if (slot->kind == BT_BATCH_SHEETS) put_sheets(batch, contact, limits, inv);
 }
 
-/// n records, of which none lies in the other place; a call of the library takes longer for so few.
+/// Copy n records between places that do not overlap; memcpy takes longer for so few.
 BT_INLINE void copy_records(bt_contact *to, const bt_contact *from, bt_idx n)
 {
     for (bt_idx i = 0; i < n; i++) {
@@ -253,7 +253,7 @@ void bt_batch_pack(bt_cell *cell, const bt_inv *inv)
 
 // --- unpacking -------------------------------------------------------------------------------------------------------
 
-/// The records of the contacts of a batch.
+/// Write the contacts of a batch back to their records.
 BT_INLINE void take_records(const bt_batch *batch, bt_contact *contact)
 {
     bt_vec line[4][BT_LANES];
@@ -287,7 +287,7 @@ static void take_out(const bt_batch *batch, bt_unknowns *of)
     }
 }
 
-/// Returns how many contacts are in batches.
+/// Write all batches back. Returns how many contacts were in them.
 BT_FOR_EACH_CPU
 static bt_idx take_all(const bt_cell *cell, packing *pack)
 {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Residual passes four contacts at a time: the same numbers and the same list as contact by contact (solver.c).
-// Contacts are looked at where they are, in batches or not; they leave their batches only when the list has
-// changed, which it has in a tenth of the cells.
+// Contacts are read where they are, in batches or not; they leave their batches only when the list has changed, as in a
+// tenth of the cells.
 #include "solve/batch.h"
 
 #include <math.h>
@@ -69,20 +69,20 @@ typedef struct {
     bt_mask rows, bad;
 } look;
 
-/// Of `most` and `flat` the lower one: nothing rises here.
+/// The lower of `most` and `flat`: nothing rises here.
 BT_INLINE bt_vec limits_of(const bt_limit *const limit[BT_LANES], int c)
 {
     bt_vec most = {limit[0]->most[c], limit[1]->most[c], limit[2]->most[c], limit[3]->most[c]};
     return bt_smaller(most, (bt_vec){limit[0]->flat[c], limit[1]->flat[c], limit[2]->flat[c], limit[3]->flat[c]});
 }
 
-/// What a look at four contacts gives, lane by lane: squares of their rows, and which of them bear load or close.
+/// Result for four contacts, lane by lane: the squares of their rows, and which of them bear load or close.
 typedef struct {
     lanes square[3];
     bt_mask on;
 } seen;
 
-/// As bt_contact_residual, of the first n lanes but for sheets; limit: their bounds, or NULL.
+/// As bt_contact_residual, for the first n lanes, except sheets; limit: their bounds, or NULL.
 BT_INLINE seen look_at(look *o, const four *f, const bt_limit *const *limit, int n)
 {
     const bt_vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY};
@@ -126,7 +126,7 @@ static bool lane_is_on(look *o, const seen *s, int l)
     return s->on[l];
 }
 
-/// The same of sheets, one by one.
+/// The same for sheets, one by one.
 static bool sheets_are_on(look *o, const bt_contact *contact, const bt_mass *m, const bt_limit *limit)
 {
     const double r = bt_sheets_residual(contact, m, limit, o->v, o->problem->tolerance, &o->found.squares);
@@ -136,10 +136,10 @@ static bool sheets_are_on(look *o, const bt_contact *contact, const bt_mass *m, 
     return contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || r > 0;
 }
 
-/// UNSEEN: in no batch. LEAVES: in a batch, and to be swept no more. LISTED: to be swept.
+/// UNSEEN: in no batch. LEAVES: in a batch, but no longer to be swept. LISTED: to be swept.
 enum { UNSEEN, LEAVES, LISTED };
 
-/// Contacts index[n] of the cell.
+/// Residuals and marks of contacts index[n] of the cell.
 BT_INLINE void look_at_records(look *o, const bt_cell *cell, bool bounded, const bt_contact *const contact[BT_LANES],
                                const bt_idx index[BT_LANES], int n, uint8_t *mark)
 {
@@ -159,7 +159,7 @@ BT_INLINE void look_at_records(look *o, const bt_cell *cell, bool bounded, const
     }
 }
 
-/// The sheets in lane l of a batch, with all that their residual needs.
+/// The sheets in lane l of a batch, with the members that their residual needs.
 static bt_contact sheets_of(const bt_batch *batch, int l)
 {
     return (bt_contact){.nx = batch->nx[l], .ny = batch->ny[l], .rat = batch->rat[l], .rbt = batch->rbt[l],
@@ -167,7 +167,7 @@ static bt_contact sheets_of(const bt_batch *batch, int l)
                         .lt = batch->x[2][l], .a = batch->a[l], .b = batch->b[l]};
 }
 
-/// Has the last sweep moved the contact in lane l?
+/// Has the last sweep changed the contact in lane l?
 static bool was_moved(const bt_batch *batch, int l)
 {
     return batch->x[0][l] != batch->before[0][l] || batch->x[1][l] != batch->before[1][l] ||
@@ -197,7 +197,7 @@ BT_INLINE void look_at_batch(look *o, const bt_cell *cell, bool bounded, const b
     }
 }
 
-/// Marks what the last sweep has moved.
+/// Mark the contacts that the last sweep has changed.
 static void mark_moved(const bt_cell *cell, uint8_t *mark)
 {
     for (bt_idx k = 0; k < cell->work->n_last; k++) {
@@ -208,7 +208,7 @@ static void mark_moved(const bt_cell *cell, uint8_t *mark)
     }
 }
 
-/// Four at a time the contacts that are in no batch.
+/// Process the contacts in no batch, four at a time.
 BT_INLINE void look_at_rest(look *o, const bt_cell *cell, bool bounded, const bt_contact *records, uint8_t *mark)
 {
     const bt_contact *contact[BT_LANES];
@@ -242,7 +242,7 @@ static void look_at_rigid(look *o, const bt_cell *cell, uint8_t *mark) { look_at
 BT_FOR_EACH_CPU
 static void look_at_bounded(look *o, const bt_cell *cell, uint8_t *mark) { look_at_all(o, cell, true, mark); }
 
-/// The list of the marks; batches of the same contacts stay as they are.
+/// List the marked contacts; batches of the same contacts stay as they are.
 static void list_marked(bt_cell *cell, const uint8_t *mark)
 {
     bt_idx listed = 0, in_batches = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sweeps through the batches of a cell: the arithmetic of bt_update_contact (kernel.h), four contacts at a time, with
-// the move of their unknowns before it.
+// Sweeps through the batches of a cell: the arithmetic of bt_update_contact (kernel.h), four contacts at a time,
+// preceded by the extrapolation of their unknowns.
 #include "solve/batch.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@ typedef bt_motions motion;
 
 BT_INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
 {
-    const uint32_t all = 0x01010101; // of nearly all batches
+    const uint32_t all = 0x01010101; // true of nearly all batches
     bt_transpose(&m);
     if (memcmp(moves, &all, sizeof all) == 0) {
         memcpy(&v[body[0]], &m.x, sizeof m.x);
@@ -73,8 +73,8 @@ BT_INLINE void rim(const bt_batch *batch, const vec bound[2], const vec b[2], ve
     }
 }
 
-/// As bt_limit_normals where no bound rises. The second point of a contact with one has no mass and no bound: of all
-/// sides of the rim it stays at 0, and the first comes to its bound, as it does alone.
+/// As bt_limit_normals where no bound rises. The missing second point of a contact has no mass and no bound: it stays
+/// at 0 on every side of the rim, and the first point reaches its bound as it does alone.
 BT_INLINE void bound_normals(const bt_batch *batch, const vec bound[2], const motion *p, const motion *q, vec *l1,
                              vec *l2)
 {
@@ -90,7 +90,7 @@ BT_INLINE void bound_normals(const bt_batch *batch, const vec bound[2], const mo
     *l2 = bt_choose(over, l[1], *l2);
 }
 
-/// As bt_update_sheets; lanes without a contact bear nothing and have no step.
+/// As bt_update_sheets; lanes without a contact bear nothing and have step length 0.
 BT_INLINE vec update_sheets(bt_batch *batch, vec friction, bt_vel *v)
 {
     const vec zero = {0}, one = {1, 1, 1, 1};
@@ -123,7 +123,8 @@ BT_INLINE vec update_sheets(bt_batch *batch, vec friction, bt_vel *v)
     return bt_larger(bt_size_of(dx), bt_size_of(dy)) * batch->wt;
 }
 
-/// As bt_update_contact, with bounds of the normals or NULL; the largest changes of a row's speed, m/s.
+/// As bt_update_contact; limits: bounds of the normal impulses, or NULL. Returns, per lane, the largest change of a
+/// row's speed, m/s.
 BT_INLINE vec update(bt_batch *batch, const vec *limits, bt_vel *v)
 {
     motion a = bt_take_four(v, batch->a), b = bt_take_four(v, batch->b);
@@ -154,7 +155,7 @@ BT_INLINE vec update(bt_batch *batch, const vec *limits, bt_vel *v)
     return bt_larger(bt_larger(bt_size_of(u1), bt_size_of(u2)), bt_size_of(dt) * batch->wt);
 }
 
-/// As bt_apply with all of the impulses.
+/// As bt_apply, with the whole impulses.
 BT_INLINE void apply(const bt_batch *batch, bt_vel *v)
 {
     motion a = bt_take_four(v, batch->a), b = bt_take_four(v, batch->b);
@@ -178,12 +179,12 @@ static void apply_all(const bt_batch *batches, bt_idx n, bt_vel *v)
 
 void bt_batch_apply(const bt_cell *cell, bt_vel *v) { apply_all(cell->work->batch, cell->work->n_batches, v); }
 
-/// Unknowns of a batch after their move: of one visit to a cell.
+/// Extrapolated unknowns of a batch, for one visit to a cell.
 typedef struct {
     vec x[3];
 } moved;
 
-/// What a visit to a cell does, and has done.
+/// Settings and results of a visit to a cell.
 typedef struct {
     const bt_sweep *sweep;
     int times;            // passes at most
@@ -195,7 +196,7 @@ typedef struct {
     double most, against; // largest update of the first pass; J
 } visit;
 
-/// After the moves that it has missed while it rested.
+/// Extrapolate a batch, including the moves that it missed while it rested.
 BT_INLINE void move(bt_batch *batch, double lead, double lag, moved *y)
 {
     for (int c = 0; c < 3; c++) {
@@ -206,7 +207,7 @@ BT_INLINE void move(bt_batch *batch, double lead, double lag, moved *y)
     }
 }
 
-/// How far it turned against its move, as bt_rounds_against.
+/// How far a batch turned against its move, as bt_rounds_against.
 BT_INLINE vec turned(const bt_batch *batch, const moved *y)
 {
     vec sum = {0};
@@ -215,7 +216,7 @@ BT_INLINE vec turned(const bt_batch *batch, const moved *y)
     return sum;
 }
 
-/// The batches that do not rest; the others have one sweep less to rest. Returns how many.
+/// Find the batches that do not rest; the others then have one sweep less to rest. Returns how many are due.
 BT_INLINE bt_idx find_due(bt_rest *rests, bt_idx n, bool all, bt_idx *due)
 {
     bt_idx n_due = 0;
@@ -228,7 +229,7 @@ BT_INLINE bt_idx find_due(bt_rest *rests, bt_idx n, bool all, bt_idx *due)
     return n_due;
 }
 
-/// The first pass is over the batches that are due, each other one over those that the last has not left calm.
+/// The first pass is over the due batches, each later one over those that the previous pass has not left calm.
 BT_INLINE void go_through(bt_batch *batches, bt_idx n, bt_vel *v, bool bounded, visit *o)
 {
     const bt_batch_bounds *bounds = (const bt_batch_bounds *)(batches + n);
@@ -272,7 +273,7 @@ static void go_through_rigid(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
     go_through(batches, n, v, false, o);
 }
 
-/// Where contacts have bounds; apart, or rigid ice would pay for the registers that this takes.
+/// For contacts with bounds; a separate function, or rigid ice would pay for the registers that this takes.
 BT_FOR_EACH_CPU
 static void go_through_bounded(bt_batch *batches, bt_idx n, bt_vel *v, visit *o)
 {

@@ -91,21 +91,21 @@ void bt_islands_add(const bt_world *world, bt_islands *islands)
 
 // A and P of islands.h by island; sums are exact, so that ranks and threads do not matter.
 
-/// A contact whose load has no bound, with the load λ of the proof.
+/// A contact whose load is unbounded, with its load λ in the proof.
 typedef struct {
     bt_contact u;    ///< without its bias; friction 0 where the proof takes none
     double bias[2];
-    double at_first; ///< sum of the normal impulses that the sweeps have come to, N s
+    double at_first; ///< sum of the normal impulses at the end of the sweeps, N s
 } hard;
 
-/// Those of this rank: cell k has contact[first[k]] to contact[first[k + 1] − 1].
+/// These contacts on this rank: cell k has contact[first[k]] to contact[first[k + 1] − 1].
 typedef struct {
     hard *contact;
     bt_idx *first;
-    double closing; ///< the largest speed of closing without loads, m/s
+    double closing; ///< the largest closing speed without loads, m/s
 } loads;
 
-/// Does it bear load, and any load?
+/// Is the contact loaded, and its load unbounded?
 static bool is_hard(const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
@@ -114,7 +114,7 @@ static bool is_hard(const bt_cell *cell, bt_idx j)
     return !limit || !(isfinite(limit->most[0]) || (contact->n > 1 && isfinite(limit->most[1])));
 }
 
-/// The contacts of this rank, and how fast they would close.
+/// Collect these contacts, and the largest closing speed without loads.
 static loads collect(const bt_world *world)
 {
     const bt_cells *cells = world->cells;
@@ -170,7 +170,7 @@ static void push(bt_world *world, bt_idx k, const void *context, bt_totals *tota
     }
 }
 
-/// M⁻¹Jᵀλ into the array of the position projection.
+/// Write M⁻¹Jᵀλ to the array of the position projection.
 static void form_change(bt_world *world, const loads *found)
 {
     bt_totals totals = {0};
@@ -189,8 +189,8 @@ static void relax(bt_world *world, bt_idx k, const void *context, bt_totals *tot
     }
 }
 
-/// λ to loads that balance each other, with the friction of contacts that stick: sweeps of the same problem with all
-/// that drives it at rest.
+/// Bring λ to loads that balance each other, with the friction of sticking contacts: sweeps of the same problem with U*
+/// = 0 and b = 0.
 static void balance(bt_world *world, const loads *found)
 {
     form_change(world, found);
@@ -202,7 +202,7 @@ static void balance(bt_world *world, const loads *found)
     }
 }
 
-/// A of each island into share.
+/// Write A of each island to share.
 static void power_of_closing(bt_world *world, bt_islands *islands, const loads *found)
 {
     const bt_vel *v = world->bodies.vel;
@@ -219,7 +219,7 @@ static void power_of_closing(bt_world *world, bt_islands *islands, const loads *
     for (bt_idx i = 0; i < world->bodies.n; i++) islands->share[i] = bt_sum_value(&islands->sum[i]);
 }
 
-/// P of each island into sum.
+/// Write P of each island to sum.
 static void imbalance(bt_world *world, bt_islands *islands)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -237,14 +237,14 @@ static void imbalance(bt_world *world, bt_islands *islands)
     bt_islands_add(world, islands);
 }
 
-/// Strike out islands whose A is no more than `speed` times their sum.
+/// Strike out islands whose A is at most `speed` times their sum.
 static void drop_islands_below(bt_world *world, bt_islands *islands, double speed)
 {
     for (bt_idx i = 0; i < world->bodies.n; i++)
         if (!(islands->share[i] > speed * bt_sum_value(&islands->sum[i]))) islands->share[i] = 0;
 }
 
-/// Strike out islands that close by no more than the tolerance.
+/// Strike out islands that close no faster than the tolerance.
 static void drop_islands_not_closing(bt_world *world, bt_islands *islands, const loads *found)
 {
     bt_islands_clear(world, islands);
@@ -270,7 +270,7 @@ static void drop_islands_without_loads(bt_world *world, bt_islands *islands, con
         if (!(bt_sum_value(&islands->sum[i]) > 0)) islands->share[i] = 0;
 }
 
-/// Strike out islands whose loads are not those that the sweeps have come to.
+/// Strike out islands whose balanced loads differ from those at the end of the sweeps.
 static void drop_islands_moved(bt_world *world, bt_islands *islands, const loads *found)
 {
     bt_islands_clear(world, islands);
@@ -285,7 +285,7 @@ static void drop_islands_moved(bt_world *world, bt_islands *islands, const loads
         if (bt_sum_value(&islands->sum[i]) > 0) islands->share[i] = 0;
 }
 
-/// A of the islands in which A/P is beyond what gives way into share, 0 for all others.
+/// Write A to share for islands whose A/P exceeds any plausible speed, 0 for all others.
 static void mark(bt_world *world, bt_islands *islands, const loads *found, double speeds)
 {
     form_change(world, found);
@@ -294,7 +294,7 @@ static void mark(bt_world *world, bt_islands *islands, const loads *found, doubl
     drop_islands_below(world, islands, speeds * found->closing);
 }
 
-/// Is an island marked, and one that presses on the towed body?
+/// Is any island marked, and is one of these in contact with the towed body?
 static bt_lock marked(const bt_world *world, bt_islands *islands, const loads *l)
 {
     const bt_idx towed = bt_world_towed(world);
@@ -310,7 +310,7 @@ static bt_lock marked(const bt_world *world, bt_islands *islands, const loads *l
     return (bt_lock){found[0] > 0, found[1] > 0};
 }
 
-/// Friction of the contacts that stick, or of none, is in the proof.
+/// Keep in the proof the friction of sticking contacts (if `held`), or none.
 static void take_friction(const bt_world *world, const loads *found, bool held)
 {
     for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
@@ -321,7 +321,7 @@ static void take_friction(const bt_world *world, const loads *found, bool held)
     }
 }
 
-/// The proof by loads that are balanced first, of normals alone or with the friction that holds.
+/// The proof by balanced loads, from normal impulses alone or with the friction that holds.
 static bt_lock by_balance(bt_world *world, bt_islands *islands, const loads *found, bool held)
 {
     const size_t n = (size_t)found->first[world->cells->n];

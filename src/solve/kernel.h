@@ -10,8 +10,8 @@
 
 /// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both
 /// press, one of them, none). Two points of one edge are strongly coupled through the turning of the floes: solved one
-/// by one they need 2 to 10 times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points
-/// that coincide) the first of the single cases that holds is taken; so it is for one point, whose second has no mass
+/// by one they need 2 to 10 times the sweeps on rows of floes lying edge to edge. If the coupling is singular (points
+/// that coincide), the first single case that holds is taken; likewise for one point, as the missing one has no mass
 /// (mn 0).
 static inline void bt_solve_normals(const bt_contact *contact, const bt_mass *m, const bt_vel *va, const bt_vel *vb,
                                     double *l1, double *l2)
@@ -19,24 +19,24 @@ static inline void bt_solve_normals(const bt_contact *contact, const bt_mass *m,
     const double dx = vb->x - va->x, dy = vb->y - va->y, un = contact->nx * dx + contact->ny * dy;
     const double u1 = un + contact->rbn[0] * vb->w - contact->ran[0] * va->w + contact->bias[0];
     const double u2 = un + contact->rbn[1] * vb->w - contact->ran[1] * va->w + contact->bias[1];
-    // Velocities with both impulses taken off.
+    // Velocities without both impulses.
     const double b1 = u1 - m->w[0] * contact->ln[0] - m->w12 * contact->ln[1],
                  b2 = u2 - m->w12 * contact->ln[0] - m->w[1] * contact->ln[1];
     *l1 = (m->w12 * b2 - m->w[1] * b1) * m->per_det;
     *l2 = (m->w12 * b1 - m->w[0] * b2) * m->per_det;
     if (!(m->per_det > 0 && *l1 >= 0 && *l2 >= 0)) {
         const double only1 = bt_max(0, -b1 * m->mn[0]), only2 = bt_max(0, -b2 * m->mn[1]);
-        const bool first = b2 + m->w12 * only1 >= 0 || only2 == 0; // then the second point opens by itself
+        const bool first = b2 + m->w12 * only1 >= 0 || only2 == 0; // then the second point opens without load
         *l1 = first ? only1 : 0;
         *l2 = first ? 0 : only2;
     }
 }
 
-/// Take the normal impulses l1 and l2, with the friction that they allow: of both points as one. The tangential rows of
-/// the points are the same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two
-/// separate unknowns would drift apart along their null space and eat up the friction cone. Returns how much the
-/// contact changes the speed of one of its rows at most, m/s: of two points that share a load each needs but half an
-/// impulse, and its residual is the whole speed.
+/// Apply the normal impulses l1 and l2, and the friction that they allow, one impulse for both points. Their tangential
+/// rows are the same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two
+/// separate unknowns would drift apart along their null space and use up the friction cone. Returns the largest change
+/// of speed of a row by the whole contact, m/s: of two points that share a load each takes only half the impulse, but
+/// its residual is the whole speed.
 static inline double bt_take_normals(bt_contact *contact, const bt_mass *m, double l1, double l2, bt_vel va, bt_vel vb,
                                      bt_vel *v, const bt_inv *inv)
 {
@@ -54,8 +54,7 @@ static inline double bt_take_normals(bt_contact *contact, const bt_mass *m, doub
     return bt_max(bt_max(fabs(u1), fabs(u2)), fabs(dt) * m->wt);
 }
 
-/// The nearest load that sheets can bear (contact/raft.h): as much of `ends` as there is, to one side or the other, and
-/// as far from it as friction reaches.
+/// Project (x, y) on the loads that sheets can bear (contact/raft.h): at most ±`ends`, plus friction in any direction.
 static inline void bt_onto_sheets(const bt_limit *limit, double *x, double *y)
 {
     const double *e = limit->ends, part = bt_part_of_ends(e, *x, *y);
@@ -66,7 +65,7 @@ static inline void bt_onto_sheets(const bt_limit *limit, double *x, double *y)
     *y = part * e[1] + dy * (radius / far);
 }
 
-/// What the load of sheets would be after a step of its own (contact/raft.h).
+/// The load of sheets after one projected step (contact/raft.h), others held.
 static inline void bt_sheets_map(const bt_contact *contact, const bt_mass *m, const bt_limit *limit, const bt_vel *va,
                                  const bt_vel *vb, double *x, double *y)
 {
@@ -102,7 +101,7 @@ static inline double bt_update_contact(bt_contact *contact, const bt_mass *m, co
     return bt_take_normals(contact, m, l[0], l[1], va, vb, v, inv);
 }
 
-/// What the normal impulse of point i would be with all others held.
+/// The normal impulse of point i after its projected update, with all others held.
 static inline double bt_normal_map(const bt_contact *contact, const bt_mass *m, const bt_limit *limit, int i,
                                    const bt_vel *va, const bt_vel *vb)
 {
@@ -111,15 +110,15 @@ static inline double bt_normal_map(const bt_contact *contact, const bt_mass *m, 
                  : bt_max(0, contact->ln[i] - w * m->mn[i]);
 }
 
-#define BT_SHORT 0.01 // part of its bound by which an impulse may be short of it, assumed
+#define BT_SHORT 0.01 // share of its bound by which an impulse may fall short, assumed
 
-/// Residual of a row under a bound that is `part` of its impulse short of what its map says, m/s, `closing`: the speed
-/// that it leaves. The natural map is at most bound × W there, whatever the speed. Where that is below the tolerance
-/// (a short step, large floes, weak ice), ice that should give way bore nothing, step after step, and the position
-/// projection held it without a force. So until BT_SHORT of the impulse is left, the speed counts. The impulse of
-/// sheets has a direction, too, which where it is small turns with the last digits of the slip: to ask for it to 1 %
-/// took 331,000 residuals a step in 90 % ice, in place of 187,000. So `part` is at most the share of the power that the
-/// impulse does not take.
+/// Residual, m/s, of a bounded row whose impulse falls short of its map by the share `part`; closing: the speed left,
+/// m/s. There the natural map is at most bound × W, whatever the speed. Where that was below the tolerance (a short
+/// step, large floes, weak ice), ice that should give way bore nothing, step after step, and the position projection
+/// held it without a force. So while more than BT_SHORT of the impulse is missing, the speed counts. The impulse of
+/// sheets also has a direction, which turns with the last digits of the slip where that is small: requiring it to 1 %
+/// took 331,000 residuals a step in 90 % ice, instead of 187,000. So for sheets `part` is at most the share of the
+/// power that the impulse does not take.
 static inline double bt_short_residual(double closing, double part, double tolerance)
 {
     return bt_min(closing, part * (tolerance / BT_SHORT));
@@ -146,8 +145,8 @@ static inline double bt_sheets_residual(const bt_contact *contact, const bt_mass
     return isfinite(x + y) ? bt_max(bt_max(fabs(x), fabs(y)), lacks) : INFINITY;
 }
 
-/// Natural-map residual of a contact, m/s, and of rows under bounds what they are short of them; into *sum the squares
-/// over its rows (a normal one a point, one tangential; two of sheets). tolerance: of the problem, m/s.
+/// Natural-map residual of a contact, m/s, with the shortfall of bounded rows; adds to *sum the squares over its rows
+/// (a normal row per point, one tangential; two for sheets). tolerance: of the problem, m/s.
 static inline double bt_contact_residual(const bt_contact *contact, const bt_mass *m, const bt_limit *limit,
                                          const bt_vel *v, double tolerance, double *sum)
 {
@@ -168,11 +167,11 @@ static inline double bt_contact_residual(const bt_contact *contact, const bt_mas
     const double wt = bt_tangent_velocity(contact, va, vb),
                  r = (bt_clamp(contact->lt - wt * m->mt, contact->mu * total) - contact->lt) * m->wt;
     *sum += r * r;
-    return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY; // the maximum itself passes over a NaN
+    return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY; // bt_max itself ignores a NaN
 }
 
-/// Gauss–Seidel update in the plain position projection (solve/project.c): point by point, the biases are the gaps, m,
-/// the impulses the multipliers, kg m, d: displacements. Returns the largest correction, m.
+/// Gauss–Seidel update in the plain position projection (solve/project.c): point by point. Biases are gaps, m, impulses
+/// the multipliers, kg m; d: displacements. Returns the largest correction, m.
 static inline double bt_project_contact(bt_contact *contact, const bt_mass *m, double slop, bt_vel *d,
                                         const bt_inv *inv)
 {

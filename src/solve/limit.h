@@ -8,17 +8,17 @@
 #include "contact/law.h"
 #include "contact/row.h"
 
-/// The rising part of bounds, all 0 where there is none.
+/// The rising part of the bounds, all 0 if there is none.
 static inline const bt_rise *bt_rise_of(const bt_limit *limit)
 {
     static const bt_rise none;
     return limit->rise ? limit->rise : &none;
 }
 
-/// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising
-/// part of the bound, λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 +
-/// slope W), and that of a hit where a quadratic equation has its root; there it is above the flat part exactly when
-/// that is so at the solution. `place` and not the bias: a rebound is no crushing.
+/// Impulse of point i alone; b: its normal velocity with bias and without this impulse. With w = b + W λ, a rising line
+/// λ = base − slope (w − bias + place) is met at λ = (base − slope (b − bias + place)) / (1 + slope W), and the curve
+/// of a hit at the root of a quadratic equation; the rising part is above the flat one there exactly if it is so at the
+/// solution. `place` and not the bias: a rebound does not crush.
 static inline double bt_limit_point(const bt_limit *limit, const bt_contact *contact, const bt_mass *m, int i, double b)
 {
     const bt_rise *rise = bt_rise_of(limit);
@@ -40,8 +40,8 @@ static inline double bt_limit_bound(const bt_limit *limit, const bt_contact *con
     return bt_min(limit->most[i], bt_max(limit->flat[i], rising));
 }
 
-/// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
-/// multiplier has the right sign, and of sides that rounding leaves in doubt the one of least value.
+/// Minimum of ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is if not inside: on the side whose
+/// multiplier has the right sign; if rounding leaves that in doubt, on the side of least value.
 static inline void bt_limit_rim(const bt_mass *m, const double b[2], const double c[2], double l[2])
 {
     double least = INFINITY;
@@ -60,8 +60,8 @@ static inline void bt_limit_rim(const bt_mass *m, const double b[2], const doubl
     }
 }
 
-/// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point
-/// by point, a few times: the sweeps do the rest.
+/// Both impulses of a manifold. Exact if neither bound is reached, or both are flat; otherwise point by point, a few
+/// times: the sweeps do the rest.
 static inline void bt_limit_two(const bt_limit *limit, const bt_contact *contact, const bt_mass *m, const double b[2],
                                 double l[2])
 {
@@ -79,8 +79,8 @@ static inline void bt_limit_two(const bt_limit *limit, const bt_contact *contact
         for (int i = 0; i < 2; i++) l[i] = bt_limit_point(limit, contact, m, i, b[i] + m->w12 * l[1 - i]);
 }
 
-/// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is
-/// below the flat parts.
+/// Both normal impulses under bounds at these velocities; l: on entry, the impulses without bounds, nearly always below
+/// the flat parts.
 static inline void bt_limit_normals(const bt_limit *limit, const bt_contact *contact, const bt_mass *m,
                                     const bt_vel *va, const bt_vel *vb, double l[2])
 {

@@ -4,18 +4,17 @@
 // With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M̃⁻¹ J_nᵀ p, M̃ as in
 // solver.h, with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
-// by the same rows without friction. That is a contact problem of the same form, and the solver's own sweeps and
-// residuals solve it (solver.h): for the time of the projection, cells have other contacts, with the gaps as biases and
-// no friction, and no bounds. Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart does not press
-// either into a third. Velocity-level correction (Baumgarte) would add kinetic energy and load that is not there
-// (Metrikin 2014).
+// by the same rows without friction. That is a contact problem of the same form, solved by the solver's own sweeps and
+// residuals (solver.h): during the projection, cells have other contacts, with the gaps as biases, without friction and
+// bounds. Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart does not press either into a third.
+// Velocity-level correction (Baumgarte) would add spurious kinetic energy and load (Metrikin 2014).
 //
-// Second pass. The gaps above are linear in the turns of a step. Two bodies that turn by θ against each other may end
-// θ²/2 of their radii inside each other: at 5 s a floe that rolls along a hull does. So where a turn can have left more
-// than LEFT slops, those pairs are looked for anew where they are now: the floe that rolls along a hull touches it
-// metres from where it did. If one of them is that deep, their new rows part the bodies once more, with the rows of all
-// other pairs as they were. Most steps have no such turn; most that have need no second pass. Not for the plain
-// reference, which also makes the fields: it has sweeps of its own, point by point, and fields keep their bits.
+// Second pass. The gaps above are linear in the rotations of a step. Two bodies that rotate by θ relative to each other
+// may overlap by θ²/2 of their radii at the end, as does, at 5 s, a floe that rolls along a hull. So where a rotation
+// can have left more than LEFT slops, the contacts of the pair are found anew at the present poses: the rolling floe
+// now touches the hull metres away. If one of them is that deep, the new rows, with the unchanged rows of all other
+// pairs, separate the bodies once more. Most steps have no such rotation; most that have need no second pass. Not for
+// the plain reference, which also makes the fields: its own sweeps, point by point, keep the bits of fields.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,10 +30,11 @@
 #include "solve/rounds.h"
 
 enum { TURNS, N_FOUND };
-enum { LEFT = 5 }; // slops that a turn may leave as overlap: half of what a run warns of, assumed
+enum { LEFT = 5 }; // overlap that a rotation may leave, in slops: half of the warning threshold of a run, assumed
 
-/// May the turn of contact j in this step, whose gaps are those at its end, have left more than `least` of overlap, m?
-/// Only of pairs that touch with their outlines as they are: what has given way, as that of sheets, is no overlap.
+/// May the rotation of the bodies of contact j in this step have left an overlap above `least`, m? Its gaps are those
+/// at the end of the step. Only for pairs that touch with unchanged outlines: where ice has given way, or sheets lie on
+/// each other, overlap is allowed.
 static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double least)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -67,7 +67,7 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
             }
             gaps->gap[i] += world->par.dt * bt_normal_velocity(contact, i, &world->bodies.vel[contact->a],
                                                                &world->bodies.vel[contact->b]);
-            if (cell->laws->limits) gaps->gap[i] += cell->laws->limits[j].grown[i]; // what has given way in this step
+            if (cell->laws->limits) gaps->gap[i] += cell->laws->limits[j].grown[i]; // crushed or rafted in this step
             totals->most = bt_max(totals->most, -gaps->gap[i]);
         }
         if (!world->par.plain_sweeps && turns(world, cell, j, LEFT * world->par.slop))
@@ -75,7 +75,7 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
     }
 }
 
-/// Gaps after the first pass, and the row where a pair that has turned touches now.
+/// Update the gaps after the first pass, and form the row where a pair that has rotated touches now.
 static void look_again(bt_world *world, bt_cell *cell, bt_idx j, bt_contact *row, bt_totals *totals)
 {
     const bt_contact *contact = &cell->contacts[j];
@@ -96,7 +96,7 @@ static void look_again(bt_world *world, bt_cell *cell, bt_idx j, bt_contact *row
     }
 }
 
-/// What a cell has put aside.
+/// The contacts of a cell, put aside during the projection.
 typedef struct bt_aside {
     bt_contact *contacts;
     size_t bytes;
@@ -104,7 +104,7 @@ typedef struct bt_aside {
     struct bt_limit *limits;
 } bt_aside;
 
-/// In place of the contacts of cell k those of the projection; sheets have none.
+/// Replace the contacts of cell k by those of the projection; sheets have none.
 static void put_rows(bt_world *world, bt_idx k, const void *again, bt_totals *totals)
 {
     bt_cell *cell = &world->cells->cell[k];
@@ -146,7 +146,7 @@ static void put_back(bt_world *world)
     world->solver->aside = NULL;
 }
 
-/// The deepest overlap of pairs that have turned, m.
+/// Replace the contacts of all cells. Returns the deepest overlap of pairs that have rotated, m.
 static double put_aside(bt_world *world, bool again)
 {
     bt_totals totals = {0};
@@ -183,7 +183,7 @@ static void solve_apart(bt_world *world)
     bt_rounds_scale(&problem, world->cells);
     bt_work work = {0};
     bt_rounds_residual(world, &problem, BT_BEGINS, &work);
-    if (problem.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates
+    if (problem.plain) // the reference, also used to shake fields: no residual pass, the updates end it
         while (work.sweeps < world->par.position_sweeps && (work.sweeps == 0 || work.residual > problem.tolerance))
             work.residual = bt_rounds_sweep(world, &problem, &work);
     else bt_rounds_run(world, &problem, &work);
@@ -192,7 +192,7 @@ static void solve_apart(bt_world *world)
     st->projected = st->projected && work.residual <= problem.tolerance;
 }
 
-/// Part what overlaps by the rows that cells have: bt_solver.shift. They have their contacts again after it.
+/// Solve the rows of the cells for displacements that remove overlap (bt_solver.shift), then restore their contacts.
 static void part(bt_world *world)
 {
     const bt_cells *ts = world->cells;

@@ -12,22 +12,22 @@
 #include "solve/vector.h"
 #include "partition/domain.h"
 
-#define GAIN 0.8        // of the sum of squares, that ROUNDS rounds must take it below
+#define GAIN 0.8        // factor below which ROUNDS rounds must bring the sum of squares
 #define MOST_CAP 0.98
-#define NARROWER 1.25   // of the distance of the cap from 1, and of the length of a round
+#define NARROWER 1.25   // factor on the distance of the cap from 1, and on the length of a round
 #define WIDER 1.5
-#define LEAST_CAP 0.3   // less is none
-#define NO_MOMENTUM 0.3 // of the limit of work, beyond it: without momentum
-#define HARD 0.5        // of the limit of work: from here on the best unknowns are kept
-#define FAR 4           // tolerances: a residual that is not left at the limit of work
-#define LEAST_LOWERED 0.5 // of the update that ends a round
-#define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
+#define LEAST_CAP 0.3   // below this: no momentum
+#define NO_MOMENTUM 0.3 // further work, over the limit of work, without momentum
+#define HARD 0.5        // share of the limit of work, from where the best unknowns are kept
+#define FAR 4           // tolerances: with a larger residual the iteration continues beyond the limit of work
+#define LEAST_LOWERED 0.5 // least factor on the update that ends a round
+#define LEAST_SWEEP 0.01 // share of the contacts that a sweep costs in itself, in the limit of work
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MORE = 2 };
 
-// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on.
-// What a cell adds ends at 2⁴⁵, some 6,000 times the tolerance, and earlier in a field of so many cells that a sum
-// would not hold them: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the
-// energy of one contact at convergence, so that 10²⁷ times that still fits.
+// Squares, in units where the squared tolerance is 2²⁰, have twelve digits from 10⁻⁷ times the tolerance on. The sum of
+// a cell is cut off at 2⁴⁵, some 6,000 times the tolerance, or lower in a field of so many cells that the total would
+// overflow: the root mean square is then a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one
+// contact at convergence, and 10²⁷ times that still fits.
 void bt_rounds_scale(bt_problem *problem, const bt_cells *t)
 {
     const double heaviest = t->heaviest, cells = (double)t->n_x * t->n_y + 1;
@@ -84,14 +84,14 @@ void bt_rounds_found(bt_cell *cell, const bt_found *found)
     cell->work->found_listed = cell->n_listed;
 }
 
-/// The bodies of the cell of body i may be moved.
+/// Mark that sweeps may move the bodies in the cell of body i.
 static void mark_cell_of(bt_world *world, bt_idx i)
 {
     const int32_t *at = world->bodies.cell[i];
     if (!world->bodies.large[i]) world->cells->cell[bt_cells_at(world->cells, at[0], at[1])].swept = true;
 }
 
-/// Bodies of the block of cell (x, y) may be moved.
+/// Mark that sweeps may move the bodies of the block of cell (x, y), if it has a list.
 static void mark_block(bt_cells *cells, int32_t x, int32_t y, double listed)
 {
     for (int j = 0; listed > 0 && j < 4; j++) {
@@ -100,8 +100,7 @@ static void mark_block(bt_cells *cells, int32_t x, int32_t y, double listed)
     }
 }
 
-/// Collective. Tell the value of each cell that has work, 1 or 0, to `take` on all ranks, which spreads it to the cells
-/// around.
+/// Collective. Pass the value, 1 or 0, of each cell with work to `take` on all ranks, which spreads it.
 static void spread(bt_world *world, double (*value_of)(const bt_cell *cell), bt_take_cell *take)
 {
     bt_cells *cells = world->cells;
@@ -119,8 +118,8 @@ static void spread(bt_world *world, double (*value_of)(const bt_cell *cell), bt_
 static double has_list(const bt_cell *cell) { return cell->n_listed > 0; }
 static double is_bad(const bt_cell *cell) { return cell->work->found.bad > 0; }
 
-/// Collective. Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside
-/// a large body always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last
+/// Collective. Mark the cells whose bodies sweeps over the present lists of all ranks may move; always those of floes
+/// beside a large body. Exactly these are extrapolated: a floe elsewhere would follow the rounding error of its last
 /// change, and the marks must not depend on ranks.
 static void mark_swept(bt_world *world)
 {
@@ -162,7 +161,7 @@ static bool is_touched(const bt_cells *cells, bt_idx k)
     const bt_cell *cell = &cells->cell[k];
     const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
     bool any = cell->phase == BT_COLOURS;
-    for (int j = 0; j < 4 && !any; j++) { // a cell without bodies may be there on some ranks only
+    for (int j = 0; j < 4 && !any; j++) { // a cell without bodies may exist on some ranks only
         const bt_cell *o = block[j] >= 0 ? &cells->cell[block[j]] : NULL;
         any = o && o->end > o->first && o->swept;
     }
@@ -206,7 +205,7 @@ void bt_rounds_residual(bt_world *world, const bt_problem *problem, bt_since sin
 
 // --- rounds over a part of the field --------------------------------------------------------------------------------
 
-/// The cell at (x, y) is bad: its list and those beside it stay.
+/// If the cell at (x, y) is bad, keep its list and those of its neighbours.
 static void keep_beside(bt_cells *cells, int32_t x, int32_t y, double bad)
 {
     for (int32_t dy = -1; bad > 0 && dy <= 1; dy++)
@@ -216,7 +215,7 @@ static void keep_beside(bt_cells *cells, int32_t x, int32_t y, double bad)
         }
 }
 
-/// Collective. Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach
+/// Collective. Empty the lists of cells that are neither bad nor next to a bad cell; the contacts of large bodies reach
 /// anywhere and stay.
 static void keep_near_bad(bt_world *world)
 {
@@ -236,8 +235,8 @@ typedef struct {
     double beta;
 } body_move;
 
-/// Move n velocities on by beta along their last change, 0: only keep them. A velocity is four numbers side by side, of
-/// which the last stays 0.
+/// Extrapolate n velocities by beta along their last change; with 0 only store them in `before`. A velocity is four
+/// adjacent numbers; the last stays 0.
 BT_FOR_EACH_CPU
 static void move_on_bodies(bt_vel *vel, bt_vel *before, bt_idx n, double beta)
 {
@@ -266,13 +265,13 @@ static void move_bodies(bt_world *world, bt_idx k, const void *context, bt_total
     move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 
-/// How far sweeps move on along the last change: the next one, and those before it.
+/// Extrapolation factors β of the next sweep and of the sweeps before it.
 typedef struct {
     double theta, beta[BT_REST + 1];
     double against; ///< of the last sweep
 } momentum;
 
-/// Returns the largest update.
+/// One sweep over the lists. Returns the largest update.
 static double sweep(bt_world *world, const bt_problem *problem, const bt_before *first, bool all, momentum *m,
                     bt_work *work)
 {
@@ -297,14 +296,14 @@ double bt_rounds_sweep(bt_world *world, const bt_problem *problem, bt_work *work
     return sweep(world, problem, NULL, true, &(momentum){0}, work);
 }
 
-/// What counts against the limit.
+/// The work that counts against the limit.
 static double spent(const bt_problem *problem, const bt_work *work)
 {
     if (problem->plain) return (double)work->sweeps;
     return (double)(work->updates + work->checks) + (1 + LEAST_SWEEP * (double)work->contacts) * (double)work->sweeps;
 }
 
-/// How far the next sweep moves on from where the last one has come to.
+/// Set the extrapolation factor of the next sweep.
 static void gather(double cap, momentum *m)
 {
     double *beta = m->beta;
@@ -318,7 +317,7 @@ static void gather(double cap, momentum *m)
     }
 }
 
-/// With `on`, the momentum of the round before goes on. Returns true when the last update was no more than `small`.
+/// One round. With `on`, the momentum of the previous round continues. True if the last update was at most `small`.
 static bool run_round(bt_world *world, const bt_problem *problem, int length, double cap, bool on, double limit,
                       double small, momentum *m, bt_work *work)
 {
@@ -336,13 +335,13 @@ static bool run_round(bt_world *world, const bt_problem *problem, int length, do
     }
 }
 
-/// The cap and the length of the rounds, by what they bring.
+/// The cap and the length of rounds, adapted to their gain.
 typedef struct {
     double cap, mark; ///< mark: misfit at the last residual pass
     int length;
 } pace;
 
-/// The sum of squares, or the largest where the part of a cell is cut off (bt_rounds_scale): that sum shows no gain.
+/// The sum of squares, or the largest square if the sum of a cell is cut off (bt_rounds_scale), as that shows no gain.
 static double misfit_of(const bt_problem *problem, const bt_work *work)
 {
     const double largest = work->residual * work->residual;
@@ -366,8 +365,7 @@ static void adapt(pace *a, const bt_problem *problem, double misfit)
     if (a->cap < LEAST_CAP) a->cap = 0;
 }
 
-/// Keep the unknowns of a hard problem when they are the best so far; `best`: the residual of those kept, INFINITY =
-/// none.
+/// Keep the unknowns of a hard problem if they are the best so far; best: the residual of those kept, INFINITY = none.
 static void keep_better(bt_world *world, const bt_problem *problem, const bt_work *work, double *best)
 {
     if (!(work->residual < *best)) return;
@@ -375,7 +373,8 @@ static void keep_better(bt_world *world, const bt_problem *problem, const bt_wor
     bt_phases_any_order(world, problem->keep, &(bt_keeping){BT_KEEP}, &(bt_totals){0});
 }
 
-/// Back to the best unknowns where they are better than the present ones. True: the velocities are theirs.
+/// Restore the best unknowns if they are better than the present ones. True if so, with the velocities formed from
+/// them.
 static bool back_to_best(bt_world *world, const bt_problem *problem, bt_work *work, double best)
 {
     if (!(work->residual > problem->tolerance && best < work->residual)) return false;
@@ -405,15 +404,15 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
     momentum m = {.theta = 1};
     double best = INFINITY, small = (problem->plain ? 1 : BT_NEAR) * problem->tolerance; // update that ends a round
     const double all_work = problem->limit * (problem->plain ? 1 : (double)(work->contacts + 1));
-    // between the two no momentum
+    // between `fast` and `limit`: no momentum
     double fast = spent(problem, work) + all_work, limit = fast + (problem->plain ? 0 : NO_MOMENTUM * all_work);
     int more = 0; // further attempts
-    bool settled = true; // velocities, and the residual, are those of the impulses
+    bool settled = true; // velocities and residual have been formed from the impulses
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > problem->tolerance && spent(problem, work) < limit; n++) {
         const bool last = !problem->plain && spent(problem, work) >= fast;
         if (last) {
-            // from where momentum came nearest
+            // from the best state that momentum has reached
             if (a.cap > 0 && back_to_best(world, problem, work, best)) settled = true, all = false;
             a.cap = 0, a.length = problem->length;
         } else if (n % ROUNDS == 0 && !problem->plain) adapt(&a, problem, misfit_of(problem, work));

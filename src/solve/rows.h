@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Four contacts side by side, and their effective masses (private to the solver).
 //
-// A record of a contact is four lines of four numbers: those of four contacts are turned from rows to columns with a
-// quarter of the instructions of copying them number by number.
+// A contact record is four lines of four numbers; transposing the lines of four contacts takes a quarter of the
+// instructions of copying them number by number.
 #ifndef BERGTOW_ROWS_H
 #define BERGTOW_ROWS_H
 
@@ -33,7 +33,7 @@ typedef struct bt_masses {
     bt_vec w[2], w12, mn[2], per_det, wt, mt;
 } bt_masses;
 
-/// Rows to columns; its own inverse.
+/// Transpose; its own inverse.
 BT_INLINE void bt_transpose(bt_motions *m)
 {
     const bt_vec a = __builtin_shufflevector(m->x, m->y, 0, 4, 2, 6),
@@ -95,10 +95,10 @@ BT_INLINE bt_four_rows bt_rows_of(const bt_contact *const contact[BT_LANES])
                      .one = n > none, .two = n > none + 1};
 }
 
-/// x where the mask says so, else 0.
+/// x where the mask is set, else 0.
 BT_INLINE bt_vec bt_only(bt_mask m, bt_vec x) { return (bt_vec)((bt_mask)x & m); }
 
-/// As bt_mass_of for contacts with points; 0 of others.
+/// As bt_mass_of for contacts with points; 0 for others.
 BT_INLINE bt_masses bt_masses_of(const bt_four_rows *rows, bt_invs a, bt_invs b)
 {
     const bt_vec free = a.m + b.m, one = {1, 1, 1, 1}, none = {0};

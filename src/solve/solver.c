@@ -20,9 +20,9 @@
 
 // --- restitution -----------------------------------------------------------------------------------------------------
 
-// The work of each island's contacts, and what of its restitution is left.
+// The work of each island's contacts, and the remaining share of its restitution.
 
-/// With the restitution of the bodies, whatever an earlier solution of this step has left of it.
+/// Restore the full restitution of the bodies after an earlier solution of this step.
 static void restore(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
@@ -54,7 +54,7 @@ bool bt_restitution_lower(bt_world *world)
         const bt_cell *cell = &ts->cell[ts->order[i]];
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
             const bt_contact *contact = &cell->contacts[j];
-            // what sheets take must not cover what rebounds give
+            // work lost by sheets must not hide energy gained by rebounds
             if (contact->ln[0] + contact->ln[1] == 0 || contact->n == 0) continue;
             bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
                        bt_contacts_work(world, contact) - bt_contacts_unsolved_work(contact, world->stats.residual));
@@ -86,7 +86,7 @@ bool bt_restitution_lower(bt_world *world)
 #include <malloc.h>
 #endif
 
-#define UPDATES 6.0 // of every contact that one of max_sweeps stands for
+#define UPDATES 6.0 // updates of every contact that one of max_sweeps allows
 
 bt_solver *bt_solver_create(void)
 {
@@ -118,18 +118,19 @@ void bt_solver_rest(bt_world *world)
     give_back(world->solver);
     bt_cells_rest(world->cells);
 #ifdef __GLIBC__
-    // Free pieces of some kilobytes between pieces in use are of no use to arrays of all floes, and would stay.
+    // Free chunks of some kilobytes between chunks in use are too small for arrays of all floes, and would stay
+    // allocated.
     malloc_trim(0);
 #endif
 }
 
-/// The line, in the pass of the last cell on the rank that owns the large bodies.
+/// The tow line when the cell is the last one, on the rank that owns the large bodies; otherwise NULL.
 static bt_tow *line_of(const bt_world *world, bt_idx cell)
 {
     return cell == world->cells->n - 1 && bt_tow_has_line(world->tow) ? world->tow : NULL;
 }
 
-// --- velocities from impulses, and what they leave of the contact law ------------------------------------------------
+// --- velocities from impulses, and residuals -------------------------------------------------------------------------
 
 void bt_solver_begin_cell(bt_world *world, bt_cell *cell)
 {
@@ -176,12 +177,12 @@ static void apply_impulses(bt_world *world, bt_idx k, const void *context, bt_to
     bt_vel *towed = &v[bt_world_towed(world)];
     const bt_inv by = inv[bt_world_towed(world)];
     bt_tow_apply(line, towed, by);
-    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first
-    // sweep. So the line has its exact update in every step, not only in steps with sweeps.
+    // On a heavy body the residual Δλ W of a tension that is off by newtons is below the tolerance before the first
+    // sweep. So the line gets its exact update in every step, not only in steps with sweeps.
     if (warm) bt_tow_update(line, towed, by);
 }
 
-/// Of the contacts of a cell that is swept in place.
+/// Residual of the contacts of a cell that is swept in place.
 static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_problem *problem)
 {
     const double near = BT_NEAR * problem->tolerance;
@@ -197,7 +198,7 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
         found.bad += r > near;
         found.rows += contact->n + 1 + (contact->n == 0);
         const double *x = cell->work->in_place[i].before;
-        // or did before the last sweep
+        // or changed in the last sweep
         bool on =
             problem->plain || contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || x[0] != contact->ln[0] ||
             x[1] != contact->ln[1] || x[2] != contact->lt;
@@ -209,7 +210,7 @@ static bt_found residual_in_place(bt_cell *cell, const bt_vel *v, const bt_probl
     return found;
 }
 
-/// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
+/// Residual of a cell, and its list: contacts that bear load or close. Sweeps would not change the others.
 void bt_solver_residual_of_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)totals;
@@ -240,8 +241,8 @@ static void free_velocities(bt_world *world, bt_idx k, const void *context, bt_t
                (size_t)(cell->end - cell->first) * sizeof *bodies->vel);
 }
 
-/// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up. True when some
-/// impulse on this rank is not zero.
+/// Form the velocities U* + M⁻¹ Jᵀ λ from scratch, so that rounding errors of increments do not accumulate. True if
+/// some impulse on this rank is not zero.
 static bool form_velocities(bt_world *world, bool warm)
 {
     bt_totals totals = {0};
@@ -254,7 +255,7 @@ static void settle(bt_world *world) { form_velocities(world, false); }
 
 // --- sweeps ----------------------------------------------------------------------------------------------------------
 
-/// Memory is read in the order of the contacts, but with gaps too wide for the hardware to foresee.
+/// Memory is read in the order of the contacts, but with gaps too wide for the hardware prefetcher.
 static inline void fetch_ahead(const bt_cell *cell, bt_idx j)
 {
     if (j >= cell->n_listed) return;
@@ -262,7 +263,7 @@ static inline void fetch_ahead(const bt_cell *cell, bt_idx j)
     for (size_t k = 0; k < sizeof(bt_contact); k += 64) __builtin_prefetch(line + k);
 }
 
-/// Every listed contact once; returns the largest update, m/s.
+/// Update every listed contact once; returns the largest update, m/s.
 static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
 {
     enum { AHEAD = 3 };
@@ -323,7 +324,7 @@ void bt_solver_sweep_cell(bt_world *world, bt_idx k, const void *context, bt_tot
     int64_t times = 0;
     double most = INFINITY;
     for (; times < world->par.inner_sweeps || times == 0; times++) {
-        // more would be for nothing until the neighbours have changed
+        // further passes gain nothing until the neighbours have changed
         if (most <= BT_ENOUGH * sweep->problem->tolerance) break;
         most = update_list(cell, v, world->bodies.inv);
         if (line) most = bt_max(most, bt_tow_update(line, towed, world->bodies.inv[bt_world_towed(world)]));
@@ -390,7 +391,7 @@ static bt_problem contact_problem(const bt_world *world)
     return problem;
 }
 
-/// Start from the impulses of the step before. True when there are any.
+/// Start from the impulses of the previous step. True if there are any.
 static bool warm_start(bt_world *world)
 {
     bt_tow *line = world->cells->cell[world->cells->n - 1].own ? line_of(world, world->cells->n - 1) : NULL;
@@ -411,9 +412,9 @@ static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_
     bt_sum_add(&totals->sum[0], cell->n_contacts);
 }
 
-/// Does the solution at hand hold with the contacts that have been added to it? Where all impulses are there still, and
-/// no more, the velocities are theirs, and the residual elsewhere is as it was. An impulse can be gone: a point gave
-/// way to an edge of another part of the floe, or a bound took some of it.
+/// Does the present solution still hold with the contacts that were added? If the impulses are still the same, the
+/// velocities belong to them, and the residual elsewhere is unchanged. An impulse can be lost: a point was replaced by
+/// an edge of another part of the floe, or a bound has cut it.
 static bool holds_with_more(bt_world *world)
 {
     bt_step_stats *st = &world->stats;
@@ -434,7 +435,7 @@ static void sweep_to_tolerance(bt_world *world)
     bt_work work = {0};
     const bool pressed = warm_start(world);
     bt_rounds_residual(world, &problem, BT_BEGINS, &work);
-    // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
+    // An impulse below the tolerance, carried over from step to step, would push for ever: at least one sweep.
     if (pressed && work.residual <= problem.tolerance) {
         bt_rounds_sweep(world, &problem, &work);
         bt_rounds_residual(world, &problem, BT_SWEPT, &work);
@@ -471,7 +472,7 @@ void bt_solver_solve(bt_world *world, bool extends)
     solver->extends = extends && !solver->rebounds && !world->par.plain_sweeps;
     bt_step_stats *st = &world->stats;
     st->restitution_cut = false;
-    // the displacements of the last step are over, and their array is of the bodies that were here then
+    // the displacements of the last step are void: their array belongs to the bodies held then
     solver->shifted = false;
     st->sweeps = st->contact_updates = st->contact_moves = st->residual_checks = 0;
     if (bt_domain_is_idle(world)) settle(world);

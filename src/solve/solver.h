@@ -3,7 +3,7 @@
 //
 //     w = J U2 + b,   M̃ (U2 − U*) = Jᵀ λ,   0 ≤ λ_n ⟂ w_n ≥ 0,   |λ_t| ≤ μ λ_n, λ_t opposes slip       (1)–(3)
 //
-// with M̃ = M + Δt diag K, the mass with what of the drag is implicit (bodies.inv is its inverse).
+// with M̃ = M + Δt diag K, the mass with the implicit part of the drag (bodies.inv is its inverse).
 //
 // A sweep updates contacts one after the other (a contact is a manifold: the normals of its two points are solved
 // together, and their friction as one), cell by cell in the order of cells.h, with the velocities as they stand.
@@ -12,19 +12,19 @@
 // Data flow of a step. contacts (bt_cell.contacts, with the impulses of the last step) and vel_free -> vel ->
 //   residual pass -> lists -> sweeps -> vel, contacts:
 //   residual reads all contacts and vel; writes bt_work_list.list (contacts that bear load or close), the residual, and
-//   what is bad;
-//   sweep    goes over the lists only, inner_sweeps times a cell before the next has its turn: its data are then in the
-//            first-level cache, and between ranks nothing need be exchanged. The listed contacts are packed for it,
+//   the number of bad contacts;
+//   sweep    covers the lists only, inner_sweeps times per cell before the next cell: its data are then in the
+//            first-level cache, and ranks need not exchange anything. The listed contacts are packed for it,
 //            four a batch, and put back before the next residual pass (src/solve/batch.h); those of
 //            movable large bodies and with rising bounds are swept where they are;
-//   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
-//   settle   at the end: vel anew from vel_free and the impulses, then a residual pass: the residual that is reported.
-// Rounds of sweeps, momentum, what ends them and what they may cost: src/solve/rounds.h. The position projection is the
-// same, with displacements in place of velocities.
+//   move     between two sweeps: extrapolates impulses and velocities along their last change (bt_solver.before);
+//   settle   at the end: vel anew from vel_free and the impulses, then a residual pass for the reported residual.
+// Rounds of sweeps, momentum, stopping rules and the limit of work: src/solve/rounds.h. The position projection works
+// likewise, with displacements in place of velocities.
 //
 // Why momentum: a plain sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and
 // ~m_berg/m_floe where a heavy berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over
-// all contacts, as the reference; both end on a projected sweep, with velocities formed anew from the impulses, and the
+// all contacts, as the reference; both end with a projected sweep, velocities formed anew from the impulses, and the
 // same criterion.
 //
 // Where a contact law applies (contact/law.h) the normal impulses have an upper bound, too, λ_n <= L(w_n)
@@ -32,11 +32,11 @@
 //
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
-// which is zero exactly at a solution. The largest change of a row's speed in a sweep is the same quantity seen while
-// velocities still change; it only says when the true map is worth its price. Its root mean square over all rows is
-// reported beside it. Under a bound the map is bounded, too, by L W: an impulse that is short of it by more than 1 %
-// counts by the speed that it leaves (bt_short_residual in src/solve/kernel.h); of sheets, whose impulse has a
-// direction, one that takes 1 % less power than the bound allows.
+// which is zero exactly at a solution. The largest change of a row's speed in a sweep is the same quantity while
+// velocities still change; it only tells when evaluating the true map is worth its cost. The root mean square over all
+// rows is also reported. Under a bound L the map itself is bounded by L W: an impulse more than 1 % short of L counts
+// by the speed left (bt_short_residual in src/solve/kernel.h); for sheets, whose impulse has a direction, if it takes
+// 1 % less power than the bound allows.
 #ifndef BT_SOLVER_H
 #define BT_SOLVER_H
 
@@ -51,31 +51,31 @@
 // Restitution that never adds energy (private to the solver).
 //
 // Newton's law can add energy when several contacts of a body rebound at once, or slip (Kane & Levinson 1985). Movable
-// bodies that touch form an island; where the contacts of an island come out with positive work, the step is solved
-// again with the restitution of that island halved, and again, at last with none, where the work is never positive.
+// bodies that touch form an island; if the contacts of an island do positive work, the step is solved again with the
+// restitution of that island halved, repeatedly, and finally with none, when the work is never positive.
 
 /// Collective. Full restitution for every island; false (and nothing to do) when no contact of this step has any.
 bool bt_restitution_begin(bt_world *world);
 
-/// Collective. Lower the restitution, and the biases, of every island whose contacts did positive work, beyond what
-/// rows solved to the residual may do (λ times the residual, and rounding). True when there was one.
+/// Collective. Lower the restitution, and the biases, of every island whose contacts did positive work beyond the error
+/// of the solution (λ times the residual, and rounding). True if there was one.
 bool bt_restitution_lower(bt_world *world);
 
 typedef struct bt_solver {
     struct bt_work_list *work;   ///< [n_work] of the cells (solve/rounds.h)
     bt_idx n_work;
-    bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/solve/rounds.h)
+    bt_vel *before;              ///< [n bodies] the velocities before the last sweep (src/solve/rounds.h)
     bt_idx cap_before;
     double line_before[BT_MAX_BRANCHES]; ///< impulses of the line before the last sweep, N s
-    double line_best[BT_MAX_BRANCHES]; ///< and of the best residual pass, while they are kept
+    double line_best[BT_MAX_BRANCHES]; ///< and at the best residual pass, while kept
     bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
     bt_idx cap_bodies;
     bool shifted;                ///< the projection, or its second pass, has moved something
     bool turned;                 ///< some pair has turned so far that there may be a second pass
-    bool parted_again;           ///< which has moved something
-    struct bt_aside *aside;      ///< [cells] what cells have put aside while they are projected (solve/project.c)
+    bool parted_again;           ///< the second pass has moved something
+    struct bt_aside *aside;      ///< [cells] contacts put aside during the projection (solve/project.c)
     bool rebounds;               ///< some contact of this step has a restitution
-    bool extends;                ///< the solution of this step at hand may hold with the contacts that were added
+    bool extends;                ///< the present solution of this step may still hold with the added contacts
     struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)
 } bt_solver;
 
@@ -83,30 +83,27 @@ bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *solver);
 
 /// Collective. Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes U2,
-/// contacts get their impulses, stats the counts. Newton's law of restitution can add energy when several
-/// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
-/// touch each other) come out with positive work, the step is solved again with the restitution of that island
-/// halved, and again, at last with none, where the work is never positive. `extends`: vel is a solution of this step
-/// before its last detection, which stays where the contacts that were added allow it.
+/// contacts get their impulses, stats the counts. Restitution is lowered where it would add energy
+/// (bt_restitution_lower). `extends`: vel solves this step as before its last detection; that solution stays if the
+/// added contacts allow it.
 void bt_solver_solve(bt_world *world, bool extends);
 
-/// A cell whose contacts are about to be solved for: its lists are empty, impulses are cut to what their bounds allow
-/// now, nothing has moved.
+/// Prepare a cell for the solve: empty its list, cut impulses to their present bounds, mark nothing as moved.
 void bt_solver_begin_cell(bt_world *world, bt_cell *cell);
 
-/// Passes over a cell (bt_problem.residual and .sweep): contacts, biases, bounds and masses are those of the cell,
-/// velocities those of the problem.
+/// Passes over a cell (bt_problem.residual and .sweep): contacts, biases, bounds and masses come from the cell,
+/// velocities from the problem.
 bt_visit bt_solver_residual_of_cell, bt_solver_sweep_cell;
 
-/// Memory that the next step takes anew goes back, for what is written between steps.
+/// Free memory that the next step allocates anew, to make room for output between steps.
 void bt_solver_rest(bt_world *world);
 
 /// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
 /// same rows without friction; they move poses and never touch velocities.
 void bt_solver_project(bt_world *world);
 
-/// Collective. After the poses have moved: a second pass where turns have left overlap (solve/project.c). True: there
-/// are displacements, by which alone the poses move once more.
+/// Collective. After the poses have moved: a second pass where rotations have left overlap (solve/project.c). True if
+/// there are displacements; the poses then move once more, by these alone.
 bool bt_solver_project_again(bt_world *world);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Four doubles at a time (private to the solver): the compiler's vectors, element by element in IEEE arithmetic without
-// contraction, whatever instructions they are translated to. So the bits do not depend on the processor.
+// contraction, whatever the instructions. So the bits do not depend on the processor.
 #ifndef BERGTOW_VECTOR_H
 #define BERGTOW_VECTOR_H
 

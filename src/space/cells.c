@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Labels of the floes, storage in the order of the cells, and the array of cells; what they are for: space/cells.h.
+// Labels of the floes, storage in the order of the cells, and the array of cells; see space/cells.h.
 #include "space/cells.h"
 
 #include <assert.h>
@@ -13,13 +13,13 @@
 
 double bt_margin_most(const bt_world *world) { return 16 * world->par.size; }
 
-// Contacts make floes faster within the step. With a fifth more than the speeds before the solve, the margin holds for
-// the solution nearly wherever that matters: 300 steps of full-scale tows in 80 and 90 % ice take a sixth fewer
-// updates. Two fifths save no more and add a tenth to the time of detection. Plain sweeps, the reference, have no such
-// room: fields are shaken with them, and keep their bits.
+// Contacts make floes faster within the step. With a fifth more than the speeds before the solve, the margin nearly
+// always holds for the solution: 300 steps of full-scale tows in 80 and 90 % ice take a sixth fewer updates. Two fifths
+// save no more and add a tenth to the time of detection. Plain sweeps, the reference, have no such allowance: fields
+// are shaken with them, and must keep their bits.
 #define FASTER 1.2
 
-/// The way, m, rounded up to a power of √2, between the slop and the largest margin.
+/// A distance, m, rounded up to a power of √2, between the slop and the largest margin.
 static double round_up(const bt_world *world, double least)
 {
     if (!(least < bt_margin_most(world)) && world->par.size > 0) return bt_margin_most(world);
@@ -116,7 +116,7 @@ void bt_cells_leave(bt_cells *cells)
             cells->busy[kept++] = k;
         } else {
             cells->is_busy[k] = 0;
-            cells->cell[k].swept = false; // as a residual pass would have it: nothing here moved on
+            cells->cell[k].swept = false; // as after a residual pass: nothing here is extrapolated
         }
     }
     cells->n_busy = kept;
@@ -139,8 +139,8 @@ double bt_cells_outside(const bt_world *world, bt_idx i)
     return out;
 }
 
-/// Side of the cells along one direction. Around a period their number is even, or the colours would meet at the seam;
-/// below four the block of a cell would meet itself, and one cell takes the whole period.
+/// Side of the cells along one direction. Around a period their number is even, or equal colours would meet at the
+/// seam; with fewer than four the block of a cell would meet itself, so one cell takes the whole period.
 static double side_along(double side, double period, int32_t *wrap)
 {
     *wrap = 0;
@@ -150,8 +150,7 @@ static double side_along(double side, double period, int32_t *wrap)
     return period / *wrap;
 }
 
-/// Floor of the coordinate, within what 32 bits hold; a body with a pose that is not a number lands in cell 0 and is
-/// reported by the run.
+/// Floor of the coordinate in cells, limited to 32 bits; a body with a NaN pose goes to cell 0, and the run reports it.
 static int32_t coordinate(double x, double x0, double side, int32_t wrap)
 {
     if (wrap == 1) return 0;
@@ -188,7 +187,7 @@ static void choose_cells(bt_world *world, double margin)
     double side = bt_max((world->par.cell > 0 ? world->par.cell : CELL_DIAMETERS) * world->par.size,
                          2 * cells->reach + cells->margin_max + 0.5 * world->par.size);
     if (!(side > 0)) side = 1;
-    for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 cells a floe, by larger cells
+    for (;; side *= 2) { // a floe far out must not cost memory: larger cells, at most 4 per floe
         cells->side_x = side_along(side, world->par.period_x, &cells->wrap_x);
         cells->side_y = side_along(side, world->par.period_y, &cells->wrap_y);
         int32_t low[2] = {0, 0}, high[2] = {0, 0};
@@ -204,14 +203,14 @@ static void choose_cells(bt_world *world, double margin)
         cells->n_x = (int32_t)n_x, cells->n_y = (int32_t)n_y;
         break;
     }
-    // A direction that one cell spans has no neighbours, and no bound on where a centroid stands.
+    // In a direction that one cell spans there are no neighbours, and centroids may lie anywhere.
     double slack = INFINITY;
     if (cells->wrap_x != 1) slack = bt_min(slack, cells->side_x - 2 * cells->reach - cells->margin_max);
     if (cells->wrap_y != 1) slack = bt_min(slack, cells->side_y - 2 * cells->reach - cells->margin_max);
     cells->allowance = 0.5 * slack;
 }
 
-/// Only a pose that is not a number lies outside the box of the floes.
+/// Clamp to the box of the floes, outside which only a NaN pose lies.
 static int32_t within(int32_t c, int32_t low, int32_t n) { return c < low ? low : c >= low + n ? low + n - 1 : c; }
 
 void bt_cells_choose(bt_world *world, double margin)
@@ -245,7 +244,7 @@ static int by_cell(const void *p, const void *q)
 
 static void **array_of(bt_bodies *bodies, int k) { return (void **)((char *)bodies + bt_body_fields[k].array); }
 
-/// Bodies in the order of `from`; vertices, whose number differs, follow.
+/// Permute the bodies to the order of `key`, and their vertices, whose number varies, with them.
 static void permute(bt_bodies *bodies, const sort_key *key)
 {
     const size_t n = (size_t)bodies->n;
@@ -312,7 +311,7 @@ static bt_cell *new_cell(bt_cells *cells, int32_t x, int32_t y)
     return cell;
 }
 
-/// A cell for every place of the box that this rank owns or whose bodies it holds; the last one for the large bodies.
+/// Make a cell for every place of the box that this rank owns or whose bodies it holds; the last is for large bodies.
 void bt_cells_make(bt_world *world)
 {
     bt_cells *cells = world->cells;

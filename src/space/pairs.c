@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Broad phase: the list of a cell's pairs near enough to be looked at, kept over many steps.
+// Broad phase: the list of a cell's pairs near enough to be tested for contact, kept over many steps.
 //
-// Boxes of the bodies of a cell are compared all with all, and with those of the cells beside it where both come near
-// the border; a cell has some dozens, and comparing boxes that lie in a row in memory is quicker than any finer grid.
-// The list holds while no body of the block has travelled (path of its fastest point) farther than its share of the
-// clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
-// floes of the cell itself; one that can be moved has its pairs in the last cell. Shores have a tree of their own
-// (shore.h).
+// The boxes of the bodies of a cell are compared all with all, and with those of neighbouring cells where both are near
+// the border; a cell has some dozens, and comparing boxes in contiguous memory is faster than any finer grid. The list
+// holds while no body of the block has travelled (path of its fastest point) farther than its share of the clearance;
+// then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with floes in their own
+// cells; a movable large body has its pairs in the last cell. Shores have their own tree (shore.h).
 //
-// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so
-// far towards each other, a step looks at these near ones alone.
+// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved
+// that far towards each other, a step tests only these near pairs.
 #include "space/pairs.h"
 
 #include <math.h>
@@ -30,7 +29,7 @@ void bt_pair_scratch_free(bt_pair_scratch *scratch)
     *scratch = (bt_pair_scratch){0};
 }
 
-/// Box of n vertices of body i, from its vertex `part` on.
+/// Box about n vertices of body i, from vertex `part` on.
 static void box_of_part(const bt_bodies *bodies, bt_idx i, int part, int n, double box[N_BOX])
 {
     box[X] = bodies->pose[i].x;
@@ -51,9 +50,9 @@ static void box_of(const bt_bodies *bodies, bt_idx i, double box[N_BOX])
     box_of_part(bodies, i, 0, (int)(bodies->offset[i + 1] - bodies->offset[i]), box);
 }
 
-/// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the
-/// nearest image of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole
-/// period.
+/// Do two boxes come within clearance? With periodic images a long wall can reach around the period: its box is
+/// compared at the nearest image of the centroids, which is right for bodies shorter than half a period, and for walls
+/// that span the whole period.
 static inline bool near(const bt_params *par, const double *a, const double *b, double clearance)
 {
     const double dx = bt_nearest_image(b[X] - a[X], par->period_x), dy = bt_nearest_image(b[Y] - a[Y], par->period_y);
@@ -70,7 +69,8 @@ static void append_parts(bt_pair_scratch *scratch, size_t *n, bt_idx a, bt_idx b
                                        .axes = BT_NO_AXES};
 }
 
-/// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.
+/// Append the pair of bodies i and j, whose boxes come within clearance; if one of them is not convex, the pairs of its
+/// parts that do.
 static void append(const bt_world *world, bt_pair_scratch *scratch, size_t *n, bt_idx i, bt_idx j, double clearance)
 {
     const bt_bodies *bd = &world->bodies;
@@ -93,7 +93,7 @@ static void append(const bt_world *world, bt_pair_scratch *scratch, size_t *n, b
     }
 }
 
-/// Body i, whose box this is, and the polygons of shores whose boxes come within clearance of it.
+/// Append the pairs of body i, with this box, and the polygons of shores whose boxes come within clearance of it.
 static void append_shore(const bt_world *world, bt_pair_scratch *scratch, size_t *n, bt_idx i, const double *box,
                          double clearance)
 {
@@ -118,7 +118,7 @@ static void append_shore(const bt_world *world, bt_pair_scratch *scratch, size_t
     }
 }
 
-/// Boxes of the bodies of cell k, after those there are; returns their number then.
+/// Append the boxes of the bodies of cell k to the n present ones; returns the new number.
 static size_t add_boxes(const bt_world *world, bt_idx k, bt_pair_scratch *scratch, size_t n)
 {
     if (k < 0) return n;
@@ -136,7 +136,7 @@ static size_t add_boxes(const bt_world *world, bt_idx k, bt_pair_scratch *scratc
     return n;
 }
 
-/// Bodies [i0, i1) of the scratch.
+/// Bodies [begin, end) of the scratch.
 typedef struct { size_t begin, end; } boxes;
 
 /// Box about several boxes, and about the centroid of the first.
@@ -150,7 +150,7 @@ static void box_about(const bt_params *par, const bt_pair_scratch *scratch, boxe
         const double *b = scratch->box + N_BOX * i;
         const double dx = bt_nearest_image(b[X] - box[X], par->period_x),
                      dy = bt_nearest_image(b[Y] - box[Y], par->period_y);
-        box[LOW_X] = bt_min(dx + b[LOW_X], box[LOW_X]); // passes over a NaN
+        box[LOW_X] = bt_min(dx + b[LOW_X], box[LOW_X]); // ignores a NaN
         box[LOW_Y] = bt_min(dy + b[LOW_Y], box[LOW_Y]);
         box[HIGH_X] = bt_max(dx + b[HIGH_X], box[HIGH_X]);
         box[HIGH_Y] = bt_max(dy + b[HIGH_Y], box[HIGH_Y]);
@@ -168,7 +168,7 @@ static void swap_boxes(bt_pair_scratch *scratch, size_t i, size_t j)
     }
 }
 
-/// Those of `group` whose boxes come within clearance of another box, which are put in front of the others.
+/// The members of `group` whose boxes come within clearance of another box; they are moved to the front.
 static boxes in_front(const bt_params *par, bt_pair_scratch *scratch, boxes group, const double *box, double clearance)
 {
     size_t end = group.begin;
@@ -185,11 +185,11 @@ static void among(const bt_world *world, bt_pair_scratch *scratch, boxes group, 
                 append(world, scratch, n, scratch->body[i], scratch->body[j], clearance);
 }
 
-/// Do bodies of cells side by side, at most three sides apart with what they stand outside, have one nearest image?
+/// Is the nearest image of two bodies in neighbouring cells unique? They are at most three sides apart.
 static bool one_image(int32_t wrap) { return wrap == 0 || wrap >= 8; }
 
-/// Pairs of a body of one cell and one of the other. Few of either are near the border: first those are found that come
-/// near the box about all of the other cell, with some room for the rounding of that box.
+/// Append pairs of a body in each of two cells. Few of either are near the border: first find those near the box about
+/// the whole other cell, with some room for the rounding of that box.
 static void between(const bt_world *world, bt_pair_scratch *scratch, boxes p, boxes q, double clearance, size_t *n)
 {
     const bt_cells *ts = world->cells;
@@ -237,7 +237,8 @@ static size_t pairs_of_block(const bt_world *world, const bt_cell *cell, bt_idx 
     return n;
 }
 
-/// Row or column of cells at a distance from their corner, m; a body may be farther off than cells can be counted.
+/// Row or column of cells at a distance, m, from their corner; a body may be farther off than 32-bit cell coordinates
+/// reach.
 static int32_t line_at(double distance, double side)
 {
     const double fence = 1e9;
@@ -254,7 +255,7 @@ bt_cell_range bt_pairs_range(const bt_world *world, bt_idx i, double pad)
         .x0 = line_at(x + box[LOW_X] - pad, cells->side_x), .x1 = line_at(x + box[HIGH_X] + pad, cells->side_x),
         .y0 = line_at(y + box[LOW_Y] - pad, cells->side_y), .y1 = line_at(y + box[HIGH_Y] + pad, cells->side_y),
     };
-    // Within the cells there are, and each of them once.
+    // Only existing cells, and each of them once.
     if (cells->wrap_x && range.x1 - range.x0 >= cells->wrap_x - 1) range.x0 = 0, range.x1 = cells->wrap_x - 1;
     if (cells->wrap_y && range.y1 - range.y0 >= cells->wrap_y - 1) range.y0 = 0, range.y1 = cells->wrap_y - 1;
     if (cells->wrap_x == 1) range.x0 = range.x1 = 0;
@@ -305,7 +306,7 @@ static bt_named name_of(const bt_gid *gid, const bt_pair *pair, size_t at)
     return (bt_named){gid[pair->a], gid[pair->b], (uint32_t)pair->part[0] << 16 | pair->part[1], (uint32_t)at};
 }
 
-/// What the old list knew of the pairs that stay: both lists are sorted, one walk matches them.
+/// Replace the list, keeping the data of pairs that stay: both lists are sorted, so one pass matches them.
 static void replace(bt_world *world, bt_cell *cell, bt_pair_scratch *scratch, size_t n)
 {
     const bt_gid *gid = world->bodies.gid;
@@ -327,7 +328,8 @@ static void replace(bt_world *world, bt_cell *cell, bt_pair_scratch *scratch, si
     of->n_pairs = of->cap_pairs = (bt_idx)n;
 }
 
-/// What moves the bodies of the pairs of cell k, m: of its four cells, or of any for the last one; and large bodies.
+/// Path lengths, m, of the bodies in the pairs of cell k: of its four cells, or of any cell for the last one; and of
+/// large bodies.
 static void paths_of(const bt_world *world, bt_idx k, const bt_cell *cell, double moved[4], double *large)
 {
     const bt_cells *ts = world->cells;
@@ -345,7 +347,7 @@ bool bt_pairs_near(const bt_world *world, bt_idx k, bt_cell *cell, double margin
     paths_of(world, k, cell, moved, &large);
     most = large - cell->search.large_near;
     for (int i = 0; i < 4; i++) most = bt_max(most, moved[i] - cell->search.moved_near[i]);
-    // A hundredth is for the rounding of sums of paths.
+    // One per cent is left for the rounding of sums of paths.
     if (cell->search.near_known && 2 * most + margin - cell->search.margin_near <= 0.99 * bt_pairs_near_gap(world))
         return true;
     memcpy(cell->search.moved_near, moved, sizeof moved);

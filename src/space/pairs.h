@@ -7,25 +7,25 @@
 #include "space/cells.h"
 #include "space/shore.h"
 
-/// Room that one thread works in.
+/// Scratch memory of one thread.
 typedef struct bt_pair_scratch {
     double *box;          ///< [6][cap_boxes] x, y and the box about them: low x, low y, high x, high y, m
     bt_idx *body;         ///< [cap_boxes]
     size_t cap_boxes;
     bt_pair *found;       ///< [cap_found]
     size_t cap_found;
-    bt_named *name;       ///< [2][cap_names] of those found
+    bt_named *name;       ///< [2][cap_names] of the pairs found
     size_t cap_names;
     bt_shore_list shore;  ///< polygons near a body
 } bt_pair_scratch;
 
-/// Make the list of cell k, kept in `cell`, anew unless it holds for this margin.
+/// Renew the list of cell k, kept in `cell`, unless it is valid for this margin, m.
 void bt_pairs_update(bt_world *world, bt_idx k, bt_cell *cell, double margin, bt_pair_scratch *scratch);
 
-/// Do the near pairs of cell k hold for this margin? If not, they are to be found anew: clears them, and keeps what has
-/// moved by now.
+/// Are the near pairs of cell k valid for this margin, m? If not, clear them and store the present paths; they have to
+/// be found anew.
 bool bt_pairs_near(const bt_world *world, bt_idx k, bt_cell *cell, double margin);
-/// Pair i is near when it has less than this between its bodies beyond the margin, m.
+/// A pair is near if its gap exceeds the margin by less than this, m.
 double bt_pairs_near_gap(const bt_world *world);
 void bt_pairs_add_near(bt_cell *cell, bt_idx i);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Passes over the active cells by threads, with the exchange between ranks under way.
+// Passes over the active cells by threads, overlapped with the exchange between ranks.
 #include "space/phases.h"
 #include "base/inside.h"
 
@@ -19,7 +19,7 @@ static void totals_merge(bt_totals *into, const bt_totals *from)
     into->most2 = bt_max(into->most2, from->most2);
 }
 
-// --- who does what ---------------------------------------------------------------------------------------------------
+// --- assignment of cells ---------------------------------------------------------------------------------------------
 
 /// Has this rank work in cell k?
 static bool has_work(const bt_world *world, bt_idx k)
@@ -33,14 +33,14 @@ static bool is_listed(const bt_world *world, bt_idx k)
     return world->cells->cell[k].n_listed > 0 || (k == world->cells->n - 1 && bt_tow_has_line(world->tow));
 }
 
-/// What a visit to cell k takes, in contacts. A cell itself costs something, too.
+/// Cost of a visit to cell k, in contacts. A cell itself costs something, too.
 static int64_t cost_of(const bt_cells *cells, bt_idx k, bt_which which)
 {
     enum { CELL = 4 };
     return CELL + (which == BT_LISTED ? cells->cell[k].n_listed : cells->cell[k].n_contacts);
 }
 
-/// Stretches of cells [begin, end) of the order with equal parts of the work, one a share.
+/// Divide cells [begin, end) of the order into shares of equal work.
 static void deal_stretch(bt_cells *cells, bt_which which, bt_idx begin, bt_idx end, bt_share *share)
 {
     int64_t all = 0, before = 0;
@@ -55,7 +55,7 @@ static void deal_stretch(bt_cells *cells, bt_which which, bt_idx begin, bt_idx e
     share[cells->n_shares - 1].end = end;
 }
 
-/// Of n cells first those that are listed, otherwise as they stand. Returns how many these are.
+/// Move the listed ones among n cells to the front, in unchanged order. Returns how many they are.
 static bt_idx listed_first(const bt_world *world, bt_idx *cell, bt_idx n)
 {
     bt_idx listed = 0;
@@ -93,7 +93,7 @@ void bt_phases_distribute(bt_world *world)
     }
 }
 
-/// Stretch of the order that cell k belongs to: of each phase first the cells at the border of the rank.
+/// Stretch of the order to which cell k belongs: in each phase the border cells come first.
 static int stretch_of(const bt_world *world, bt_idx k)
 {
     const bt_cell *cell = &world->cells->cell[k];
@@ -133,7 +133,7 @@ void bt_phases_order(bt_world *world)
         cells->order[at[stretch_of(world, k)]++] = k;
         find_before(world, k);
         cells->n_contacts += cells->cell[k].n_contacts;
-        cells->cell[k].n_listed = cells->cell[k].n_contacts; // until they are listed
+        cells->cell[k].n_listed = cells->cell[k].n_contacts; // until there are lists
     }
     bt_phases_distribute(world);
 }
@@ -154,7 +154,7 @@ typedef struct pass {
     uint32_t number; ///< of the pass; 0: in any order
     bt_which which;
     bt_idx me, team; ///< number of the thread, and how many there are
-    bt_totals *own;  ///< what the thread adds up
+    bt_totals *own;  ///< totals of this thread
 } pass;
 
 static pass in_order(bt_world *world, bt_which which, bt_visit *visit, const void *context)
@@ -171,10 +171,10 @@ static pass in_order(bt_world *world, bt_which which, bt_visit *visit, const voi
                   .team = 1};
 }
 
-/// Waits until cell k has been visited in this pass.
+/// Wait until cell k has been visited in this pass.
 static void wait_for_cell(const pass *mine, bt_idx k)
 {
-    enum { TURNS = 2000 }; // some 50 µs: longer than a cell takes, unless its thread has lost its processor
+    enum { TURNS = 2000 }; // some 50 µs: longer than a cell takes, unless its thread has been descheduled
     for (int n = 0; atomic_load_explicit(&mine->w->cells->turn[k].done, memory_order_acquire) != mine->number; n++)
         if (n > TURNS) sched_yield();
 }
@@ -189,8 +189,8 @@ static void visit_cell(const pass *mine, bt_idx k)
     if (waits) atomic_store_explicit(&turn->done, mine->number, memory_order_release);
 }
 
-/// Cells of one stretch of the list: first those of this thread's share, then what others have
-/// not yet taken.
+/// Visit cells of one stretch of the list: first those of this thread's share, then cells that others
+/// have not yet taken.
 static void visit_stretch(pass *mine, int stretch)
 {
     bt_share *share = &mine->share[stretch * mine->n_shares];
@@ -205,14 +205,14 @@ static void visit_stretch(pass *mine, int stretch)
     }
 }
 
-/// Waits for the other threads.
+/// Wait for the other threads.
 static void wait_for_team(const pass *mine)
 {
     if (mine->team == 1) return;
 #pragma omp barrier
 }
 
-/// A stretch of the cells for each thread.
+/// Visits before the pass, with one stretch of cells for each thread.
 static void visit_before(pass *mine)
 {
     if (!mine->before) return;
@@ -248,9 +248,9 @@ static void run_stretches(pass *mine)
     for (int s = 0; s < mine->n_stretches; s++) visit_stretch(mine, s);
 }
 
-/// The pass on all threads. One thread goes without OpenMP: in libgomp a team of one and each of its barriers enter the
-/// kernel too, to wake nobody, which was a sixth of the time of a small run. It adds to `totals` itself: to clear, copy
-/// and merge totals of its own costs as much as a small cell.
+/// Run the pass on all threads. A single thread runs without OpenMP: in libgomp a team of one and each of its barriers
+/// also enter the kernel, which took a sixth of the time of a small run. It adds to `totals` directly: to clear, copy
+/// and merge separate totals costs as much as a small cell.
 static void run_on_team(void run(pass *), pass *o, bt_totals *totals)
 {
     for (bt_idx s = 0; s < o->n_stretches * o->n_shares; s++)
@@ -275,7 +275,7 @@ static void run_on_team(void run(pass *), pass *o, bt_totals *totals)
     o->w->stats.in_team += bt_clock() - t0;
 }
 
-/// The reference: what the schedule above comes to, without threads, shares, or an exchange under way.
+/// The reference: equivalent to the schedule above, without threads, shares or overlapped exchange.
 static void run_plain(bt_world *world, const bt_before *before, bt_visit *visit, const void *context, bt_vel *exchanged,
                       bt_totals *totals)
 {

@@ -9,9 +9,9 @@
 #include "base/elementary.h"
 #include "body/bodies.h"
 
-static const double CONE = 1e-6; // rad; two pieces of a straight shore may both answer, never none
-static const double ENDS = 4;    // slops: an edge that shows less than this does not count, nor a gap to its end
-enum { LEAF = 4 };               // polygons at the end of a branch
+static const double CONE = 1e-6; // rad; two pieces of a straight shore may both count, never neither
+static const double ENDS = 4;    // slops: an exposed edge shorter than this does not count, nor a gap to its end
+enum { LEAF = 4 };               // polygons per leaf
 
 typedef struct { double low[2], high[2]; } box;
 
@@ -21,7 +21,7 @@ struct bt_shore {
     bt_face *face;              ///< [n_faces] one for each vertex
     bt_shore_polygon *polygon;  ///< [n] in the order of the tree
     int n;
-    /// [] box about the polygons of a node; node k has the nodes 2k + 1 and 2k + 2 for the halves of its polygons
+    /// [] box about the polygons of a node; nodes 2k + 1 and 2k + 2 hold the halves of node k
     box *node;
 };
 
@@ -95,7 +95,7 @@ static bool boxes_meet(const double low[2], const double high[2], const double o
     return low[0] <= other_high[0] && other_low[0] <= high[0] && low[1] <= other_high[1] && other_low[1] <= high[1];
 }
 
-/// Calls take(context, polygon) for each that meets the box.
+/// Call take(context, polygon) for each polygon whose box meets `bounds`.
 static void visit(const bt_shore *shore, int node, int begin, int end, const box *bounds,
                   void (*take)(void *, const bt_shore_polygon *), void *context)
 {
@@ -113,7 +113,7 @@ static void visit(const bt_shore *shore, int node, int begin, int end, const box
 
 typedef struct { bt_shore_list *list; double x, y, shift[2], period[2]; } nearest;
 
-/// At this image, if it is the nearest one: each polygon once, as its body's pairs have one offset.
+/// Take a polygon at this image if it is the nearest: each polygon once, as pairs of its body have one offset.
 static void take_nearest(void *context, const bt_shore_polygon *p)
 {
     const nearest *c = context;
@@ -160,7 +160,7 @@ static void vertex(const polygon *shape, int i, double out[2])
     out[1] = shape->y + v[1];
 }
 
-/// Outward unit normal of edge i, and how long that is, m.
+/// Outward unit normal of edge i; returns the length of the edge, m.
 static double normal_of(const polygon *shape, int i, double n[2])
 {
     const double *v = shape->v + 2 * (i < shape->n ? i : i - shape->n), *q = shape->v + 2 * ((i + 1) % shape->n);
@@ -179,7 +179,7 @@ static double height(const polygon *shape, int i, const double x[2])
     return n[0] * (x[0] - v[0]) + n[1] * (x[1] - v[1]);
 }
 
-/// How far apart two polygons are along an edge normal of the first, at least.
+/// Does an edge normal of the first polygon separate the two by more than `reach`, m?
 static bool apart_by_edge_of(const polygon *p, const polygon *q, double reach)
 {
     for (int i = 0; i < p->n; i++) {
@@ -193,7 +193,7 @@ static bool apart_by_edge_of(const polygon *p, const polygon *q, double reach)
     return false;
 }
 
-/// From where to where along edge i of p, at a distance `beyond` outside it, q is; false: nowhere.
+/// The interval along edge i of p, at a distance `beyond` outside it, that lies in q; false if there is none.
 static bool cover(const polygon *p, int i, const polygon *q, double beyond, double span[2])
 {
     double n[2], x[2];
@@ -212,8 +212,8 @@ static bool cover(const polygon *p, int i, const polygon *q, double beyond, doub
     return span[0] < span[1];
 }
 
-/// The normals of polygon `shape` at a point of its boundary, from the first to the last edge that it is on; false: it
-/// is inside, or `near` is false.
+/// Normals u to w of polygon `shape` at point x, of the first and the last edge on which x lies; false if x is inside,
+/// or if it is farther off than `reach` (*near false).
 static bool cone_at(const polygon *shape, const double x[2], double reach, bool *near, double u[2], double w[2])
 {
     bool on[BT_MAX_VERTICES];
@@ -234,7 +234,7 @@ static bool cone_at(const polygon *shape, const double x[2], double reach, bool 
     return true;
 }
 
-/// What cones a and b have in common, into a.
+/// Replace cone a by the intersection of a with the cone u to w.
 static void intersect(bt_face *a, const double u[2], const double w[2])
 {
     bt_face both = *a, b = {.u = {u[0], u[1]}, .w = {w[0], w[1]}};
@@ -254,7 +254,7 @@ typedef struct {
     double shift[2], reach;
     bool alone;              ///< no other polygon lies against it
     bt_face *face;           ///< [of->count], or NULL
-    double (*span)[2];       ///< what others cover of one edge
+    double (*span)[2];       ///< intervals of one edge that others cover
     int n_spans, cap_spans, edge;
 } about;
 
@@ -281,7 +281,7 @@ static void take_beside(void *context, const bt_shore_polygon *q)
     memcpy(around->span[around->n_spans++], span, sizeof span);
 }
 
-/// Looks at all polygons that may lie against around->of, at all images.
+/// Visit all polygons that may lie against around->of, at all images.
 static void look_beside(const bt_world *world, about *around)
 {
     const double period[2] = {world->par.period_x, world->par.period_y};
@@ -298,7 +298,7 @@ static void look_beside(const bt_world *world, about *around)
         }
 }
 
-/// The ends of an edge that others cover are taken off.
+/// Cut off the ends of an edge that others cover.
 static void trim(about *around, bt_face *face, double length)
 {
     face->from = 0;
@@ -329,7 +329,7 @@ static void find_faces(const bt_world *world, about *around)
     }
 }
 
-/// All polygons of the fixed bodies there are.
+/// Collect all polygons of the fixed bodies.
 static void collect(const bt_world *world, bt_shore *shore)
 {
     const bt_bodies *bodies = &world->bodies;

@@ -7,7 +7,7 @@
 
 enum { ROOM = 2 * (BT_MAX_VERTICES + 2) };
 
-static const double EQUAL = 1e-9; // areas that differ by less of the whole are those of a symmetric cut
+static const double EQUAL = 1e-9; // share of the whole: if areas differ by less, the cut is symmetric
 
 static bool take(bt_piece *piece, int n, const double *v)
 {

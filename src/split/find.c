@@ -1,45 +1,45 @@
 // SPDX-License-Identifier: MIT
 // The section along which a floe splits.
 //
-// Demand of a section, with N and M of section.h, h the thickness and l the length. At each end of it
+// Demand of a section, with N and M of section.h, h the thickness and l the length. At each of its ends
 //     s = (N ∓ 6 M/l − 0.45 f_i)/(h l) = p + e,   − at a, + at b
-// p = 4 F_y/(h l) of the pair that opens it there; f_i is the thrust at the other end that the floe's inertia balances:
-// a point load that goes through the depth of a beam relieves the far fibre by 0.40 to 0.55 f_i/(h l) at widths of 1 to
-// 4 times l, by finite elements. Across the section, with f_t the thrust of the contacts at an end along it, f_i its
-// part that inertia balances (the rest is held behind), and w the length they bear on,
+// with p = 4 F_y/(h l) from the pair that opens it there; f_i is the part of the thrust at the other end that the
+// floe's inertia balances: a point load through the depth of a beam relieves the far fibre by 0.40 to 0.55 f_i/(h l) at
+// widths of 1 to 4 times l, by finite elements. Across the section, with f_t the thrust of the contacts at one end
+// along it, f_i its part balanced by inertia (the rest has a support behind the floe), and w the length on which they
+// bear,
 //     t = (0.637 (1 − W^{3/2})(f_t − f_i) + 0.43 (1 − W) f_i)/(h b),   b = min(A/l, l), W = min(w/b, 1)
 // 0.637 = 2/π is that of a disc between two points; both by finite elements. The strength of law.h with c = 0.75
-// belongs to a pair at the mouth of the crack, and to what closes it there:
+// applies to a pair at the mouth of the crack, and to stress that closes it there:
 //     near   p > 0:  (p + min(e, 0))/σ_0.75 + max(e, 0)/σ_1.4
 //     far    p = 0:  e/σ_1.4
 //     burst          t/σ_1.4
 // The three peak at different places, so that the largest of the ratios counts, not their sum.
 //
-// Sections that are looked at: from each of the largest contacts (up to 8, of a tenth of the largest load on) along
-// its force, through the centroid, and to each other of them; through the centroid across the most tensile axis of
-// Σ sym(x f); and across the long axis of the floe at its centroid and at a third and two thirds of its length: a strip
-// that is struck at its end breaks at a third. No section is shorter than the least width. A convex floe in two pieces,
-// each nowhere narrower than that, has none: one of them has no chord parallel to the section longer than it, and the
-// width of a convex body is at most its longest chord of any direction.
+// Sections that are tested: from each of the largest contacts (up to 8, of a tenth of the largest load on) along its
+// force, through the centroid, and to each other of them; through the centroid across the most tensile axis of Σ sym(x
+// f); and across the long axis of the floe at its centroid and at a third and two thirds of its length: a strip struck
+// at its end breaks at a third. No section is shorter than the least width. In a convex floe a shorter section cannot
+// leave two pieces that are nowhere narrower: one of them has no longer chord parallel to the section, and the width of
+// a convex body is at most its longest chord in any direction.
 //
 // Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
 // and loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here. N and M
-// are those of either part, so at most the mean of both:
+// can be computed from either part, so they are at most the mean of both bounds:
 //     |N| ≤ (G + |F|)/2 + |T| √(A/J)/2:   of F, |A1 − A2| |F|/(2 A); |S1| = |S2|, so each is at most half of
 //         ∫ r dA ≤ √(A J).
 //     |M| ≤ ((R + e) G + √(J/A + e²) |F| + |T| (1 + e √(A/J)))/2:   of F, ∫ |x − m| dA ≤ √(A (J + A e²)); of T/J,
 //         (J1 + J2 + 2 |m| |S1|)/2.
-// A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the
-// centroid and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a
-// point that is cut off, m the middle of the section and f ≤ l/(2 r) the share of the way from Q to c at which the
-// triangle of both has the section, on which it is f c long. If the line from Q through m meets c, then |Q m| ≤ f D.
-// If not, m is beside the triangle, of which no more than l/2 is on the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2.
-// So |Q m| ≤ d with d = D l/(2 r). Nothing that is cut off is wider than l, so it has a share s ≤ l d/A of the area,
-// and
+// A short section of a convex floe cuts off little. With D = 2 R, r the distance of the nearest edge from the centroid
+// and l ≤ 2 r, the chord through the centroid parallel to the section, c, is at least 2 r long. Let Q be a point of the
+// part cut off, m the middle of the section and f ≤ l/(2 r) the share of the distance from Q to c at which the triangle
+// Qc meets the section, in a length f c. If the line from Q through m meets c, then |Q m| ≤ f D. If not, m is outside
+// the triangle, which covers at most l/2 of the section: f ≤ l/(4 r), and |Q m| ≤ f D + l/2. So |Q m| ≤ d with d = D
+// l/(2 r). The part cut off is nowhere wider than l, so its share of the area is s ≤ l d/A, and
 //     |N| ≤ G + s (|F| + |T| R A/J),   |M| ≤ d (G + s (|F| + |T| R A/J))
 // Pairs add p ≤ 4 P/(h l) at their own end and press on the other.
-// Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises:
-// between two lengths each is taken where it is largest.
+// Bounds of N and M/l of the first kind fall with l, those of the second rise, and h l times the strength rises: over a
+// range of lengths each is evaluated where it is largest.
 #include "split/find.h"
 #include "base/elementary.h"
 
@@ -50,11 +50,11 @@
 #include <string.h>
 
 static const double BURST_HELD = 0.637, BURST_FREE = 0.43, FAR_RELIEF = 0.45;
-static const double LEAST_LOAD = 0.1; // / the largest load: sections are looked for from contacts that carry more
+static const double LEAST_LOAD = 0.1; // share of the largest load: only contacts that carry more give sections
 static const double EQUAL = 1e-9;    // ratios that differ by less are equal
-static const double COMPACT = 0.1;   // second moments along both axes that differ by less of their sum: no long axis
+static const double COMPACT = 0.1;   // of the sum of the second moments: if both differ by less, no long axis
 
-/// Numbers of a floe's outline that do not depend on loads.
+/// Quantities of a floe's outline that do not depend on loads.
 typedef struct form {
     double area, polar, radius, inradius;
     double xx, xy, yy;               ///< second moments, m4
@@ -80,10 +80,10 @@ static form form_of(const bt_split_floe *floe)
     return outline;
 }
 
-static const double STEP = 1.1;  // ratio of the lengths between which a bound is taken at once, for what a floe bears
-static const double COARSE = 2;  // the same for the loads of a step
+static const double STEP = 1.1;  // ratio of the ends of a length range with one bound, for bt_split_borne
+static const double COARSE = 2;  // the same, for the loads of a step
 
-/// Of loads: G, |F|, |T| and P.
+/// Sums over the loads: G, |F|, |T| and P.
 typedef struct sums { double size, net, torque, opening; } sums;
 
 static sums sums_of(const bt_load_case *loads)
@@ -91,7 +91,7 @@ static sums sums_of(const bt_load_case *loads)
     return (sums){loads->size, bt_hypot(loads->fx, loads->fy), fabs(loads->torque), loads->opening};
 }
 
-/// Upper bound of stress over strength of sections of these lengths.
+/// Upper bound of stress / strength for sections of lengths in this range.
 static double bound_between(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law,
                             double low, double high)
 {
@@ -116,7 +116,7 @@ static double bound_between(const bt_split_floe *floe, const form *outline, cons
                         (floe->thickness * outline->area * bt_split_strength(law, d, false))) / floe->factor;
 }
 
-/// Of all sections of length l and more.
+/// The same for all sections of length l or more.
 static double bound(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law, double l)
 {
     double most = 0;
@@ -128,7 +128,7 @@ static double bound(const bt_split_floe *floe, const form *outline, const sums *
     return bt_max(most, bound_between(floe, outline, s, law, l, INFINITY));
 }
 
-/// A length from which on no section splits, m.
+/// A length above which no section splits, m.
 static double safe_length(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law)
 {
     double high = INFINITY, low = bt_max(2 * outline->inradius, law->least_width);
@@ -240,8 +240,8 @@ static double demand(const search *s, const bt_section *section, bt_split_mode *
     return worst;
 }
 
-/// Take a section when it is the best so far. One from a contact keeps its direction, another is turned so that bending
-/// opens b: where both pieces are equal, the direction says which is the first.
+/// Take a section if it is the best so far. A section from a contact keeps its direction, others are turned so that
+/// bending opens b: if the pieces are equal, the direction decides which is the first.
 static void consider(const search *s, bt_chord chord, bool from_contact)
 {
     double a[2], b[2];
@@ -301,8 +301,7 @@ static void search_sections(const search *s)
 {
     const bt_load_case *loads = s->loads;
     const bt_split_floe *floe = s->floe;
-    // The largest contacts, then in the order of the loads: an order by size would turn on rounding where two
-    // are equal.
+    // Choose the largest contacts, in the order of the loads: an order by size would depend on rounding.
     int chosen[BT_SPLIT_CONTACTS] = {0}, n = 0;
     double largest = 0;
     for (int k = 0; k < loads->n; k++)
@@ -320,7 +319,7 @@ static void search_sections(const search *s)
         memmove(chosen + least, chosen + least + 1, (size_t)(n - 1 - least) * sizeof *chosen);
         chosen[n - 1] = k;
     }
-    // Both ends of a section may move to a vertex.
+    // Both ends of a section may move to a vertex, so 2 slops more.
     const double safe = floe->convex ? s->safe + 2 * s->law->slop : INFINITY;
     const bool central = !(2 * s->form->inradius > safe); // through the centroid
     double xx = 0, xy = 0, yy = 0, scale = 0;
@@ -328,7 +327,7 @@ static void search_sections(const search *s)
         const bt_edge_load *edge = &loads->load[chosen[i]];
         consider_from(s, edge->place, edge->load->fx, edge->load->fy);
         if (central) consider_from(s, edge->place, -edge->x, -edge->y);
-        // Both ends of a section are looked at; in an outline that is not convex the way back may be another.
+        // In an outline that is not convex the section from the other end may differ.
         for (int j = floe->convex ? i + 1 : 0; j < n; j++) {
             const bt_edge_load *other = &loads->load[chosen[j]];
             const double dx = other->x - edge->x, dy = other->y - edge->y;
@@ -340,8 +339,8 @@ static void search_sections(const search *s)
     }
     double x, y;
     if (central && major_axis(xx, xy, yy, EQUAL * scale, &x, &y)) consider_through(s, 0, 0, -y, x);
-    // A chord at a third is at least half as long as its parallel through the centroid, which is at two thirds at most:
-    // lengths of parallel chords are concave.
+    // A chord at a third of the length is at least half as long as the parallel one through the centroid, which lies at
+    // most at two thirds: the length of parallel chords is concave.
     const form *outline = s->form;
     if (outline->inradius > safe) return;
     if (!major_axis(outline->xx, outline->xy, outline->yy, COMPACT * outline->polar / 2, &x, &y)) return;

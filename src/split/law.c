@@ -6,7 +6,7 @@
 #include <math.h>
 
 static const double PAIR_FACTOR = 0.75, FACTOR = 1.4; // c of law.h
-static const double YOUNG = 5e9, POISSON = 0.3;           // of full-scale sea ice, assumed: 2 to 6 GPa are in use
+static const double YOUNG = 5e9, POISSON = 0.3;           // of full-scale sea ice, assumed; 2 to 6 GPa are in use
 
 double bt_split_strength(const bt_split_law *law, double l, bool pair)
 {

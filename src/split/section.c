@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Chords of an outline, and what they have to carry (section.h).
+// Chords of an outline, and the loads on them (section.h).
 #include "split/section.h"
 #include "base/elementary.h"
 
@@ -17,7 +17,7 @@ void bt_chord_place(int n, const double *v, bt_chord_end end, double p[2])
     p[1] = a[1] + end.t * (b[1] - a[1]);
 }
 
-/// The place at share t, 0 to 1, of an edge, or a vertex within slop of it.
+/// The point at share t, 0 to 1, of an edge, or a vertex within the slop of it.
 static bt_chord_end place_on(int n, const double *v, int edge, double t, double slop)
 {
     const int next = edge + 1 < n ? edge + 1 : 0;
@@ -46,9 +46,9 @@ typedef struct crossing {
     double t, along; ///< share of the edge; coordinate on the line, m
 } crossing;
 
-/// Where the line through (x, y) along the unit vector (dx, dy) crosses the outline, in order along it. A vertex is on
-/// one side or the other, the same for both its edges: there is always an even number, and what lies between the first
-/// and the second, the third and the fourth, ... is inside.
+/// Crossings of the line through (x, y) along the unit vector (dx, dy) with the outline, in order along the line. A
+/// vertex counts as on one side, the same for both its edges, so their number is even, and the line is inside between
+/// the first and the second, the third and the fourth, ...
 static int crossings(int n, const double *v, double x, double y, double dx, double dy, crossing *out)
 {
     int k = 0;
@@ -86,7 +86,7 @@ bool bt_chord_from(int n, const double *v, bt_chord_end end, double dx, double d
     const int k = crossings(n, v, p[0], p[1], dx, dy, at);
     int first = 0;
     while (first < k && at[first].along <= slop) first++;
-    if ((k - first) % 2 == 0) return false; // just beyond the place is outside
+    if ((k - first) % 2 == 0) return false; // the line leaves the outline at once
     *chord = (bt_chord){end, place_on(n, v, at[first].edge, at[first].t, slop)};
     return true;
 }
@@ -114,7 +114,7 @@ int bt_chord_piece(int n, const double *v, const bt_chord *chord, double *out)
     if (a.edge == b.edge && a.t == b.t) return 0;
     bt_chord_place(n, v, a, out);
     bt_chord_place(n, v, b, out + 2);
-    // vertices after b up to that of a's edge, which is a itself when a is a vertex
+    // number of vertices after b up to that of a's edge, which is a itself if a is a vertex
     int between = a.edge - b.edge;
     if (between < 0 || (between == 0 && b.t > a.t)) between += n;
     if (a.t == 0 && between > 0) between--;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Bodies that a program changes by hand between two steps; see edit.h.
 //
-// Cells rest, keep pairs and speeds on the ground that bodies move by steps alone. So labels and cells are made anew
-// before the next step, as when a moving window puts floes elsewhere (window.c), and the body counts as disturbed.
+// Resting cells and stored pairs and speeds rely on bodies moving only in steps. So labels and cells are made anew
+// before the next step, as when a moving window renews floes (window.c), and the body counts as disturbed.
 #include "step/edit.h"
 
 #include <math.h>
@@ -15,7 +15,7 @@
 #include "tow/tow.h"
 #include "base/elementary.h"
 
-/// Is it a body that a program may change? The answer is the same on all ranks, which hold bodies of their own.
+/// May a program change this body? The answer is the same on all ranks, though they hold different bodies.
 static bool may_change(const bt_world *world, bt_gid gid, const double x[3], bt_errors *err)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -49,7 +49,7 @@ bt_status bt_edit_velocity(bt_world *world, bt_gid gid, const double v[3], bt_er
     if (!may_change(world, gid, v, err)) return BT_ERR_USAGE;
     const bt_idx i = bt_world_index(world, gid);
     if (i >= 0) {
-        // what contacts did to it stays in the difference
+        // the difference, the change by contacts, stays
         bt_vel *u = &world->bodies.vel[i], *free = &world->bodies.vel_free[i];
         free->x = v[0] - (u->x - free->x);
         free->y = v[1] - (u->y - free->y);
@@ -59,8 +59,8 @@ bt_status bt_edit_velocity(bt_world *world, bt_gid gid, const double v[3], bt_er
     return BT_OK;
 }
 
-/// Put body i, if this rank holds it, to a place. The periods that this lies from the domain are taken off, and counted
-/// as those are by which it has gone; a floe of a moving window has been put into the window.
+/// Put body i, if this rank holds it, at a pose. A place outside the domain is wrapped, and the periods are counted as
+/// if travelled; a floe of a moving window counts as placed inside the window.
 static void put(bt_world *world, bt_idx i, const double to[3])
 {
     bt_bodies *bodies = &world->bodies;
@@ -78,8 +78,8 @@ static void put(bt_world *world, bt_idx i, const double to[3])
     if (world->window && bodies->gid[i] < world->window->n_floes) bodies->lap[i] = bt_window_lap(world, pose->x);
 }
 
-/// Collective. Id of a body over which body gid would lie at a place, by more than is left alone; −1 = none. The rank
-/// that owns it shows its outline there to all, as none of them need hold both it and what stands there.
+/// Collective. Id of a body that body gid would overlap by more than the slop at pose `to`; −1 = none. The rank that
+/// owns gid sends its outline to all, as no rank need hold both bodies.
 static double obstacle_at(const bt_world *world, bt_gid gid, const double to[3])
 {
     const bt_bodies *bodies = &world->bodies;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The history of splits, and its pieces as bodies in the place of their parents; see step/splitting.h.
+// The history of splits, and the pieces as bodies in place of their parents; see step/splitting.h.
 #include "step/splitting.h"
 
 #include <math.h>
@@ -118,7 +118,7 @@ uint64_t bt_splitting_hash(const bt_splitting *splitting)
 
 // --- pieces ----------------------------------------------------------------------------------------------------------
 
-/// A body for piece k of body i, by its velocity at the start of the step. v: its outline.
+/// Make a body of piece k of body i, with the velocity field of i at the start of the step. v: its outline.
 static void put_piece(bt_world *world, bt_idx i, const bt_split_record *record, int k, const double *v, bt_gid gid)
 {
     bt_bodies *bodies = &world->bodies;
@@ -154,7 +154,7 @@ static void put_piece(bt_world *world, bt_idx i, const bt_split_record *record, 
     bodies->lap[j] = lap;
 }
 
-/// Splits from..n of the history: pieces in the place of parents that this rank holds.
+/// Splits from..n of the history: put pieces in place of the parents that this rank holds.
 static void put_pieces(bt_world *world, int64_t from)
 {
     bt_bodies *bodies = &world->bodies;
@@ -189,8 +189,8 @@ static void put_pieces(bt_world *world, int64_t from)
     free(keep);
 }
 
-/// Records of pairs with parents become those of pairs with their pieces. Impulses are not handed on: points of a piece
-/// have other names.
+/// Turn the records of pairs with parents into records of pairs with their pieces. Impulses are not passed on: the
+/// points of a piece have other names.
 static bt_memory *hand_on(const bt_world *world, bt_memory *memory, int64_t *n, int64_t from)
 {
     const bt_splitting *splitting = world->splitting;

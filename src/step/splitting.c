@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Loads of the floes in a step, and floes that split by them; see step/splitting.h.
+// Loads of the floes in a step, and the floes that split under them; see step/splitting.h.
 #include "step/splitting.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ static void add(load_list *list, const load_row *row)
     list->row[list->n++] = *row;
 }
 
-/// `more` is given away: the first list is not copied.
+/// Append and free `more`; an empty list takes it over without a copy.
 static void append(load_list *list, load_list *more)
 {
     if (list->n == 0) {
@@ -69,7 +69,7 @@ static bt_split_floe floe_of(const bt_world *world, bt_idx i)
     return floe;
 }
 
-/// A contact with a normal impulse: where its pressure has its centre, and on what length it bears.
+/// Centre of pressure and bearing length of a contact with a normal impulse.
 typedef struct {
     double ran, rbn;    ///< ra×n, rb×n of the centre, m
     double length;      ///< m
@@ -81,9 +81,9 @@ static bool is_raft_edge(const bt_world *world, const bt_cell *cell, bt_idx j)
     return bt_law_on(&world->par, BT_LAW_RAFTING) && cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0;
 }
 
-/// Of two points that bear, the centre lies between them, and uniform pressure about it reaches to the nearer end: that
-/// is the nearer point itself, and where floes have rafted a half of the way between the points beyond it. One point
-/// bears on what it crushes, F/(p h), or on a point where nothing is crushed.
+/// With two points the centre lies between them, and the uniform pressure about it extends to the nearer end: the
+/// nearer point itself, or, for floes that have rafted, half the distance between the points beyond it. One point bears
+/// on the crushed length F/(p h), or without crushing on length 0.
 static centre centre_of(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
@@ -103,7 +103,7 @@ static bool gives_way(const bt_world *world, int law, const bt_contact *contact)
     return bt_law_on(&world->par, law) && bt_law_applies(world, law, contact->a, contact->b);
 }
 
-#define WEDGE (BT_PI / 3) // half angle from which on the thrust of a wedge closes the crack that it would open
+#define WEDGE (BT_PI / 3) // half angle above which the thrust of a wedge closes the crack that it would open
 
 static bool is_collision(const bt_world *world, const bt_collision *collision)
 {
@@ -111,7 +111,7 @@ static bool is_collision(const bt_world *world, const bt_collision *collision)
     return rule->conversion != BT_IMPACT_NONE && collision->impulse > 0 && collision->approach >= rule->least_speed;
 }
 
-/// Of a collision, N; the thinner ice is crushed.
+/// Peak force of a collision, N; the thinner ice is crushed.
 static double peak_of(const bt_world *world, const bt_contact *contact, const bt_collision *collision, double corner)
 {
     const double a = world->bodies.thickness[contact->a], b = world->bodies.thickness[contact->b];
@@ -123,14 +123,14 @@ static double peak_of(const bt_world *world, const bt_contact *contact, const bt
 
 /// Sizes of the loads of a contact with a normal impulse.
 typedef struct {
-    double force, peak; ///< normal forces: what persists, and a collision at its peak, N; 0 = none
+    double force, peak; ///< normal forces: persisting, and at the peak of a collision, N; 0 = none
     double friction;    ///< per normal force
     double opening[2];  ///< of a and of b, by the other's vertex: each force of the pair, per normal force
     int at;             ///< the point that bears most
 } pressing;
 
-/// A sharp vertex of another body that goes into a floe opens it by a pair of forces along the edge. A rigid vertex
-/// does not go in.
+/// Sizes of the loads of contact j. A sharp vertex of another body that penetrates a floe opens it by a pair of forces
+/// along the edge. A rigid contact does not penetrate.
 static pressing pressing_of(const bt_world *world, const bt_cell *cell, bt_idx j)
 {
     const bt_contact *contact = &cell->contacts[j];
@@ -152,7 +152,7 @@ static pressing pressing_of(const bt_world *world, const bt_cell *cell, bt_idx j
     return p;
 }
 
-/// The loads of contact j on the floe on its side a or b.
+/// Add the loads of contact j on the floe on its side a or b.
 static void add_side(const bt_world *world, const bt_cell *cell, bt_idx j, const pressing *p, const centre *c,
                      bool of_b, load_list *to)
 {
@@ -174,27 +174,27 @@ static void add_side(const bt_world *world, const bt_cell *cell, bt_idx j, const
     }
 }
 
-/// What is done with the contacts of a cell.
+/// The two passes over the contacts of a cell.
 typedef enum {
-    SUM, ///< bounds of the loads on floes that this rank owns are added up, and the loads on others listed
-    LIST ///< loads on its own floes that are to be looked at are listed
+    SUM, ///< add up bounds of the loads on floes that this rank owns, list the loads on others
+    LIST ///< list the loads on its own floes that may split
 } pass;
 
 static bool is_mine(const bt_world *world, bt_idx i) { return !world->domain || bt_domain_owns(world, i); }
 
-/// In the second pass only floes that may split by the sum of their loads.
+/// Does a pass consider floe i? The second only if it may split under the sum of its loads.
 static bool is_looked_at(const bt_world *world, bt_idx i, pass what)
 {
     return what == SUM || (is_mine(world, i) && world->splitting->sum[i] > 0);
 }
 
-/// Of the loads of a contact on its side a or b, with their opening forces, N.
+/// Size of the loads of a contact on its side a or b, with their opening forces, N.
 static double size_on(const pressing *p, bool of_b)
 {
     return (p->force + p->peak) * (sqrt(1 + p->friction * p->friction) + p->opening[of_b]);
 }
 
-/// For body i of a contact: is its load to be listed? In the first pass `most`, N, is added where it is not.
+/// Is the load of a contact on body i to be listed? If not, the first pass adds `most`, N, to the sum of i.
 static bool is_listed(bt_world *world, bt_idx i, pass what, double most)
 {
     double *sum = &world->splitting->sum[i];
@@ -253,21 +253,21 @@ static void add_cells(bt_world *world, pass what, load_list *to)
 
 static double size_of(const bt_floe_load *load) { return bt_hypot(load->fx, load->fy) + load->opening; }
 
-/// Does body i surely bear loads of this sum, N? What it bears follows from outline, thickness and strength, which an
-/// id has for ever.
+/// Does body i certainly bear loads of this sum, N? Its bound follows from outline, thickness and strength, which never
+/// change for an id.
 static bool is_borne(const bt_world *world, bt_idx i, double sum)
 {
     bt_splitting *splitting = world->splitting;
     double *borne = &splitting->borne[world->bodies.gid[i]];
     if (*borne == 0) {
         const bt_split_floe floe = floe_of(world, i);
-        // less what is rounding in sums and in turned outlines
+        // less the rounding of sums and of rotated outlines
         *borne = (1 - 1e-9) * bt_split_borne(&floe, &splitting->law);
     }
     return sum <= *borne;
 }
 
-/// Room for a sum of each body and for what each id bears.
+/// Make room for the sum of each body and the bound of each id.
 static void make_room(bt_splitting *splitting, const bt_bodies *bodies)
 {
     if (splitting->cap_sum < bodies->n) {
@@ -279,8 +279,8 @@ static void make_room(bt_splitting *splitting, const bt_bodies *bodies)
     for (; splitting->cap_borne < bodies->n_global; splitting->cap_borne++) splitting->borne[splitting->cap_borne] = 0;
 }
 
-/// Collective. Loads of the floes that this rank owns, but for those of floes whose loads together are too small to
-/// split them, in nearly all steps nearly all. Contacts of a floe may be found by other ranks, which send its loads.
+/// Collective. Loads of the floes that this rank owns, except floes whose loads together are too small to split them,
+/// which is nearly all. Other ranks may find contacts of a floe; they send its loads.
 static load_list collect(bt_world *world)
 {
     bt_splitting *splitting = world->splitting;
@@ -333,7 +333,7 @@ typedef struct {
     bt_split best;
 } judged;
 
-/// The loads [n] of floe i. They are sorted.
+/// Judge floe i under its loads [n], which are sorted here.
 static judged judge(const bt_world *world, bt_idx i, load_row *row, size_t n)
 {
     const bt_splitting *splitting = world->splitting;
@@ -363,7 +363,7 @@ static judged judge(const bt_world *world, bt_idx i, load_row *row, size_t n)
     return out;
 }
 
-/// Loads by floe: those of floe k of the n are at[first[k]] up to at[first[k + 1]].
+/// Group the loads by floe: those of floe k of the n returned are rows first[k] to first[k + 1] − 1.
 static bt_idx by_floe(const bt_world *world, load_list *list, bt_idx **floe, size_t **first)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -400,7 +400,7 @@ static void place_of(const bt_bodies *bodies, bt_idx i, bt_chord_end end, double
     out[1] += bodies->pose[i].y;
 }
 
-/// False when the cut cannot be made.
+/// Append a floe that splits; false if the cut cannot be made.
 static bool add_found(const bt_world *world, const judged *j, found_list *to)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -437,14 +437,14 @@ static int by_parent(const void *p, const void *q)
     return (a->record.parent > b->record.parent) - (a->record.parent < b->record.parent);
 }
 
-/// Collective. Those of all ranks, in the order of the ids of the parents.
+/// Collective. Gather the split floes of all ranks, in the order of the ids of the parents.
 static found_list of_all(const bt_world *world, found_list *mine)
 {
     found_list all = {0};
     all.row = bt_domain_gather_all(world, mine->row, mine->n, sizeof *mine->row, &all.n);
     all.vertex = bt_domain_gather_all(world, mine->vertex, mine->n_vertices, 2 * sizeof *mine->vertex, &all.n_vertices);
     int64_t at = 0;
-    for (size_t k = 0; k < all.n; k++) { // as they were put one after the other
+    for (size_t k = 0; k < all.n; k++) { // in the order in which they were gathered
         all.row[k].first_vertex = at;
         const int64_t *c = all.row[k].record.corners;
         at += c[0] + c[1] + c[2];
@@ -457,7 +457,7 @@ static found_list of_all(const bt_world *world, found_list *mine)
 
 enum { N_DEFERRED, N_TOO_SMALL, N_TOO_OLD, N_RAFTED, N_COUNTS };
 
-/// Floes that split by the loads of this solution: those of this rank. *most: largest ratio of one that cannot.
+/// This rank's floes that split under the loads of this solution. *most: largest ratio of a floe that cannot.
 static found_list find(bt_world *world, bt_sum count[N_COUNTS], double *most)
 {
     load_list loads = collect(world);
@@ -521,7 +521,7 @@ bool bt_splitting_step(bt_world *world, int round)
         book(splitting, &row->record);
     }
     const bool again = splitting->n > from;
-    if (!again) { // the last look at the step
+    if (!again) { // the last round of the step
         const int64_t left = (int64_t)found.n - no_id;
         bt_domain_reduce(world, &all);
         splitting->total.deferred += left;

@@ -21,9 +21,9 @@
 #include "partition/domain.h"
 #include "space/phases.h"
 
-/// Move body i by its velocity over dt, and by its displacement; returns the length of its path through the water's
-/// frame, m. Displacements of the projection are there only for cells that contacts may move: for others their array
-/// still holds what it held, maybe of other bodies.
+/// Move body i by its velocity over dt, and by its displacement if `shifted`; returns the length of its path relative
+/// to the water, m. Displacements of the projection exist only for cells that contacts may move: elsewhere the array
+/// holds stale values, perhaps of other bodies.
 static double move(bt_world *world, bt_idx i, double dt, bool shifted)
 {
     bt_bodies *bodies = &world->bodies;
@@ -38,7 +38,7 @@ static double move(bt_world *world, bt_idx i, double dt, bool shifted)
         x += d.x, y += d.y;
         if (d.x != 0 || d.y != 0 || d.w != 0) bodies->disturbed[i] = 1;
     }
-    if (dx == 0 && dy == 0 && turn == 0 && world->cells->still) return 0; // most floes of a cell that moves
+    if (dx == 0 && dy == 0 && turn == 0 && world->cells->still) return 0; // true of most floes of a moving cell
     bt_pose *pose = &bodies->pose[i];
     if (dx != 0 || dy != 0) {
         int32_t across = 0;
@@ -60,7 +60,7 @@ static double move(bt_world *world, bt_idx i, double dt, bool shifted)
     return path;
 }
 
-/// All bodies of the cell drift with the water, and nothing pushed them apart.
+/// Do all bodies of the cell drift with the water, undisturbed?
 static bool at_rest(const bt_world *world, const bt_cell *cell)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -72,11 +72,11 @@ static bool at_rest(const bt_world *world, const bt_cell *cell)
 }
 
 typedef struct {
-    double dt; ///< s, 0: by the displacements alone
+    double dt; ///< s; 0: displacements alone
     bool can_sleep, shifted;
 } way;
 
-/// The maxima: the farthest path, and how far a floe stands outside its cell, m.
+/// Maxima: the longest path, and the distance of a floe outside its cell, m.
 static void advance_cell(bt_world *world, bt_idx k, const void *context, bt_totals *most)
 {
     const way *by = context;
@@ -88,7 +88,7 @@ static void advance_cell(bt_world *world, bt_idx k, const void *context, bt_tota
     for (bt_idx i = cell->first; i < cell->end; i++) {
         const double length = move(world, i, by->dt, shifted);
         path = bt_max(path, length);
-        // no farther than before
+        // a floe at rest lies no farther out than before
         if (!last && (length > 0 || !ts->still)) out = bt_max(out, bt_cells_outside(world, i));
     }
     ts->moved[k] += path;
@@ -96,7 +96,7 @@ static void advance_cell(bt_world *world, bt_idx k, const void *context, bt_tota
     if (!last) most->most = bt_max(most->most, path);
     if (!moves || last) return;
     if (!by->can_sleep || !at_rest(world, cell)) ts->asleep[k] = BT_AWAKE;
-    // where forces have been informed, they would find what they found
+    // a cell already asleep stays so: its forces would be the same
     else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
 }
 
@@ -114,7 +114,7 @@ static void move_bodies(bt_world *world, way by)
 static void advance(bt_world *world)
 {
     bt_cells *ts = world->cells;
-    // Cells move with the water where that is not periodic.
+    // Cells move with the water along directions that are not periodic.
     bt_environment_advance(world);
     if (!(world->par.period_x > 0)) ts->x0 = world->par.x0 + world->drift_x;
     if (!(world->par.period_y > 0)) ts->y0 = world->par.y0 + world->drift_y;
@@ -125,12 +125,12 @@ static void advance(bt_world *world)
     bt_tow_advance(world);
 }
 
-#define WORK_ROUNDING 1e-10 // of the kinetic energy: work of the contacts above it is no rounding
+#define WORK_ROUNDING 1e-10 // share of the kinetic energy: larger work of the contacts is not rounding
 
 enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOLVED, ENERGY, POINTS, ACTIVE,
        N_BALANCE };
 
-/// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
+/// Momentum gained by bodies, and impulses received from bodies of infinite mass, separately.
 static void balance_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
@@ -144,7 +144,7 @@ static void balance_cell(bt_world *world, bt_idx k, const void *context, bt_tota
         if (bodies->motion[i] != BT_DYNAMIC) continue;
         const bt_vel *v = &bodies->vel[i];
         const double dx = v->x - bodies->vel_free[i].x, dy = v->y - bodies->vel_free[i].y;
-        if (dx != 0 || dy != 0) { // also of a floe that its contacts have stopped
+        if (dx != 0 || dy != 0) { // also of a floe stopped by its contacts
             bt_sum_add(&totals->sum[GAINED_X], dx / bodies->inv[i].m);
             bt_sum_add(&totals->sum[GAINED_Y], dy / bodies->inv[i].m);
         }
@@ -170,8 +170,9 @@ static void balance_cell(bt_world *world, bt_idx k, const void *context, bt_tota
     totals->most = bt_max(totals->most, cell->overlap);
 }
 
-/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
-/// line; the difference over the momentum exchanged is the residual. Also work, energy, counts and overlap of the step.
+/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses from bodies of infinite mass and the line; the
+/// difference over the momentum exchanged is the balance residual. Also sets work, energy, counts and overlap of the
+/// step.
 static void balance(bt_world *world)
 {
     const bt_cells *ts = world->cells;
@@ -188,7 +189,7 @@ static void balance(bt_world *world)
     double x[N_BALANCE];
     for (int k = 0; k < N_BALANCE; k++) x[k] = bt_sum_value(&all.sum[k]);
     const double ex = x[GAINED_X] - x[APPLIED_X], ey = x[GAINED_Y] - x[APPLIED_Y];
-    // A step that exchanges next to nothing is measured against the momentum carried: rounding is relative to that.
+    // A step that exchanges almost nothing is measured against the momentum carried, to which rounding is relative.
     const double scale = bt_max(x[EXCHANGED], 1e-4 * x[CARRIED]);
     st->momentum_residual = scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
     st->contact_work = x[WORK];
@@ -199,7 +200,7 @@ static void balance(bt_world *world)
     st->overlap = all.most;
 }
 
-/// Add to a phase the time since *t0, less what was spent waiting for other ranks, which has its own entry.
+/// Add to a phase the time since *t0, less the time spent waiting for other ranks, which has its own entry.
 static void clock_phase(bt_world *world, double *phase, double *t0)
 {
     bt_step_stats *st = &world->stats;
@@ -211,11 +212,11 @@ static void clock_phase(bt_world *world, double *phase, double *t0)
     *t0 = now;
 }
 
-/// Detect and solve. The step is solved again, from the impulses found so far, for two reasons. Pairs that bear load
-/// are found to pass each other, or pairs that were let pass to meet (contact/contacts.h): the last rounds only give
-/// rows back. And the margin of the detection holds for the velocities before the solve; contacts can make a floe
-/// faster (squeezed out of a wedge, spun, rebounding). When a solution that converged outruns the margin, cells whose
-/// margin has grown are detected again.
+/// Detect and solve. The step is solved again, from the impulses found so far, for two reasons. First, loaded pairs
+/// turn out to pass each other, or released pairs to meet (contact/contacts.h); the last rounds only restore rows.
+/// Second, the margin of the detection is valid for the velocities before the solve; contacts can make a floe faster
+/// (squeezed out of a wedge, spun, rebounding). When a converged solution outruns the margin, cells whose margin has
+/// grown are detected again.
 static void solve_contacts(bt_world *world)
 {
     enum { MAX_REPEATS = 4, MAX_ROUNDS = 8, MAX_RELEASES = 3 };
@@ -251,14 +252,14 @@ static void solve_contacts(bt_world *world)
         }
     }
     clock_phase(world, &st->phases.detect, &t0);
-    st->phases.detect -= st->phases.colour; // which it holds
+    st->phases.detect -= st->phases.colour; // `detect` includes it
     st->sweeps = sweeps;
     st->contact_updates = updates;
     st->contact_moves = moves;
     st->residual_checks = checks;
 }
 
-/// Free velocities and contacts, again with the pieces of floes that split (step/splitting.h).
+/// Free velocities and contacts, repeated with the pieces of floes that split (step/splitting.h).
 static void solve_split(bt_world *world)
 {
     bt_step_stats *st = &world->stats, all = {0};
@@ -289,7 +290,7 @@ void bt_world_step(bt_world *world)
     bt_step_stats *st = &world->stats;
     st->phases = st->shared = (bt_phases){0};
     st->in_team = 0;
-    bt_domain_exchange_time(world); // waited since the last step, for its record: not in the time of this one
+    bt_domain_exchange_time(world); // waiting since the last step belongs to its record, not to this step
     double t0 = bt_clock();
     bt_environment_begin(world); // U_w, U_a
     bt_window_begin(world);
@@ -299,7 +300,7 @@ void bt_world_step(bt_world *world)
         memcpy(world->forces->towed_at, (const double[]){world->tow->travel_x, world->tow->travel_y},
                sizeof world->forces->towed_at);
     bt_tow_lead(world);
-    bt_exposure_begin(world); // of floes, in some steps
+    bt_exposure_begin(world); // of floes, only in some steps
     clock_phase(world, &st->phases.forces, &t0);
     solve_split(world); // U2
     t0 = bt_clock();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The moving window: what step/window.h says, step by step.
+// Implementation of the moving window (step/window.h).
 //
-// Ranks. Which floes are due follows from their own state, so owners find them; the list of them, with the places they
-// would take, goes to all ranks, each of which tests the places against the bodies it owns. From there on everything is
-// done alike by every rank that holds a body, so copies stay copies; labels are renewed in the same step, which brings
-// the floes to their new ranks.
+// Ranks. Whether a floe is due follows from its own state, so owners find these floes; the list, with the places they
+// would take, goes to all ranks, and each tests the places against the bodies it owns. After that, all ranks that hold
+// a body do the same, so copies stay equal; labels are renewed in the same step, which brings the floes to their new
+// ranks.
 #include "step/window.h"
 
 #include <math.h>
@@ -21,9 +21,9 @@
 
 // --- undisturbed ice -------------------------------------------------------------------------------------------------
 
-// Free drift of the mean floe, step by step; what it is for: step/window.h.
+// Free drift of the mean floe, step by step; see step/window.h.
 
-/// Of the convex hull, along which form drag acts, m.
+/// Perimeter of the convex hull, on which form drag acts, m.
 static double hull_perimeter(const bt_bodies *bodies, bt_idx i)
 {
     const int n = bt_body_corners(bodies, i);
@@ -38,8 +38,8 @@ static double hull_perimeter(const bt_bodies *bodies, bt_idx i)
     return sum;
 }
 
-/// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has
-/// no direction has a width of its own. Mean width of a convex hull: its perimeter / π (Cauchy).
+/// Mean floe: its drag is that of all floes together over their number, all of it as skin drag: form drag needs a
+/// width, and for a floe of any orientation that is the mean width of its convex hull, perimeter / π (Cauchy).
 static void mean_floe(const bt_world *world, bt_undisturbed *ice, bt_gid n_floes)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -58,12 +58,12 @@ static void mean_floe(const bt_world *world, bt_undisturbed *ice, bt_gid n_floes
         ice->exposure = bodies->exposure[i];
         ice->drag.water_skin += drag->water_skin + ice->exposure.water_form * drag->water_form * perimeter / BT_PI;
         ice->drag.air_skin += drag->air_skin + ice->exposure.air_form * drag->air_form * perimeter / BT_PI;
-        // relative to the water, so that the mean of floes that rest in it does to the last bit
+        // relative to the water, so that the mean of floes at rest in it is exactly so
         ice->vel.x += bodies->vel[i].x - world->par.water_u;
         ice->vel.y += bodies->vel[i].y - world->par.water_v;
         n++;
     }
-    if (n == 0) { // as the water goes
+    if (n == 0) { // no ice: the velocity of the water
         ice->vel = (bt_vel){.x = world->par.water_u, .y = world->par.water_v};
         return;
     }
@@ -82,7 +82,7 @@ void bt_undisturbed_create(bt_world *world, bt_gid n_floes, const bool held[2])
     if (held[1]) ice->vel.y = 0;
 }
 
-/// By the table of force laws, as of every floe; so what has the velocity of the water keeps it to the last bit.
+/// By the table of force laws, like every floe, so that ice with the velocity of the water keeps it to the last bit.
 void bt_undisturbed_advance(bt_world *world)
 {
     bt_undisturbed *ice = world->undisturbed;
@@ -95,7 +95,7 @@ void bt_undisturbed_advance(bt_world *world)
         .share = ice->share, .all = &one};
     const bt_vel water = {.x = world->par.water_u, .y = world->par.water_v};
     bt_vel u = ice->mass > 0 ? bt_forces_drift(world, &mean) : water;
-    // A law that depends on the place. The ice that a window takes in has none, and the run ends.
+    // NaN comes from a law that depends on the place. With a window it stays, and the run ends.
     if (!world->window && !(isfinite(u.x) && isfinite(u.y))) u = water;
     u.w = 0;
     if (ice->held[0]) u.x = 0;
@@ -114,15 +114,15 @@ void bt_undisturbed_place(const bt_world *world, double at[2])
 
 // --- the window ------------------------------------------------------------------------------------------------------
 
-#define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
+#define ZONE_SHARE 0.5    // of `ahead`, and of the distance from body to rear, assumed
 
-/// A floe that could go, and the place it would take.
+/// A floe that is due, and the place it would take.
 typedef struct candidate {
     bt_gid gid;
     bt_pose place;
     double radius, mass, inertia;
     bt_vel was;
-    int64_t n, first; ///< its vertices at the place, with those of parts, in the list of them all
+    int64_t n, first; ///< number and first of its vertices, those of parts included, in the list of all
     bool stays;
 } candidate;
 
@@ -157,7 +157,7 @@ int32_t bt_window_lap(const bt_world *world, double x)
 {
     const bt_window *window = world->window;
     x -= world->undisturbed->drift_x;
-    // the copy that lies within [rear, rear + L)
+    // the copy within [rear, rear + L)
     return (int32_t)(window->sign > 0 ? ceil((window->rear - x) / window->length)
                                       : floor((-x - window->rear) / window->length));
 }
@@ -179,7 +179,7 @@ static double floe_at(const bt_world *world, bt_idx i)
     return world->window->sign * (x - world->undisturbed->drift_x);
 }
 
-/// Has the rear passed the home of floe i, and may the floe be taken from where it is?
+/// Has the rear passed the home of floe i, and may the floe be taken from its present place?
 static bool due(const bt_world *world, bt_idx i)
 {
     const bt_window *window = world->window;
@@ -187,8 +187,7 @@ static bool due(const bt_world *world, bt_idx i)
     return late > 0 && floe_at(world, i) < window->rear + bt_min(late, ZONE_SHARE * (window->length - window->ahead));
 }
 
-/// Place that floe i takes in the mother field around the period; *turns: periods that it lies from there without
-/// copies.
+/// The place that floe i takes in the mother field, wrapped into the period; *turns: periods taken off.
 static bt_pose place_of(const bt_world *world, bt_idx i, int32_t *turns)
 {
     const bt_window *window = world->window;
@@ -200,7 +199,7 @@ static bt_pose place_of(const bt_world *world, bt_idx i, int32_t *turns)
     return pose;
 }
 
-/// Vertices of the candidates, turned as at their places, relative to the centroids.
+/// Vertices of the candidates relative to their centroids, rotated as at their places.
 typedef struct shapes {
     double *vertex;  ///< [n][2] m
     bt_mark *mark;   ///< [n]
@@ -212,14 +211,14 @@ static int by_gid(const void *p, const void *q)
     return (a->gid > b->gid) - (a->gid < b->gid);
 }
 
-/// Collective. All floes that are due, by id, and their shapes.
+/// Collective. Collect all floes that are due, by id, and their shapes.
 static candidate *collect(const bt_world *world, size_t *n, shapes *shape)
 {
     const bt_bodies *bodies = &world->bodies;
     size_t m = 0, n_vertices = 0, all;
     candidate *mine = NULL;
     shapes own = {NULL, NULL};
-    for (int pass = 0; pass < 2; pass++) { // to count, to fill
+    for (int pass = 0; pass < 2; pass++) { // first count, then fill
         if (pass) {
             mine = bt_alloc(m, sizeof *mine);
             own = (shapes){bt_alloc(2 * n_vertices, sizeof *own.vertex), bt_alloc(n_vertices, sizeof *own.mark)};
@@ -267,7 +266,7 @@ static candidate *find(candidate *list, size_t n, bt_gid gid)
     return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL;
 }
 
-/// Mark the places that body i, where it is, does not leave free.
+/// Mark the places that body i, at its present pose, obstructs.
 static void obstruct(const bt_world *world, bt_idx i, const candidate *list, size_t n, const shapes *s, double *blocked)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -284,13 +283,12 @@ static void obstruct(const bt_world *world, bt_idx i, const candidate *list, siz
     }
 }
 
-/// Collective. Which candidates stay: those whose place is held by a body that is not a candidate, then those whose
-/// place is held by one of these, and so on; what is left can go all at once. Each round, all that it can tell: the
-/// order of nothing matters.
+/// Collective. Find the candidates that stay: those whose place is obstructed by a body that is not a candidate, then
+/// those obstructed by these, and so on; the rest can all move at once. Rounds mark all they can: no order matters.
 static void settle_places(const bt_world *world, candidate *list, size_t n, const shapes *shape)
 {
     const bt_bodies *bodies = &world->bodies;
-    double half = 0, widest = 0; // the places lie within this of the first
+    double half = 0, widest = 0; // the places lie within `half` of the first
     for (size_t k = 0; k < n; k++) {
         half = bt_max(half, fabs(bt_nearest_image(list[k].place.x - list[0].place.x, world->par.period_x)));
         widest = bt_max(widest, list[k].radius);
@@ -328,7 +326,7 @@ static bool was_moved(const bt_world *world, const uint8_t *moved, bt_gid gid)
     return i >= 0 && moved[i];
 }
 
-/// What a pair knew, its impulses and the records of all laws, is of the place that the floe has left.
+/// Drop the impulses and records of pairs with a moved floe: they belong to the place that it has left.
 static void forget_contacts(bt_world *world, const uint8_t *moved)
 {
     const bt_cells *cells = world->cells;
@@ -363,7 +361,7 @@ static void put(bt_world *world, bt_idx i)
     bt_bodies_turn(&world->bodies, i);
 }
 
-/// Every rank adds in the order of ids, all floes, held here or not: the sums are the same everywhere.
+/// Every rank adds over all floes, held here or not, in the order of ids: the sums are the same everywhere.
 static void account(bt_window *window, const candidate *found, const bt_vel *enters)
 {
     const bt_vel *states[2] = {&found->was, enters};
@@ -397,7 +395,7 @@ static void renew(bt_world *world, const candidate *list, size_t n)
     free(moved);
 }
 
-/// Collective. Floes and places that the front zone has left behind as they are; floes that wait.
+/// Collective. Keep the floes, and give up the places, that the front zone has left behind; count floes that wait.
 static void let_go(bt_world *world)
 {
     enum { KEPT, MISSED, WAITING, N };
@@ -432,7 +430,7 @@ void bt_window_begin(bt_world *world)
     window->most = bt_max(window->most, body);
     window->overtaken = bt_max(window->overtaken, window->most - body);
     const double behind = body + window->ahead - window->length - window->rear;
-    if (!(behind >= window->stride)) return; // a body that drifts back does not take the window with it
+    if (!(behind >= window->stride)) return; // the window does not follow a body that drifts back
     window->rear += window->stride * floor(behind / window->stride);
     size_t n;
     shapes shape;

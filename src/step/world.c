@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The world: who makes and frees all that a step works on, and the hash of its state.
+// The world: creation and release of all data of a step, and the hash of its state.
 #include "bergtow/world.h"
 
 #include <stdlib.h>
@@ -72,8 +72,8 @@ static uint64_t mix_double(uint64_t h, double x)
     return mix(h ^ u);
 }
 
-/// What a body is called in the hash: ids that are kept for pieces count last, so that a world in which nothing splits
-/// is called as one in which nothing can.
+/// Name of a body in the hash: ids reserved for pieces come last, so that a world where nothing has split has the same
+/// hash as one where nothing can.
 static uint64_t name_of(const bt_world *world, bt_gid gid)
 {
     const bt_splitting *splitting = world->splitting;
@@ -82,8 +82,8 @@ static uint64_t name_of(const bt_world *world, bt_gid gid)
     return (uint64_t)(world->bodies.n_global - splitting->reserve + (gid - splitting->first));
 }
 
-/// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their
-/// names.
+/// Hash of a record of a contact law other than the rigid one. The first such law enters as 0, so that states keep
+/// their old hashes.
 static uint64_t hash_memory(const bt_world *world, const bt_memory *memory)
 {
     const uint64_t where = (uint64_t)(memory->law - 1) << 32 | (uint64_t)memory->part[0] << 16 | memory->part[1];
@@ -94,7 +94,7 @@ static uint64_t hash_memory(const bt_world *world, const bt_memory *memory)
 
 uint64_t bt_world_hash(const bt_world *world)
 {
-    // The sum over bodies is associative: any order, any distribution.
+    // The sum over bodies does not depend on order or distribution.
     const bt_bodies *bodies = &world->bodies;
     uint64_t sum = 0;
     for (bt_idx i = 0; i < bodies->n; i++) {

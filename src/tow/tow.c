@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The tow from step to step: speed and path of the end, velocity of the body, way-points; equations in tow/tow.h.
+// The tow, step by step: speed and path of the end, velocity of the body, way-points; equations in tow/tow.h.
 #include "tow/tow.h"
 
 #include <math.h>
@@ -12,11 +12,11 @@
 
 // --- rows of the line, and the vessel --------------------------------------------------------------------------------
 
-// The line rows of a step and the vessel at their end; equations in tow/tow.h.
+// The line rows of a step and the vessel at the end of the line; equations in tow/tow.h.
 
 // --- the vessel ------------------------------------------------------------------------------------------------------
 
-/// Course of the vessel and the three linear things it can be at the end of the step.
+/// Course of the vessel and its three possible linear models at the end of the step.
 static void begin_vessel(bt_world *world)
 {
     bt_tow *tow = world->tow;
@@ -50,8 +50,8 @@ static void begin_vessel(bt_world *world)
 
 typedef enum { FULL, HELD, IDLE } power;
 
-/// The end of the line in this step: velocity (along, across the course) without the line, and how much an impulse
-/// changes it.
+/// The end of the line in this step: velocity (along, across the course) without the line, and its change per unit
+/// impulse.
 typedef struct {
     double d, n;      ///< m/s
     double wd, wn;    ///< 1/kg
@@ -68,7 +68,7 @@ static end_motion end_of(const bt_tow *tow, power p)
     return end;
 }
 
-/// Impulse that the line takes from the end along the course and across, N s.
+/// Impulse that the line takes from its end, along the course and across, N s.
 static void pull_of(const bt_tow *tow, const double lambda[BT_MAX_BRANCHES], double pull[2])
 {
     pull[0] = pull[1] = 0;
@@ -85,7 +85,7 @@ static double thrust_for(const bt_vessel *vessel, double dt, double vd, double p
     return vessel->mass * (vd - vessel->vd1) + dt * vessel->kd * (vd - vessel->ud) + pull;
 }
 
-/// Is p the state that fits these impulses? The last one, IDLE, is what is left.
+/// Is p the state that fits these impulses? IDLE, the last, applies if no other does.
 static bool fits(const bt_tow *tow, power p, const double lambda[BT_MAX_BRANCHES])
 {
     const bt_vessel *vessel = &tow->vessel;
@@ -97,7 +97,8 @@ static bool fits(const bt_tow *tow, power p, const double lambda[BT_MAX_BRANCHES
     return vd <= tow->end_speed && vessel->bollard_pull - vessel->kt * (vd - vessel->ud) >= 0;
 }
 
-/// From FULL with a speed too high to HELD; with a thrust below zero (dragged faster than the propeller turns) to IDLE.
+/// From FULL, to HELD if the speed is too high; to IDLE if the thrust would be negative (dragged faster than the
+/// propeller drives).
 static power next_power(const bt_tow *tow, power p, const double lambda[BT_MAX_BRANCHES])
 {
     if (p == HELD) return IDLE;
@@ -106,7 +107,7 @@ static power next_power(const bt_tow *tow, power p, const double lambda[BT_MAX_B
     return tow->vessel.full - tow->vessel.full_w * pull[0] > tow->end_speed ? HELD : IDLE;
 }
 
-/// Velocity and thrust of the vessel that belong to the impulses found.
+/// Set the velocity and thrust of the vessel from the impulses found.
 static void finish_vessel(bt_tow *tow)
 {
     bt_vessel *vessel = &tow->vessel;
@@ -175,14 +176,14 @@ static void begin_rows(bt_world *world)
     const bt_vel *v = &world->bodies.vel[i];
     bt_branch *first = &tow->branch[0], *second = &tow->branch[1];
     const end_motion idle = end_of(tow, IDLE);
-    end_motion free_end = idle; // without the line: as fast as power and governor let it
+    end_motion free_end = idle; // without the line: as fast as power and governor allow
     if (tow->mode == BT_TOW_THRUST) free_end.d = bt_max(idle.d, bt_min(tow->vessel.full, tow->end_speed));
     double rate[BT_MAX_BRANCHES] = {0};
     for (int k = 0; k < tow->n_branches; k++) {
         bt_branch *branch = &tow->branch[k];
         branch->rx = cosine * branch->hull_x - sine * branch->hull_y;
         branch->ry = sine * branch->hull_x + cosine * branch->hull_y;
-        // The end stands where its path says, in the frame of the unwrapped body.
+        // The end is at its place on the path, in the frame of the unwrapped body.
         const double x = tow->travel_x + branch->rx, y = tow->travel_y + branch->ry;
         const double dx = tow->carriage_x - x, dy = tow->carriage_y - y;
         branch->length = sqrt(dx * dx + dy * dy);
@@ -217,8 +218,8 @@ static void begin_rows(bt_world *world)
     }
 }
 
-/// Both branches together at one state of the end. rate0: their rates without the line's impulses, but for the end's
-/// velocity.
+/// Solve both branches together at one state of the end. hull0: their rates without the line's impulses and without the
+/// end's velocity.
 static void solve_pair(const bt_tow *tow, const end_motion *end, const double hull0[2], double lambda[2])
 {
     const bt_branch *p = &tow->branch[0], *q = &tow->branch[1];
@@ -240,13 +241,12 @@ static void solve_pair(const bt_tow *tow, const end_motion *end, const double hu
     lambda[1] = first ? 0 : only2;
 }
 
-/// The impulses that solve the rows at the body's velocity v, of which the present ones are part.
+/// Find the impulses that solve the rows at the body's velocity v, which includes the effect of the present ones.
 static void solve_rows(const bt_tow *tow, const bt_vel *v, double lambda[BT_MAX_BRANCHES])
 {
     const bt_branch *p = &tow->branch[0], *q = &tow->branch[1];
     if (tow->n_branches == 1 && tow->mode != BT_TOW_THRUST) {
-        // One row against a prescribed end: λ' = max(0, λ + (a + b l̇ − λ)/(1 + b W)). The same as below with less
-        // rounding.
+        // One row against a prescribed end: λ' = max(0, λ + (a + b l̇ − λ)/(1 + b W)). As below, with less rounding.
         const end_motion end = end_of(tow, HELD);
         lambda[0] = bt_max(0, p->lambda + (p->a + p->b * (end_rate(tow, &end, p) - hull_rate(p, v)) - p->lambda) /
                                               (1 + p->b * p->w));
@@ -322,8 +322,7 @@ double bt_tow_speed(const bt_tow *tow, double time)
         time);
 }
 
-/// Course and speed that lead from (x, y) to where the path is one step further; on the course of the path while it
-/// stands still.
+/// Set the course and speed that lead from (x, y) to the point of the path one step ahead; at rest, its course.
 static void follow_path(bt_tow *tow, double x, double y)
 {
     double to[2], tangent[2];
@@ -426,7 +425,7 @@ uint64_t bt_tow_hash(const bt_tow *tow)
                             tow->travel_y};
     uint64_t h = 0;
     for (size_t k = 0; k < sizeof state / sizeof *state; k++) h = mix(h, state[k]);
-    // What a tow by one line on a straight path has not.
+    // Data that a tow by one line on a straight path does not have.
     if (tow->n_branches > 1) h = mix(h, tow->branch[1].lambda);
     for (int k = 0; k < tow->n_branches; k++)
         if (tow->branch[k].broken) h = mix(h, k + 1);

@@ -82,7 +82,7 @@ class Floes:
         at = np.hstack([self.pose[:, :2], np.reshape(turn, (-1, 2))])
         x, y, c, s = np.repeat(at, np.diff(self.offsets), axis=0).T
         u, v = self.vertices.T
-        return np.split(np.stack([c * u - s * v + x, s * u + c * v + y], axis=1), self.offsets[1:-1])
+        return np.split(np.stack([c * u - s * v + x, s * u + c * v + y], axis=1), self.offsets[1:])[:-1]
 
     def take(self, kept):
         """Those floes alone."""

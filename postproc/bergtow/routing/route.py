@@ -17,7 +17,7 @@ from pathlib import Path
 from bergtow import writing
 from bergtow._program import program_path
 from bergtow.arguments import not_below_zero, whole_from
-from bergtow.errors import CASE, IO, USAGE, RunError
+from bergtow.errors import CASE, IO, SIGNAL, USAGE, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, situation, tows, verdict
 from bergtow.study import analysis
@@ -209,7 +209,7 @@ def calibrated(a, w, s, runs):
     floes, folder = members.Floes.read(s.field), s.field.parent / "swaths"
     outlines = floes.outlines()
     folder.mkdir(parents=True, exist_ok=True)
-    features, forces, ratios = [], [], []
+    features, forces, ratios, spent = [], [], [], False
     for k, (start, end) in enumerate(swaths(a.calibrate, s, length)):
         yaw = float(np.arctan2(*(end - start)[::-1]))
         file = folder / f"s{k + 1:03d}.h5"
@@ -221,6 +221,7 @@ def calibrated(a, w, s, runs):
             f"body.{name}": f"{value:.12g} {unit}" for name, value, unit in
             (("x", start[0], "m"), ("y", start[1], "m"), ("yaw", yaw, "rad"))}
         made = tow(runs, c.name, range(1), keys)
+        spent = spent or SPENT in made
         if made[0]:
             continue
         with Run(runs.path(c.name, 0)) as run:
@@ -234,7 +235,7 @@ def calibrated(a, w, s, runs):
         features.append(route.features)
     if len(forces) < 6:
         raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their end", "give --budget more time, "
-                       "or leave --calibrate out")
+                       "or leave --calibrate out", SIGNAL if spent else IO)
     fit = planner.fit_weights(features, np.array(forces))
     rank = float(fit.rank_correlation)
     told = {"swaths": len(forces), "r2": float(fit.r2), "rank_correlation": rank,
@@ -430,7 +431,7 @@ def verify(a, w, s, goal, some, n, runs, files, found, told):
         if SPENT in why:
             files.write(found)
             raise RunError(folder, f"the budget of {a.budget:g} min is spent before every tow is made",
-                           "call again: what is made is kept", IO)
+                           "call again: what is made is kept", SIGNAL)
         if any(why):
             runs.tell_failed()
         rows = []

@@ -17,7 +17,7 @@ from bergtow._program import program_path
 from bergtow.errors import CASE, SIGNAL, USAGE, RunError
 from bergtow.result import compared, findings
 from bergtow.result.members import FAILED, FINISHED, WAITING, Members, listed
-from bergtow.stats import loads
+from bergtow.stats import conditions, loads
 from bergtow.stats import load as stat_load
 from bergtow.stats import variance as stat_budget
 from bergtow.study import analysis
@@ -78,6 +78,8 @@ def numbers(e, of):
     elif of in e.summary:
         whole = np.where([e.cut(m) for m in range(e.n)], np.nan, e.summary[of])  # it includes the time after a tow
         meaning, values = e.meaning.get(of, {}), (e.mean if of == OF[0] else whole)[e.used]
+    elif not (e.status == FINISHED).any():
+        raise conditions.nothing_to_count(e, False)
     else:
         raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE",
                        USAGE)

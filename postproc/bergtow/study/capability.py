@@ -22,7 +22,7 @@ from pathlib import Path
 
 from bergtow._program import program_path
 from bergtow.arguments import measure, read, whole_from
-from bergtow.errors import CASE, USAGE, BergtowError, RunError
+from bergtow.errors import CASE, SIGNAL, USAGE, BergtowError, RunError
 from bergtow.result import at_least, compared
 from bergtow.result.run import Run, case_value, parse_case, within
 from bergtow.stats import mean as stat_mean
@@ -107,6 +107,7 @@ class Condition:
     trials: dict = field(default_factory=dict)   #: [Trial] by value
     failed: dict = field(default_factory=dict)   #: [why] by value
     wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None where that of the case will do
+    alike: set = field(default_factory=set)      #: values whose ice no seed changes: their fields are one run
     why: str = ""     #: the search ended before it was through
     case: dict = field(default_factory=dict)     #: {key: text} of the case under the value of --for
 
@@ -146,6 +147,8 @@ class Search:
             return False
         numbers = range(first, first + n)
         why = self.runs.make(name, numbers, self.sets(c, value))
+        if self.runs.alike(name):
+            c.alike.add(value)
         for i, w in zip(numbers, why):
             if w == SPENT:
                 return False
@@ -201,7 +204,7 @@ class Search:
 
 def row_of(c, value, least):
     """Numbers of a value of a condition."""
-    some = c.trials[value]
+    some = c.trials[value][:1] if value in c.alike else c.trials[value]
     out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
            "stood_still": sum(t.stood for t in some), "late_speed": [t.late for t in some],
@@ -396,5 +399,8 @@ def perform(a):
         "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
         "conditions": [found_of(c, least) for c in some]
     }
+    if not any(any(c.trials.values()) for c in some):
+        runs.tell_failed()
+        raise RunError(folder, "the budget does not reach for a run", "raise --budget; the same call continues", SIGNAL)
     analysis.keep("capability", found, folder, a.force)
     runs.tell_failed()

@@ -210,6 +210,8 @@ def compare(study, kind, base_name, base_values, name, values, margin):
         other = study.measured(base_name if kind.own else name, range(n), kind.measure)
         if not (np.isfinite(base).all() and np.isfinite(other).all()):
             return row | {"why": f"a run has no {kind.what}"}
+        if n > len(base):
+            return row | {"fields": len(base), "why": "there is one run, for no seed changes it"}
         if (missed := max(unsolved(study, m, n) for m in {base_name, base_name if kind.own else name})) > UNSOLVED:
             return row | {"fields": n, "why": f"{100 * missed:.2g} % of the steps ended at solver.max_sweeps, short of "
                           "the tolerance; raise it"}
@@ -297,7 +299,8 @@ def window(study, margin):
 def fields_row(study):
     """How many fields the mean needs, from those that are there."""
     kept = [i for i in range(FIELDS[-1]) if study.kept("case", i)]  # one in between may have met the budget
-    n, x = len(kept), study.measured("case", kept, mean_resistance)
+    x = study.measured("case", kept, mean_resistance)
+    n = len(x)
     if not np.isfinite(x).all():
         return [{"name": "fields", "key": "repeats", "judged": "open", "why": "a run has no mean ice resistance"}]
     low, high = stat_mean.t_interval(x)

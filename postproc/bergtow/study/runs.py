@@ -13,6 +13,7 @@ import ctypes
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -23,7 +24,7 @@ from pathlib import Path
 
 from bergtow import _library
 from bergtow._calls import called
-from bergtow.errors import CASE, USAGE, Message, Refused, RunError
+from bergtow.errors import CASE, SIGNAL, USAGE, Message, Refused, RunError
 from bergtow.result import integrity
 from bergtow.result.run import Run
 
@@ -107,6 +108,10 @@ class CaseRuns:
 
     def path(self, name, i):
         return self.home(name) / "members" / self.member(0 if name in self._alike else i)
+
+    def alike(self, name):
+        """Does no seed change the ice of these runs? All fields are then one run."""
+        return name in self._alike
 
     def member(self, i):
         return f"c001-r{i + 1:03d}"
@@ -234,9 +239,9 @@ class CaseRuns:
         return True
 
     def measured(self, name, fields, measure):
-        """Of runs that are there."""
+        """Of runs that are there, one for all fields where no seed changes the ice."""
         out = []
-        for i in fields:
+        for i in fields[:1] if self.alike(name) else fields:
             with Run(self.path(name, i)) as run:
                 out.append(measure(run))
         return np.array(out, dtype=float)
@@ -262,6 +267,9 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
         call += ["--max-wall", str(limit)]
     before, began = ensemble_made(folder), time.monotonic()
     code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | MESSAGES | ONE_THREAD, **options)
+    if code < 0:
+        raise RunError(folder, f"a signal has killed bergtow ensemble: {signal.Signals(-code).name}", "call again: what "
+                       "is made is kept; if the memory ran out (SIGKILL), give fewer --jobs", SIGNAL)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, messages(said), code, f"bergtow ensemble ended with exit code {code}")
     return not stopped_by_limit(code, time.monotonic() - began, limit), messages(said)
