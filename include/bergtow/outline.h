@@ -55,6 +55,14 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
 /// bt_outline_project, to rounding, within a tenth of the earth's radius.
 void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat);
 
+/// Can two numbers be longitude and latitude in degrees? narrow: with a longitude up to 180° (RFC 7946), for degrees
+/// without a crs, and for metres, which all so small are taken for degrees; otherwise up to 360°.
+bool bt_outline_in_degrees(double lon, double lat, bool narrow);
+
+/// The place in the middle of n others, all longitude and latitude in degrees: of the box around them in its own
+/// projection, which no pole and no meridian disturbs; where they lie far apart, their mean direction. (0, 0) of none.
+void bt_outline_middle(int64_t n, const double *place, double middle[2]);
+
 #ifdef __cplusplus
 }
 #endif

@@ -2,7 +2,6 @@
 // Messages, memory and the clock.
 #include "bergtow/base.h"
 #include "base/inside.h"
-#include "base/json.h"
 
 #include <locale.h>
 #include <stdio.h>
@@ -147,41 +146,6 @@ void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
 }
 
 void bt_errors_code(bt_errors *err, const char *code) { err->note[err->n - 1].code = bt_text_copy(code); }
-
-static void print_json(const char *text, const char *code)
-{
-    static const char mark[] = "warning: ";
-    const bool warning = !strncmp(text, mark, strlen(mark));
-    bt_json json = {.flat = true};
-    bt_json_open(&json, NULL, '{');
-    bt_json_bool(&json, "warning", warning);
-    bt_json_string(&json, "code", code);
-    bt_json_string(&json, "text", text + (warning ? strlen(mark) : 0));
-    bt_json_close(&json, '}');
-    fprintf(stderr, "%s\n", json.text);
-    bt_json_free(&json);
-}
-
-void bt_errors_print(const bt_errors *err)
-{
-    const char *as = getenv("BERGTOW_MESSAGES");
-    for (size_t i = 0; i < err->n; i++) {
-        const char *code = err->note[i].code;
-        if (as && !strcmp(as, "json")) print_json(err->text[i], code);
-        else fprintf(stderr, "bergtow: %s%s%s%s\n", err->text[i], code ? " [" : "", code ? code : "", code ? "]" : "");
-    }
-}
-
-void bt_errors_warn(const char *fmt, ...)
-{
-    bt_errors one = {0};
-    va_list ap;
-    va_start(ap, fmt);
-    bt_errors_add_list(&one, fmt, ap);
-    va_end(ap);
-    bt_errors_print(&one);
-    bt_errors_free(&one);
-}
 
 void bt_errors_move(bt_errors *to, bt_errors *from)
 {

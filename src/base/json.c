@@ -213,3 +213,40 @@ const bt_json_key *bt_json_keys_find(const bt_json_key *keys, int n, const char 
         if (!strcmp(keys[i].key, key)) return &keys[i];
     return NULL;
 }
+
+// --- messages --------------------------------------------------------------------------------------------------------
+
+static void print_json(const char *text, const char *code)
+{
+    static const char mark[] = "warning: ";
+    const bool warning = !strncmp(text, mark, strlen(mark));
+    bt_json json = {.flat = true};
+    bt_json_open(&json, NULL, '{');
+    bt_json_bool(&json, "warning", warning);
+    bt_json_string(&json, "code", code);
+    bt_json_string(&json, "text", text + (warning ? strlen(mark) : 0));
+    bt_json_close(&json, '}');
+    fprintf(stderr, "%s\n", json.text);
+    bt_json_free(&json);
+}
+
+void bt_errors_print(const bt_errors *err)
+{
+    const char *as = getenv("BERGTOW_MESSAGES");
+    for (size_t i = 0; i < err->n; i++) {
+        const char *code = err->note[i].code;
+        if (as && !strcmp(as, "json")) print_json(err->text[i], code);
+        else fprintf(stderr, "bergtow: %s%s%s%s\n", err->text[i], code ? " [" : "", code ? code : "", code ? "]" : "");
+    }
+}
+
+void bt_errors_warn(const char *fmt, ...)
+{
+    bt_errors one = {0};
+    va_list ap;
+    va_start(ap, fmt);
+    bt_errors_add_list(&one, fmt, ap);
+    va_end(ap);
+    bt_errors_print(&one);
+    bt_errors_free(&one);
+}

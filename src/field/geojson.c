@@ -44,9 +44,9 @@ typedef enum { DEGREES, PLANE, FRAME } coordinates;
 
 /// All coordinates of a file, as they stand there.
 typedef struct survey {
-    double low[4], high[4]; ///< first, second, first from 0° on, first up to 180°
-    size_t feature;         ///< the first that is not a place in degrees; SIZE_MAX: none
-    double odd[2];          ///< its vertex
+    double low[2], high[2];
+    size_t feature; ///< the first that is not a place in degrees; SIZE_MAX: none
+    double odd[2];  ///< its vertex
 } survey;
 
 /// A feature as it stands in the file.
@@ -137,23 +137,20 @@ static int coordinates_of(const json_t *feature, double *v, const char **why)
 }
 
 /// A vertex of feature i into the survey.
-static void see(survey *seen, size_t i, double x, double y, double lon)
+static void see(survey *seen, size_t i, const double v[2], bool narrow)
 {
-    const double q[4] = {x, y, x < 0 ? x + 360 : x, x > 180 ? x - 360 : x};
-    for (int a = 0; a < 4; a++) seen->low[a] = bt_min(seen->low[a], q[a]), seen->high[a] = bt_max(seen->high[a], q[a]);
-    if (seen->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= BT_MAP_MOST_LAT))
-        seen->feature = i, seen->odd[0] = x, seen->odd[1] = y;
+    for (int a = 0; a < 2; a++) seen->low[a] = bt_min(seen->low[a], v[a]), seen->high[a] = bt_max(seen->high[a], v[a]);
+    if (seen->feature == SIZE_MAX && !bt_outline_in_degrees(v[0], v[1], narrow))
+        seen->feature = i, seen->odd[0] = v[0], seen->odd[1] = v[1];
 }
 
-/// Box of all coordinates; lon: the farthest longitude that is one.
-static survey look_over(const reader *in, double lon)
+/// Box of all coordinates; narrow: as in bt_outline_in_degrees.
+static survey look_over(const reader *in, bool narrow)
 {
-    survey seen = {.low = {INFINITY, INFINITY, INFINITY, INFINITY},
-                   .high = {-INFINITY, -INFINITY, -INFINITY, -INFINITY},
-                   .feature = SIZE_MAX};
+    survey seen = {.low = {INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY}, .feature = SIZE_MAX};
     for (size_t i = 0; i < in->n_features; i++)
         for (int64_t k = in->feature[i].vertex; k < in->feature[i + 1].vertex; k++)
-            see(&seen, i, in->ring[2 * k], in->ring[2 * k + 1], lon);
+            see(&seen, i, in->ring + 2 * k, narrow);
     return seen;
 }
 
@@ -169,15 +166,14 @@ static void take_origin(const json_t *mark, double origin[2])
 }
 
 /// Degrees out of range, or latitude before longitude; and the place of x = y = 0: the case's, that of the
-/// file's mark, or the middle of all coordinates. Rings that lie on both sides of 180° would have it on the wrong side
-/// of the earth: they are taken with longitudes from 0° to 360° when that makes the box smaller.
+/// file's mark, or the middle of all coordinates.
 static void begin_degrees(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
-    const survey seen = look_over(in, in->assumed ? BT_MAP_NARROW_LON : BT_MAP_MOST_LON);
+    const survey seen = look_over(in, in->assumed);
     const bool given = !isnan(input->ice.origin_lon),
-               swapped = bt_max(fabs(seen.low[0]), fabs(seen.high[0])) <= BT_MAP_MOST_LAT &&
-                         bt_max(fabs(seen.low[1]), fabs(seen.high[1])) <= BT_MAP_MOST_LON;
+               swapped = bt_outline_in_degrees(bt_max(fabs(seen.low[1]), fabs(seen.high[1])),
+                                           bt_max(fabs(seen.low[0]), fabs(seen.high[0])), false);
     if (!isnan(input->ice.origin_east))
         bt_refuse(&in->r, "its coordinates are degrees, and ice.origin_east and ice.origin_north are metres; give "
                           "ice.origin_lon and ice.origin_lat, or none");
@@ -193,10 +189,8 @@ static void begin_degrees(reader *in, const json_t *mark)
                           : "correct it, or say what its coordinates are");
         return;
     }
-    int a = seen.high[2] - seen.low[2] < seen.high[0] - seen.low[0] ? 2 : 0;
-    if (seen.high[3] - seen.low[3] < seen.high[a] - seen.low[a]) a = 3;
-    double middle[2] = {(seen.low[a] + seen.high[a]) / 2, (seen.low[1] + seen.high[1]) / 2};
-    if (!(seen.low[0] <= seen.high[0])) middle[0] = middle[1] = 0; // no place at all
+    double middle[2];
+    bt_outline_middle(in->feature[in->n_features].vertex, in->ring, middle);
     if (!given && middle[1] > BT_MAP_FREE_SOUTH && middle[1] < BT_MAP_FREE_NORTH && fabs(middle[0]) >= 30 && swapped) {
         bt_refuse(&in->r,
                   "its outlines lie about latitude %.4g, longitude %.4g, where there is no sea ice: latitude seems to "
@@ -205,10 +199,9 @@ static void begin_degrees(reader *in, const json_t *mark)
                   middle[1], middle[0]);
         return;
     }
-    if (middle[0] > 180) middle[0] -= 360;
     take_origin(mark, middle);
     in->lon0 = given ? input->ice.origin_lon : middle[0] * DEGREE;
-    in->lat0 = given ? input->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE;
+    in->lat0 = given ? input->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE; // the mark says anything
 }
 
 /// The place of x = y = 0 in a plane: the case's, that of the file's mark, the middle where the crs is a projection,
@@ -216,7 +209,7 @@ static void begin_degrees(reader *in, const json_t *mark)
 static void begin_plane(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
-    const survey seen = look_over(in, BT_MAP_NARROW_LON);
+    const survey seen = look_over(in, true);
     const bool given = !isnan(input->ice.origin_east), projected = in->crs.kind == BT_MAP_PLANE;
     if (!isnan(input->ice.origin_lon) && in->kind == PLANE)
         bt_refuse(&in->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "

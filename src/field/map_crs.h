@@ -41,11 +41,6 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
 
 #define BT_MAP_FARTHEST 100e3 ///< m from the origin: the projection is one of small areas
 
-/// Degrees are no more than these; metres within BT_MAP_NARROW_LON and BT_MAP_MOST_LAT of zero are taken for degrees.
-#define BT_MAP_MOST_LON 360.
-#define BT_MAP_NARROW_LON 180. ///< also of degrees without a crs (RFC 7946)
-#define BT_MAP_MOST_LAT 90.
-
 /// Between these latitudes, deg, there is no sea ice: nearest to the equator is that of the Bohai Sea, at 37° N, and of
 /// South Georgia, at 54° S.
 #define BT_MAP_FREE_SOUTH (-53.)

@@ -280,3 +280,34 @@ void bt_outline_unproject(double north, double east, double lon0, double lat0, d
     *lon = bt_atan2(p[1], p[0]);
     *lat = bt_atan2(p[2], (1 - WGS84_E2) * bt_hypot(p[0], p[1]));
 }
+
+bool bt_outline_in_degrees(double lon, double lat, bool narrow)
+{
+    return fabs(lon) <= (narrow ? 180 : 360) && fabs(lat) <= 90;
+}
+
+void bt_outline_middle(int64_t n, const double *place, double middle[2])
+{
+    const double degree = BT_PI / 180;
+    double sum[3] = {0};
+    for (int64_t i = 0; i < n; i++) {
+        const double lon = place[2 * i] * degree, lat = place[2 * i + 1] * degree;
+        sum[0] += bt_cos(lat) * bt_cos(lon);
+        sum[1] += bt_cos(lat) * bt_sin(lon);
+        sum[2] += bt_sin(lat);
+    }
+    double lon0 = bt_atan2(sum[1], sum[0]), lat0 = bt_atan2(sum[2], bt_hypot(sum[0], sum[1]));
+    for (int look = 0; look < 4; look++) { // the middle in the projection at the last one, until it stays
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (int64_t i = 0; i < n; i++) {
+            double at[2];
+            bt_outline_project(place[2 * i] * degree, place[2 * i + 1] * degree, lon0, lat0, at, at + 1);
+            for (int a = 0; a < 2; a++) low[a] = bt_min(low[a], at[a]), high[a] = bt_max(high[a], at[a]);
+        }
+        const double north = (low[0] + high[0]) / 2, east = (low[1] + high[1]) / 2;
+        if (!(bt_hypot(north, east) < WGS84_A / 10)) break;
+        bt_outline_unproject(north, east, lon0, lat0, &lon0, &lat0);
+    }
+    middle[0] = lon0 / degree;
+    middle[1] = lat0 / degree;
+}

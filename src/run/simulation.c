@@ -570,8 +570,6 @@ static char *limits_json(void)
     bt_json_int(&json, "contact_columns", BT_CONTACT_COLUMNS);
     bt_json_string(&json, "map_local_crs", BT_MAP_LOCAL_NAME);
     bt_json_numbers(&json, "map_ice_free_deg", 2, (const double[]){BT_MAP_FREE_SOUTH, BT_MAP_FREE_NORTH});
-    bt_json_numbers(&json, "map_most_deg", 2, (const double[]){BT_MAP_MOST_LON, BT_MAP_MOST_LAT});
-    bt_json_number(&json, "map_narrow_lon_deg", BT_MAP_NARROW_LON);
     bt_json_int(&json, "outline_vertices", BT_MAX_VERTICES);
     bt_json_close(&json, '}');
     return json.text;

@@ -382,8 +382,8 @@ def test_every_number_of_the_sentence_is_in_the_rows_that_it_names(made):
         known = said_of([ids[row] for row in part["rows"]] + [made["asked"]]) | {"95", "10"}
         found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?", words.WORDS[part["code"]](part["values"], made))
         assert set(found) <= known, (part, set(found) - known)
-    said = words.sentence(made, traced=True)
-    assert set(re.findall(r"\[(.*?)\]", said)) and all(part["code"] in words.WORDS for part in made["sentence"])
+    said = words.sentence(made)
+    assert all(part["rows"] for part in made["sentence"])
     rows = {row["id"]: row for row in made["load_cases"]}
     assert made["design"]["n"] == rows[made["design"]["row"]]["n"]
     assert f"{words.number(words.designed(made['design']['n']) / 1e3)} kN" in said
@@ -429,7 +429,7 @@ def test_values_that_are_assumed_stay_beside_the_design_value(made):
     a = json.loads(json.dumps(made))
     row = next(c for c in a["load_cases"] if c["id"] == "case.head_sea")
     row["in_design"] = False
-    assert "†" in words.load_cases(a, False) and "assumed" in words.WORDS["beside"](row | row["values"], a)
+    assert "†" in words.written(words.load_cases(a)) and "assumed" in words.WORDS["beside"](row | row["values"], a)
 
 
 def test_a_load_case_above_the_steady_tow_does_not_hide_it(made):
@@ -538,7 +538,7 @@ def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
     a = json.loads(json.dumps(made))
     found = next(c for c in a["load_cases"] if c["id"] == "case.course_change")
     assert found["values"]["share_below"] == pytest.approx(0.05 ** 0.5)
-    assert "largest simulated of 2 ‡" in words.load_cases(a, False)
+    assert "largest simulated of 2 ‡" in words.written(words.load_cases(a))
     assert "of 2 runs: a lower bound, below which at least 22 % of such runs" in words.WORDS["needs_largest"](
         {"n": found["n"], "case": found["id"]}, a)
 

@@ -20,7 +20,7 @@ from shapely.ops import unary_union
 import tutorial
 from harness import DONE, IO, USAGE, call, changed, environment, run
 from test_map import FRAMES
-from test_outlines import field, same_ring
+from test_outlines import LONLAT, field, same_ring
 
 from bergtow import cli  # noqa: E402
 from bergtow.maps import read as map_read  # noqa: E402
@@ -229,6 +229,25 @@ def test_halves_at_the_180th_meridian_are_joined(tmp_path, width):
     np.testing.assert_allclose(plane_area(rings[0]), whole, rtol=1e-6)
     # the middle in the plane; that of the degrees lies 0.05 m beside it, for the plane bends
     assert abs((record["plane"]["centre"][0] - 180 - (width - 0.01) / 2 + 180) % 360 - 180) < 2e-6
+
+
+@pytest.mark.parametrize("lat", [70.0, 89.97, -66.0])
+def test_the_program_has_the_same_middle_over_the_180th_meridian(tmp_path, lat):
+    """Of a map with more floes on one side, as bergtow outlines has it, and as the program has it of the map itself:
+    in the middle of the box, of which the geodesics to its corners are of one length."""
+    map_ = write(tmp_path / "floes.geojson", [places(r, 180.0, lat) for r in (*RINGS[:2], RINGS[6], RINGS[-1])])
+    (lon0, lat0), = [outlines(map_)[1]["plane"]["centre"]]
+    case = changed(LONLAT, domain__length=6e3, domain__width=6e3, ice__origin_lon=None, ice__origin_lat=None,
+                   run__dt=1)
+    o = run(tmp_path, case).summary["outlines"]
+    apart = GEOD.inv(lon0, lat0, o["origin_lon_deg"], o["origin_lat_deg"])[2]
+    assert apart < 1e-3, apart
+    xy = np.concatenate([np.asarray(r) for r in (*RINGS[:2], RINGS[6], RINGS[-1])])
+    azimuth, _, far = GEOD.inv(180.0, lat, lon0, lat0)
+    want = (xy.min(axis=0) + xy.max(axis=0)) / 2
+    # the plane about (180, lat) has the axes of that meridian, which is another one beside the pole
+    got = far * np.array([np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth))])
+    assert np.hypot(*(got - want)) < (5 if abs(lat) < 89 else 800)
 
 
 def test_the_180th_meridian_ends_no_map(tmp_path):

@@ -17,6 +17,7 @@ they are east and north.
 Missing information about coordinates is not guessed: a file without a crs, with a crs that has no place on the earth,
 or with numbers that contradict it is refused, and the message gives the remedy.
 """
+import ctypes
 import warnings
 from dataclasses import dataclass
 
@@ -103,15 +104,15 @@ def hold_against(path, crs, xy, implied=False):
     if isinstance(crs, str):
         return
     unit = crs.axis_info[0].unit_conversion_factor
-    lon, lat = _library.limit("map_most_deg")
+    in_degrees = _library.library().bt_outline_in_degrees
     if crs.is_geographic:
         x, y = np.degrees(far * unit)
-        if x > lon + ROUNDING or y > lat + ROUNDING:
-            swapped = x <= lat and y <= lon
+        if not in_degrees(max(0.0, x - ROUNDING), max(0.0, y - ROUNDING), False):
+            swapped = in_degrees(y, x, False)
             raise RunError(path, f"is in {name_of(crs)}, degrees, and has coordinates up to {far[0]:.6g}, {far[1]:.6g}",
                            "latitude seems to come first: swap them" if swapped else
                            "they look like metres: " + (SAY if implied else "correct its crs (ogr2ogr -a_srs)"))
-    elif (far * unit <= (_library.limit("map_narrow_lon_deg"), lat)).all():
+    elif in_degrees(*far * unit, True):
         raise RunError(path, f"is in {name_of(crs)}, metres, and all its coordinates lie within {span[0]:.3g} of "
                        f"{xy[0][0]:.6g}, {xy[0][1]:.6g}, as degrees do",
                        "correct its crs (ogr2ogr -a_srs EPSG:4326)")
@@ -140,7 +141,7 @@ class Plane:
         if isinstance(crs, str):
             plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)
             return plane
-        if centre and (np.abs(centre) > _library.limit("map_most_deg")).any():
+        if centre and not _library.library().bt_outline_in_degrees(*centre, False):
             raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is no place on the earth",
                            "give longitude and latitude in degrees")
         lonlat = plane._prepare(found, xy)
@@ -227,13 +228,7 @@ def about(centre):
 
 
 def middle(lonlat):
-    """The place in the middle of others: of the box around them in the plane at their mean direction, which no pole and
-    no meridian disturbs."""
-    lon, lat = np.radians(lonlat).T
-    x, y, z = (np.cos(lat) * np.cos(lon)).mean(), (np.cos(lat) * np.sin(lon)).mean(), np.sin(lat).mean()
-    plane = about((np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, np.hypot(x, y)))))
-    e, n = plane(*np.asarray(lonlat).T)
-    e, n = np.asarray(e), np.asarray(n)
-    if not (np.isfinite(e).all() and np.isfinite(n).all()):
-        return tuple(map(float, plane(0, 0, inverse=True)))
-    return tuple(map(float, plane((e.min() + e.max()) / 2, (n.min() + n.max()) / 2, inverse=True)))
+    """The place in the middle of others, as the program has it of a map (bergtow/outline.h)."""
+    places, out = np.ascontiguousarray(lonlat, dtype=float), (ctypes.c_double * 2)()
+    _library.library().bt_outline_middle(len(places), places.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), out)
+    return tuple(out)

@@ -243,7 +243,8 @@ def load_cases(a):
     marks = ["* design value"] * bool(top)
     marks += ["† with assumed values, not in it"] * any(not c["in_design"] for c in a["load_cases"])
     marks += ["‡ of so few runs it is a lower bound, not a design value"] * lower
-    return [Table(["load case", "kN", "95 % interval", "kind", "by", "with"], rows), *[["; ".join(marks)]] * bool(marks)]
+    return [Table(["load case", "kN", "95 % interval", "kind", "by", "with"], rows),
+            *[["; ".join(marks)]] * bool(marks)]
 
 
 def parts(a):
