@@ -255,6 +255,13 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
     assert "WARNING: 2 of 40 members failed (c019-r001, c020-r002; c019-r001: it diverged)" in said
 
 
+def test_a_study_without_a_member_that_finished_says_why(tmp_path):
+    e = Members(with_status(tmp_path / "a", lambda c, r: made_up.FAILED))
+    with pytest.raises(RunError, match="no member that has finished; 40 failed, the first: c001-r001: it diverged") as why:
+        budget.numbers(e, "n_floes")
+    assert why.value.status == 4
+
+
 def loaded(folder, parted=None):
     """A hypercube with a tow force three times the ice resistance, and the force of a floe; the line of member `parted`
     parts at 200 s."""

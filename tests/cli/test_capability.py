@@ -382,6 +382,20 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
     assert late.why == case_runs.SPENT.text and not capability.found_of(late, 0.1)["resolved"]
 
 
+def test_a_budget_that_reaches_for_no_run_is_an_error(tmp_path):
+    said = found_in(tmp_path, THRUST, "--from", 0.3, "--to", 0.5, "--budget", 1e-6, code=6)
+    assert "the budget does not reach for a run" in said and not list(tmp_path.glob("**/capability.json"))
+
+
+def test_without_ice_there_is_one_run_and_no_interval(tmp_path):
+    """All fields are that run: red when it counts once for each of them."""
+    found, _ = found_in(tmp_path, THRUST, "--from", 0, "--to", 0.3, "--speed", 0.1, "--points", 2, "--budget", 3,
+                        "--fields", 6, "--keep-width")
+    open_water = found["conditions"][0]["points"][0]
+    assert open_water["value"] == 0 and open_water["fields"] == len(open_water["speed"]) == 1
+    assert open_water["mean_speed_95"] == [None, None] and open_water["mean_speed"] > 0
+
+
 class made_up_run(Told):
     """A run whose body keeps 0.15 m/s below a concentration of 0.5, and stops above."""
 
@@ -444,7 +458,7 @@ def test_the_case_that_it_is_of_is_what_all_its_runs_have_alike(tmp_path):
     """Not what follows from the searched key, so that another study of that vessel is not one of another case."""
     case = changed(THRUST, tow__line__branches=2, run__duration=2, output__window_start=1)
     found, _ = found_in(tmp_path, case, "--search", "tow.vessel.bollard_pull", "--from", 5, "--to", 10, "--for",
-                        "tow.line_length=2,3", "--points", 0, "--budget", 0.02)
+                        "tow.line_length=2,3", "--points", 0, "--budget", 0.1)
     assert found["values"]["tow.vessel.free_speed"] == "0.5 m/s"
     assert not {"tow.vessel.bollard_pull", "tow.vessel.free_resistance", "tow.line_length", "tow.branch2.length"
                 } & set(found["values"])

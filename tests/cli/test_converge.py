@@ -397,6 +397,25 @@ def test_a_run_that_failed_is_told_by_the_exit_code(tmp_path, monkeypatch):
     assert row["judged"] == "open" and "no sound state" in row["why"]
 
 
+def test_an_engine_that_a_signal_kills_is_no_spent_budget(tmp_path):
+    """Such as for want of memory, and after it has written ensemble.h5 anew."""
+    engine = tmp_path / "engine"
+    engine.write_text('#!/bin/sh\nmkdir -p "$4"; date +%N > "$4/ensemble.h5"; kill -9 $$\n')
+    engine.chmod(0o755)
+    with pytest.raises(RunError, match="a signal has killed bergtow ensemble: SIGKILL; call again") as killed:
+        case_runs.run_members(engine, tmp_path / "study.yml", tmp_path / "out", [], 1, 60.0)
+    assert killed.value.status == 6 and (tmp_path / "out/ensemble.h5").exists()
+
+
+def test_runs_that_no_seed_changes_are_one(tmp_path):
+    path = write_case(tmp_path, changed(CASE, ice__concentration=0, run__duration=5, output__window_start=2))
+    study = case_runs.CaseRuns(path, tmp_path / "out", "converge", Path(BERGTOW), [], 1, np.inf, np.inf)
+    row = converge.compare(study, next(k for k in converge.KINDS if k.name == "dt"), "case", {}, "dt-1",
+                           {"run.dt": 0.25}, 0.05)
+    assert row["fields"] == 1 and row["judged"] == "open" and "one run" in row["why"]
+    assert study.made == 2
+
+
 def test_a_run_that_fails_is_tried_once_in_a_call(tmp_path):
     """With its code, by which other commands know why; the others are made."""
     failing = changed(SHORT, air__wind_x=15, guard__energy=1e-3)
@@ -435,7 +454,7 @@ def test_fields_that_are_the_same_run_are_refused(tmp_path):
     runs = runs_of(tmp_path, changed(SHORT, ice__concentration=0))
     assert runs.make("case", [0, 1], {}) == [None, None] and runs.made == 1
     assert [runs.kept("case", i) for i in range(3)] == [True, True, False]
-    assert len(runs.measured("case", range(2), lambda run: run.number("n_floes"))) == 2
+    assert len(runs.measured("case", range(2), lambda run: run.number("n_floes"))) == 1
     given = runs_of(tmp_path, changed(SHORT, ice__concentration=0, floes=[{"x": 10, "y": 1, "length": 1}]))
     assert given.make("case", [0], {}) == [None]
     with pytest.raises(RunError, match="the ice is read.*no seed changes it"):

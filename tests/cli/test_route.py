@@ -147,6 +147,11 @@ def test_members_are_the_map_within_its_errors(tmp_path):
         assert call("check", s.case, *sets).returncode == DONE
 
 
+def test_a_map_without_floes_has_members_without_floes():
+    nothing = members.Floes(np.zeros((0, 2)), np.zeros(1, dtype=int), np.zeros((0, 3)), np.zeros(0), np.zeros(0), {})
+    assert nothing.outlines() == []
+
+
 def test_a_map_without_errors_is_one_member(tmp_path):
     s = read_situation(tmp_path, BASIN)
     (one,) = members.drawn(10, s, members.Errors(0, 0, 0), tmp_path)
