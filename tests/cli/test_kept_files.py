@@ -85,7 +85,7 @@ def quick(places, tmp_path, monkeypatch):
                                  tow__line__breaking_load=1e5), "line.yml")
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     monkeypatch.setattr(converge, "converge", work_of(tmp_path / "converge.json"))
-    monkeypatch.setattr(analysis.converge_text, "text", lambda _: "")
+    monkeypatch.setattr(analysis.converge_text, "content", lambda _: [])
     monkeypatch.setattr(report_run, "pictures", lambda _: [])
     monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     return {"RUN": str(places / "run"), "ALL": str(places / "all")}
