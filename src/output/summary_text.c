@@ -153,8 +153,8 @@ static void print_splits(const bt_splitting *splitting, int64_t n_steps)
            (long long)splitting->n, (long long)totals->by_mode[BT_SPLIT_NEAR], (long long)totals->by_mode[BT_SPLIT_FAR],
            (long long)totals->by_mode[BT_SPLIT_BURST], totals->crack_length, totals->work);
     if (splitting->n > 0)
-        printf("    sizes             floes of %.3g m (median) into pieces of %.3g m, the smallest of %.3g m; in %.2g %% of "
-               "the steps\n",
+        printf("    sizes             floes of %.3g m (median) into pieces of %.3g m, the smallest of %.3g m; in "
+               "%.2g %% of the steps\n",
                bt_splitting_size(splitting, true, 0.5), bt_splitting_size(splitting, false, 0.5),
                bt_splitting_size(splitting, false, 0), 100.0 * (double)totals->steps / (double)n_steps);
     printf("    could not split   %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",

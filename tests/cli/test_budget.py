@@ -257,9 +257,10 @@ def test_members_that_failed_leave_no_interval(tmp_path, monkeypatch, capsys):
 
 def test_a_study_without_a_member_that_finished_says_why(tmp_path):
     e = Members(with_status(tmp_path / "a", lambda c, r: made_up.FAILED))
-    with pytest.raises(RunError, match="no member that has finished; 40 failed, the first: c001-r001: it diverged") as why:
+    why = "no member that has finished; 40 failed, the first: c001-r001: it diverged"
+    with pytest.raises(RunError, match=why) as error:
         budget.numbers(e, "n_floes")
-    assert why.value.status == 4
+    assert error.value.status == 4
 
 
 def loaded(folder, parted=None):

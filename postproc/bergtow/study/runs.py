@@ -268,8 +268,8 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
     before, began = ensemble_made(folder), time.monotonic()
     code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | MESSAGES | ONE_THREAD, **options)
     if code < 0:
-        raise RunError(folder, f"a signal has killed bergtow ensemble: {signal.Signals(-code).name}", "call again: what "
-                       "is made is kept; if the memory ran out (SIGKILL), give fewer --jobs", SIGNAL)
+        raise RunError(folder, f"a signal has killed bergtow ensemble: {signal.Signals(-code).name}",
+                       "call again: what is made is kept; if the memory ran out (SIGKILL), give fewer --jobs", SIGNAL)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, messages(said), code, f"bergtow ensemble ended with exit code {code}")
     return not stopped_by_limit(code, time.monotonic() - began, limit), messages(said)
