@@ -289,7 +289,7 @@ def test_a_file_that_the_case_names_is_a_part_of_it(tmp_path, where):
 
 
 @pytest.mark.parametrize("change", ["values", "given", "case", "version"])
-def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change):
+def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change, capsys):
     first = runs_of(tmp_path, SHORT)
     assert first.make("case", [0, 1], {"ice.friction": 0.1}) == [None, None] and first.made == 2
     runs = runs_of(tmp_path, changed(SHORT, ice__thickness=0.05) if change == "case" else SHORT,
@@ -298,6 +298,8 @@ def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change)
         study = tmp_path / "out/converge/case.yml"
         study.write_text(study.read_text().replace("# bergtow", "# bergtow 0", 1))
     assert runs.make("case", [0], {"ice.friction": 0.3 if change == "values" else 0.1}) == [None] and runs.made == 1
+    told = "out/converge/case: its runs are of other settings, and are made anew" in capsys.readouterr().err
+    assert told == (change != "version")
     assert not runs.kept("case", 1)
 
 

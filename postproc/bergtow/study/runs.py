@@ -165,6 +165,8 @@ class CaseRuns:
         except Refused as error:
             codes = {message.code for message in error.errors}
             if "other_study" in codes:
+                self.tell((name, "other_study"), f"{self.home(name)}: its runs are of other settings, and are made "
+                          "anew")
                 shutil.rmtree(self.home(name))
             elif "one_field" in codes:
                 self._alike.add(name)
