@@ -189,7 +189,8 @@ def test_no_budget_and_no_capability_of_lower_bounds(tmp_path):
     e = made(tmp_path / "a", members, "latin-hypercube")
     with pytest.raises(RunError, match="no bound in some steps of 2 of 18 tows"):
         budget.of_ensemble(e)
-    runs = SimpleNamespace(given=[], make=lambda *_: [ENDED], seconds={}, end=np.inf, jobs=1, path=lambda *_: tmp_path)
+    runs = SimpleNamespace(given=[], make=lambda *_: [ENDED], seconds={}, end=np.inf, jobs=1, path=lambda *_: tmp_path,
+                           alike=lambda *_: False)
     search = capability.Search(runs, "ice.concentration", "", 0.1, None, False)
     c = capability.Condition("case", "the case", np.nan, {}, capability.bracket.Bracket(0.2, 0.9, 0.1, 0.5, 6))
     with pytest.raises(RunError, match="that of the other tows"):
