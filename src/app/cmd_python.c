@@ -4,6 +4,7 @@
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/process.h"
+#include "run/halt.h"
 
 #include <limits.h>
 #include <stdio.h>
@@ -70,6 +71,8 @@ int bt_cmd_python(int argc, char **argv)
         bt_launcher_forget(); // of one rank
         bt_comm_end(BT_OK);   // a launcher waits for it
         fflush(NULL);
+        // While it loads, Python would answer Ctrl-C with a traceback; postproc/bergtow/cli/command.py, guarded, unblocks.
+        bt_halt_block(&(sigset_t){0});
         execv(python, words); // in place of this process: what is sent to it reaches the command
         free(words);
         bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);

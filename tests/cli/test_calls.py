@@ -111,7 +111,15 @@ def test_a_message_has_its_code_beside_its_text(tmp_path):
     (other,), (damaged,) = (case_runs.messages(text) for text in said[1:])
     assert (other.code, other.warning) == ("other_study", False) and str(other).endswith("base case [other_study]")
     assert damaged.warning and not damaged.code and str(damaged).startswith("warning: member c001-r001 is not sound")
-    assert case_runs.messages("MPI: no\n\n") == [case_runs.Message("MPI: no", None, False)]
+    for line in ("MPI: no", '{"jobid": 3}', "{", "5"):
+        assert case_runs.messages(f"{line}\n\n") == [case_runs.Message(line, None, False)]
+
+
+def test_ctrl_c_while_python_loads(tmp_path):
+    """Red with a traceback: it comes before the package is there, and the command answers it."""
+    (tmp_path / "sitecustomize.py").write_text("import os\nos.kill(os.getpid(), 2)\n")
+    p = call("report", "nothing", env=environment(PYTHONPATH=tmp_path), preexec_fn=heard)
+    assert (p.returncode, p.stderr) == (6, "bergtow report: stopped\n")
 
 
 def test_a_second_stop_leaves_no_run_behind(tmp_path):

@@ -61,6 +61,7 @@ def guarded(name, main):
     code = 0
     try:
         try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, ())  # blocked by src/app/cmd_python.c while Python loads
             with progress.told(name):
                 main()
         finally:

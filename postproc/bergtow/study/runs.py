@@ -39,9 +39,16 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 FIRST_SEED = 1000  # of the fields
 
 
+def _message(line):
+    try:
+        return Message(**json.loads(line))
+    except (TypeError, ValueError):  # of another program
+        return Message(line)
+
+
 def messages(said):
     """The messages of the program; what others write there, such as MPI, is an error without a code."""
-    return [Message(**json.loads(line)) if line[0] == "{" else Message(line) for line in said.splitlines() if line]
+    return [_message(line) for line in said.splitlines() if line]
 
 
 def stopped_by_limit(code, took, limit):
@@ -270,7 +277,7 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
     before, began = ensemble_made(folder), time.monotonic()
     code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | MESSAGES | ONE_THREAD, **options)
     if code < 0:
-        raise RunError(folder, f"a signal has killed bergtow ensemble: {signal.Signals(-code).name}",
+        raise RunError(folder, f"signal {-code} ({signal.strsignal(-code)}) has ended bergtow ensemble",
                        "call again: what is made is kept; if the memory ran out (SIGKILL), give fewer --jobs", SIGNAL)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, messages(said), code, f"bergtow ensemble ended with exit code {code}")
