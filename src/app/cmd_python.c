@@ -71,7 +71,7 @@ int bt_cmd_python(int argc, char **argv)
         bt_launcher_forget(); // of one rank
         bt_comm_end(BT_OK);   // a launcher waits for it
         fflush(NULL);
-        // While it loads, Python would answer Ctrl-C with a traceback; postproc/bergtow/cli/command.py, guarded, unblocks.
+        // Until its guarded() (postproc/bergtow/cli/command.py) unblocks them: Python answers Ctrl-C with a traceback.
         bt_halt_block(&(sigset_t){0});
         execv(python, words); // in place of this process: what is sent to it reaches the command
         free(words);
