@@ -98,6 +98,7 @@ static void look_again(bt_world *world, bt_cell *cell, bt_idx j, bt_contact *row
 
 /// The contacts of a cell, put aside during the projection.
 typedef struct bt_aside {
+    bool formed; ///< the cell has the rows of the projection, and its contacts are here
     bt_contact *contacts;
     size_t bytes;
     bt_idx n;
@@ -120,7 +121,7 @@ static void put_rows(bt_world *world, bt_idx k, const void *again, bt_totals *to
         n += row->n > 0;
     }
     world->solver->aside[k] =
-        (bt_aside){cell->contacts, cell->contact_bytes, cell->n_contacts, cell->laws->limits};
+        (bt_aside){true, cell->contacts, cell->contact_bytes, cell->n_contacts, cell->laws->limits};
     cell->contacts = rows;
     cell->contact_bytes = (size_t)cell->n_contacts * sizeof *rows;
     cell->n_contacts = n;
@@ -129,12 +130,37 @@ static void put_rows(bt_world *world, bt_idx k, const void *again, bt_totals *to
     if (world->par.plain_sweeps) bt_rounds_in_place(cell, world->bodies.inv);
 }
 
+/// Residual of a cell that displacements have reached.
+static void residual_apart(bt_world *world, bt_idx k, const void *problem, bt_totals *totals)
+{
+    if (!world->solver->aside[k].formed) put_rows(world, k, &(bool){false}, totals);
+    bt_solver_residual_of_cell(world, k, problem, totals);
+}
+
+/// Residual before any displacement: 0 where no gap is closed by more than the slop. Most cells stay so, and need no
+/// rows. The large bodies move floes anywhere.
+static void residual_at_rest(bt_world *world, bt_idx k, const void *problem, bt_totals *totals)
+{
+    bt_cell *cell = &world->cells->cell[k];
+    bool takes_part = world->par.plain_sweeps || world->solver->aside[k].formed || k == world->cells->n - 1;
+    for (bt_idx j = 0; j < cell->n_contacts && !takes_part; j++)
+        for (int i = 0; i < cell->contacts[j].n; i++)
+            takes_part = takes_part || cell->gaps[j].gap[i] + world->par.slop < 0;
+    if (takes_part) {
+        residual_apart(world, k, problem, totals);
+        return;
+    }
+    cell->n_listed = 0;
+    bt_rounds_found(cell, &(bt_found){0});
+}
+
 static void put_back(bt_world *world)
 {
     for (bt_idx i = 0; i < world->cells->n_order; i++) {
         const bt_idx k = world->cells->order[i];
         bt_cell *cell = &world->cells->cell[k];
         const bt_aside *aside = &world->solver->aside[k];
+        if (!aside->formed) continue;
         free(cell->contacts);
         cell->contacts = aside->contacts;
         cell->contact_bytes = aside->bytes;
@@ -146,14 +172,10 @@ static void put_back(bt_world *world)
     world->solver->aside = NULL;
 }
 
-/// Replace the contacts of all cells. Returns the deepest overlap of pairs that have rotated, m.
-static double put_aside(bt_world *world, bool again)
+/// Begin to put contacts aside.
+static void put_aside(bt_world *world)
 {
-    bt_totals totals = {0};
     world->solver->aside = bt_alloc((size_t)world->cells->n, sizeof *world->solver->aside);
-    bt_phases_any_order(world, put_rows, &again, &totals);
-    bt_domain_reduce(world, &totals);
-    return totals.most;
 }
 
 static void sweep_plain(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
@@ -172,7 +194,7 @@ static void sweep_plain(bt_world *world, bt_idx k, const void *context, bt_total
 static void solve_apart(bt_world *world)
 {
     bt_step_stats *st = &world->stats;
-    bt_problem problem = {.residual = bt_solver_residual_of_cell,
+    bt_problem problem = {.residual = residual_at_rest,
                           .sweep = world->par.plain_sweeps ? sweep_plain : bt_solver_sweep_cell,
                           .vel = world->solver->shift,
                           .tolerance = 0.1 * world->par.slop,
@@ -183,6 +205,7 @@ static void solve_apart(bt_world *world)
     bt_rounds_scale(&problem, world->cells);
     bt_work work = {0};
     bt_rounds_residual(world, &problem, BT_BEGINS, &work);
+    problem.residual = residual_apart;
     if (problem.plain) // the reference, also used to shake fields: no residual pass, the updates end it
         while (work.sweeps < world->par.position_sweeps && (work.sweeps == 0 || work.residual > problem.tolerance))
             work.residual = bt_rounds_sweep(world, &problem, &work);
@@ -220,16 +243,22 @@ void bt_solver_project(bt_world *world)
     solver->turned = bt_sum_value(&totals.sum[TURNS]) > 0;
     solver->shifted = totals.most > world->par.slop;
     if (!solver->shifted) return;
-    put_aside(world, false);
+    put_aside(world);
     part(world);
 }
 
 bool bt_solver_project_again(bt_world *world)
 {
     bt_solver *solver = world->solver;
-    solver->parted_again = solver->turned && put_aside(world, true) > LEFT * world->par.slop;
+    solver->parted_again = false;
+    if (!solver->turned) return false;
+    put_aside(world);
+    bt_totals totals = {0};
+    bt_phases_any_order(world, put_rows, &(bool){true}, &totals);
+    bt_domain_reduce(world, &totals);
+    solver->parted_again = totals.most > LEFT * world->par.slop;
     if (solver->parted_again) part(world);
-    else if (solver->turned) put_back(world);
+    else put_back(world);
     solver->shifted = solver->shifted || solver->parted_again;
     return solver->parted_again;
 }
