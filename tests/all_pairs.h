@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Contacts without what detection leaves out: at rest or not, and by testing all pairs.
+// Reference for the detection of contacts: bodies at rest included, and by testing all pairs.
 #ifndef BT_ALL_PAIRS_H
 #define BT_ALL_PAIRS_H
 
 #include "scene.h"
 #include "contact/contacts.h"
 
-/// The contacts of everything within the margin, whether at rest or not.
+/// Detect the contacts of all bodies within the margin, at rest or not.
 static inline void detect_all(bt_world *w, double margin)
 {
     bt_cells_begin(w);
     bt_cells_update(w, margin);
     bt_cells_wake_all(w->cells);
-    // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
+    // A speed with the margin asked for; a margin already rounded must not be rounded up again.
     for (bt_idx k = 0; k < w->cells->n; k++)
         w->cells->bound[k] = bt_max(0.4 * margin / w->par.dt, 1e-300);
     bool movable = false;

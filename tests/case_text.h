@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Case files of a test, written into a folder of its own and read, and what their errors say.
+// Helpers for tests that write case files to a temporary folder, read them and check the error messages.
 #ifndef BT_CASE_TEXT_H
 #define BT_CASE_TEXT_H
 

@@ -33,7 +33,7 @@ static inline bt_record_bodies bodies(void)
 
 static inline bt_case made_up_case(void)
 {
-    static bt_case defaults; // reachable to the end: the leak checker need not know it
+    static bt_case defaults; // reachable until the end, so not reported as a leak
     if (!defaults.ice.size) bt_case_defaults(&defaults);
     static char title[] = "quote \" backslash \\ newline \n and byte \xff end", text[] = "run: {dt: 0.1 s}\n";
     static char source[] = "made up \u00e9";
@@ -41,7 +41,7 @@ static inline bt_case made_up_case(void)
     c.text = text;
     c.run.title = title;
     c.run.dt = 0.1;
-    c.ice.size = 2; // as the totals below have it
+    c.ice.size = 2; // as in the totals below
     c.tow.mode = BT_TOW_SPEED;
     c.tow.ramp = 0;
     c.domain.width = 100; // 50 body widths: no arches

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A snapshot that lies in memory into a file.
+// Write a snapshot from memory to a file.
 #ifndef BERGTOW_TEST_SNAPSHOT_FILE_H
 #define BERGTOW_TEST_SNAPSHOT_FILE_H
 

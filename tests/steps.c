@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A thousand floes stirred and blown together between walls: the state hash after some steps, for one C library to be
-// held against another (tests/machines.sh). Nothing here needs a library beyond it.
+// Prints the state hash of a thousand floes that are stirred and blown together between walls, after some steps, to
+// compare C libraries (tests/machines.sh). Needs no other library.
 #include "scene.h"
 
 #include <inttypes.h>

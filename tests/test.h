@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-// cmocka.h wants those above first
+// cmocka.h needs the headers above first
 #include <cmocka.h>
 
 static struct CMUnitTest test_table[64];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the check of a case and that of a study share: refusals, warnings, and the ice that a run would begin with.
+// Shared by the checks of a case and of a study: refusals, warnings, and the ice with which a run would begin.
 //
 // Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full
 // scale) and much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
@@ -38,7 +38,7 @@ static bt_check_ice ice_of_field(const bt_case *input, const bt_field *field)
     return ice;
 }
 
-/// Of the field that was read, or expected of the one that will be made.
+/// The ice of the field that was read, or the expected ice of the field to be generated.
 static bt_check_ice ice_of(const bt_case *input, const bt_field *field)
 {
     bt_check_ice ice = bt_case_reads_field(input) ? ice_of_field(input, field) : ice_of_case(input);
@@ -71,7 +71,7 @@ double bt_check_seconds(const bt_case *input, const bt_check_ice *n)
 
 // --- refusals and warnings -------------------------------------------------------------------------------------------
 
-/// Bodies, walls and floes that are known, as the run sets them up.
+/// Set up the bodies, walls and known floes as a run does.
 static bt_status try_setup(const bt_case *input, const bt_field *field, bt_errors *err)
 {
     bt_world *world = NULL;
@@ -98,7 +98,7 @@ bt_status bt_check_ready(const bt_case *input, const bt_comm *comm, bt_field *fi
     return status == BT_OK ? try_setup(input, field, err) : status;
 }
 
-#define SLOW 2.0 // a reference speed less than the speed of the ice by more than this is reported, assumed
+#define SLOW 2.0 // speed of the ice / reference speed above which it is reported, assumed
 
 static void warn_of_step(const bt_case *input, const bt_check_ice *ice, bt_errors *warnings)
 {
@@ -128,7 +128,7 @@ bt_check_split bt_check_split_of(const bt_case *input, const bt_check_ice *ice)
                             bt_split_opening_load(&law, ice->thickness, side)};
 }
 
-/// Where the tow leads in the ice, which water and wind move; a lead goes with it.
+/// Warn of the path through the ice, which water and wind move; a lead moves with it.
 static void warn_of_track(const bt_case *input, const bt_field *field, const bt_check_ice *ice, bt_errors *warnings)
 {
     if (ice->count < 1) return;

@@ -41,7 +41,7 @@ typedef struct {
 
 /// Where rows go: to stdout, or into a list, since the rows of a group need not follow each other.
 typedef struct {
-    bool json, begun; ///< begun: a line is yet to be ended
+    bool json, begun; ///< begun: the current line is not ended yet
     row *row;
     size_t n;
 } sink;
@@ -52,7 +52,7 @@ static void end_line(sink *to)
     to->begun = false;
 }
 
-/// True when the row is to be printed; its label has been.
+/// Add a row to the list for JSON, or print its label; true if its value is to be printed.
 static bool prints(sink *to, const row *of, const char *label)
 {
     if (to->json && of->key) {
@@ -67,14 +67,14 @@ static bool prints(sink *to, const row *of, const char *label)
     return to->begun = true;
 }
 
-/// NaN: does not apply, is null and not printed. format: NULL = in the JSON alone.
+/// value: NaN = does not apply: null, not printed. format: NULL = only in JSON.
 static void number(sink *to, const char *key, const char *label, const char *format, double value)
 {
     if (!format && !to->json) return;
     if (prints(to, &(row){.key = key, .kind = 'n', .number = value}, label)) printf(format, value);
 }
 
-/// B; format with %s.
+/// A number of bytes; format with %s.
 static void bytes(sink *to, const char *key, const char *label, const char *format, double value)
 {
     char text[32];
@@ -88,7 +88,7 @@ static void flag(sink *to, const char *key, bool value, const char *yes, const c
     if (prints(to, &(row){.key = key, .kind = 'f', .number = value}, NULL)) fputs(value ? yes : no, stdout);
 }
 
-/// NULL: as NaN. key: NULL = printed alone.
+/// value: NULL = as NaN. key: NULL = only printed.
 static void word(sink *to, const char *key, const char *label, const char *value)
 {
     if (prints(to, &(row){.key = key, .kind = 'w', .word = value}, label)) fputs(value, stdout);
@@ -96,7 +96,7 @@ static void word(sink *to, const char *key, const char *label, const char *value
 
 static size_t group_of(const char *key) { return strcspn(key, "."); }
 
-/// Each group as an object, where its first row stands.
+/// Write each group as an object, in the place of its first row.
 static void write_rows(bt_json *json, const sink *from)
 {
     for (size_t i = 0; i < from->n; i++) {
@@ -121,7 +121,7 @@ static void write_rows(bt_json *json, const sink *from)
 
 // --- the numbers -----------------------------------------------------------------------------------------------------
 
-/// x where it applies.
+/// x if it applies, otherwise NaN.
 static double where(bool applies, double x) { return applies ? x : NAN; }
 
 static void domain(sink *to, const bt_checked *c)
@@ -187,10 +187,10 @@ static void print_outlines(sink *to, const bt_outline_counts *counts)
         printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", counts->split, counts->parts);
 }
 
-/// 0 for what rounding has left of it, m.
+/// x, or 0 if it is only rounding, m.
 static double zero_if_tiny(double x) { return fabs(x) < 1e-9 ? 0 : x; }
 
-/// The line as the case has it.
+/// Print the tow line of the case.
 static void print_line(sink *to, const bt_case *input)
 {
     if (to->json) return;
@@ -226,7 +226,7 @@ static void tow_line(sink *to, const bt_case *input)
     number(to, "line.ramp_periods_needed", NULL, ", at least %g periods", BT_RAMP_PERIODS);
     flag(to, "line.starts_slowly", bt_case_start_is_slow(input), ": ok", ": TOO SHORT: the start jerks the line");
     if (input->tow.mode != BT_TOW_THRUST) return;
-    double current[2]; // of one that changes the mean over the run
+    double current[2]; // if it changes, its mean over the run
     bt_environment_mean(input, true, current);
     const double through = input->tow.speed - current[0] * bt_cos(input->tow.direction) -
                            current[1] * bt_sin(input->tow.direction),
@@ -325,7 +325,7 @@ static void environment(sink *to, const bt_checked *c)
 {
     flow(to, c->input, true);
     flow(to, c->input, false);
-    double v[2][2]; // ice and a free body begin with this, where water, wind or slope move them
+    double v[2][2]; // initial velocities of ice and a free body, if water, wind or slope move them
     bt_setup_drift(c->input, c->run->size, c->run->thickness, c->run->concentration, v[0], v[1]);
     static const char *const keys[2][2] = {{"ice.drift_x_m_s", "ice.drift_y_m_s"},
                                            {"body.drift_x_m_s", "body.drift_y_m_s"}},
@@ -337,7 +337,7 @@ static void environment(sink *to, const bt_checked *c)
     }
 }
 
-/// With a field that was read as it will be; of a field that is still to be made, the strip.
+/// The lead: with a field that was read, as it is cut; with a field to be generated, only the strip.
 static void lead(sink *to, const bt_checked *c)
 {
     const bt_case *input = c->input;
@@ -353,7 +353,7 @@ static void lead(sink *to, const bt_checked *c)
     bt_lead_stats_print(c->lead);
 }
 
-/// Values that nobody gave and that follow from others: {name: value in SI}, or in lines.
+/// Values that were not given and follow from others: {name: value in SI}, or in lines.
 static void defaults(sink *to, bt_json *json, const bt_case *input)
 {
     if (to->json) bt_json_open(json, "by_default", '{');

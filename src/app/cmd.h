@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The commands of the program, and what they share.
+// The commands of the program, and the functions they share.
 #ifndef BERGTOW_CMD_H
 #define BERGTOW_CMD_H
 
@@ -45,11 +45,11 @@ char *bt_cmd_default_folder(const char *path);
 /// it.
 char *bt_cmd_join(int argc, char **argv);
 
-/// May a command write this file? Never the case file itself, nor what is no regular file; what is there, is not empty
-/// and not the command's own (ours) only with --force. Errors: BT_ERR_IO.
+/// May a command write this file? Never the case file itself, or anything but a regular file. A file that exists, is
+/// not empty and was not written by this command (`ours`) needs --force. Errors: BT_ERR_IO.
 bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, bool force, bt_errors *err);
 
-/// Collective over `comm`. Every rank reads the file; a pipe gives what it holds to one of them. Errors: BT_ERR_USAGE.
+/// Collective over `comm`. Refuse a pipe, whose contents only one of the ranks would get. Errors: BT_ERR_USAGE.
 bt_status bt_cmd_each_may_read(const bt_comm *comm, const char *path, bt_errors *err);
 
 /// Collective over `comm`. Print all ranks' messages once, release them, and return the worst status as exit code.

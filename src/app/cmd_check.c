@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// bergtow check: validates a case and prints the numbers that follow from it. Of a study: cmd_check_study.c.
+// bergtow check: validates a case and prints the numbers that follow from it. For a study: cmd_check_study.c.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// bergtow check of a study: the study, the case of each of its conditions, and what all of it costs.
+// bergtow check of a study: the study, the case of each of its conditions, and the total cost.
 //
-// Members of a condition differ by the seed of their field alone, so the first stands for all.
+// Members of a condition differ only in the seed of their field, so the first represents all.
 #include "field/lead.h"
 #include "bergtow/study.h"
 #include "app/cmd_check.h"
@@ -27,7 +27,7 @@ enum {
     CELL = 48,
 };
 
-// Of the first member of a condition.
+// Numbers of the first member of a condition.
 typedef struct {
     double floes, steps, seconds, memory, disk; // number, number, s of one core, B, B
     bool step_good, warned;
@@ -44,9 +44,9 @@ typedef struct {
     size_t n;
 } faults;
 
-// --- faults and warnings: what is wrong with many conditions is said once --------------------------------------------
+// --- faults and warnings, each reported once for all its conditions --------------------------------------------------
 
-/// Of warnings of one code, which differ in numbers, the first stands for all.
+/// Warnings with the same code differ only in their numbers, so the first represents all.
 static bool is_same(const fault *a, const char *text, const char *code)
 {
     return a->code && code ? !strcmp(a->code, code) : !strcmp(a->text, text);
@@ -92,7 +92,7 @@ static void tell_faults(faults *found, const bt_study *study, bt_errors *err)
 
 static bt_status worse(bt_status a, bt_status b) { return a > b ? a : b; }
 
-/// Case and ice of a condition, as `check` has them of a case.
+/// Check the case and ice of a condition, as `check` does for a case.
 static bt_status check_condition(const bt_study *study, int64_t condition, numbers *sums, bt_errors *warnings,
                                  bt_errors *err)
 {
@@ -129,7 +129,7 @@ static bt_status check_condition(const bt_study *study, int64_t condition, numbe
 static bt_status check_conditions(const bt_study *study, numbers *sums, bt_errors *warnings, bt_errors *err)
 {
     bt_case input;
-    bt_status status = bt_study_base_case(study, &input, err); // what is wrong without any condition
+    bt_status status = bt_study_base_case(study, &input, err); // faults common to all conditions
     bt_case_free(&input);
     if (status != BT_OK) {
         bt_errors_add(err, "%s: base: %s with `set` is not a valid case, which every condition needs; correct that "
@@ -179,7 +179,7 @@ static void print_parameter(const bt_study *study, const bt_study_parameter *par
 {
     printf("%-20s ", parameter->name);
     if (parameter->continuous && study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
-        // with its unit: these are SI numbers, and a bare one of an angle would be read in degrees
+        // with its unit: these are SI numbers, and an angle without unit would be read in degrees
         const bt_key *key = parameter->key >= 0 ? &bt_case_keys[parameter->key] : NULL;
         const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
         char *distribution = bt_study_distribution(parameter);
@@ -208,7 +208,7 @@ static void print_varied(const bt_study *study)
     }
 }
 
-/// Texts of a row of the table, the head for condition −1.
+/// Cells of a row of the table; condition −1: its head.
 static int row_of(const bt_study *study, const numbers *sums, int64_t condition, char cell[][CELL])
 {
     int n = 0;
@@ -265,7 +265,7 @@ static void print_range(const bt_study *study, const numbers *sums)
     else printf("time step            ok\n");
 }
 
-/// How many members run at a time, and what all of it takes then. ranks: that this call was started on, or 1.
+/// Print how many members run at a time, and the resources they need. ranks: of this call, or 1.
 static void print_work(const bt_study *study, double memory, double disk, double seconds, int ranks)
 {
     char text[CELL];

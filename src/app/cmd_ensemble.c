@@ -16,14 +16,14 @@
 
 // --- processes -------------------------------------------------------------------------------------------------------
 
-// Processes that share the members of an ensemble with the one that a user has started.
+// Processes that share the members of an ensemble with the process the user started.
 //
-// Members are independent, and a field of some thousand floes keeps one core busy: two processes of one thread each
-// take less time for them than one of two threads, and half of the processor time, and on many cores the difference is
-// a factor. That several calls may work on one folder is there for job arrays; so a call starts itself again. Rejected:
-// members in the threads of one process, as the team of OpenMP, signals and the first error all are of a process.
+// Members are independent, and a field of a few thousand floes keeps one core busy. Two processes of one thread each
+// need less time for them than one of two threads, and half of the processor time; on many cores the gain is a factor.
+// Several calls may work on one folder, for job arrays, so a call starts itself again. Rejected: members in threads of
+// one process, because the OpenMP team, signals and the first error belong to a process.
 
-/// What bt_ensemble_run calls to have help. argv: of the command `ensemble`; it must outlive the calls.
+/// Helper processes for bt_ensemble_run. argv: of the command `ensemble`; it must outlive the calls.
 typedef struct bt_jobs {
     int argc;
     char **argv;
@@ -34,18 +34,18 @@ typedef struct bt_jobs {
 
 static const char mark[] = "BERGTOW_JOB";
 
-/// Is this process one of them? Then it also ends, with checkpoints, when the one that started it has ended.
+/// Is this process a helper? Then it also ends, with checkpoints, when the process that started it has ended.
 static bool jobs_is_one(void)
 {
     const char *parent = getenv(mark);
     if (!parent) return false;
     prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (getppid() != (pid_t)atol(parent)) raise(SIGTERM); // it has ended meanwhile
+    if (getppid() != (pid_t)atol(parent)) raise(SIGTERM); // the parent has ended already
     return true;
 }
 
-/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. One that cannot be started, or is killed, is reported and
-/// done without.
+/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. A helper that cannot be started, or is killed, is reported,
+/// and the others do without it.
 static void jobs_start(void *of, int n, int threads)
 {
     bt_jobs *jobs = of;
@@ -54,7 +54,7 @@ static void jobs_start(void *of, int n, int threads)
     words[k++] = "bergtow";
     words[k++] = "ensemble";
     snprintf(jobs->threads, sizeof jobs->threads, "%d", threads);
-    words[k++] = "--threads"; // before the user's words, among which -- may end the options
+    words[k++] = "--threads"; // before the user's words, where -- may end the options
     words[k++] = jobs->threads;
     words[k++] = "--no-wait";
     for (int i = 1; i < jobs->argc; i++) words[k++] = jobs->argv[i];
@@ -63,7 +63,7 @@ static void jobs_start(void *of, int n, int threads)
     char parent[24];
     snprintf(parent, sizeof parent, "%ld", (long)getpid());
     setenv(mark, parent, 1);
-    // bound to the place of this thread, all would share one core
+    // if bound to the place of this thread, all helpers would share one core
     char *bind = getenv("OMP_PROC_BIND") ? bt_text_copy(getenv("OMP_PROC_BIND")) : NULL;
     if (bind) setenv("OMP_PROC_BIND", "false", 1);
     for (int i = 0; i < n && i < BT_MAX_JOBS; i++) {
@@ -89,7 +89,7 @@ static void jobs_end(void *of, bool stop)
     for (int i = 0; i < jobs->n; i++) {
         int how = 0;
         while (jobs->pid[i] > 0 && waitpid((pid_t)jobs->pid[i], &how, 0) < 0 && errno == EINTR) continue;
-        // all else it has said itself
+        // it has reported any other error itself
         if (!stop && WIFSIGNALED(how))
             bt_errors_warn("warning: job %d of %d was ended by signal %d (%s); the others took its members over; where "
                            "memory is short, ask for fewer jobs with --jobs",
@@ -101,7 +101,7 @@ static void jobs_end(void *of, bool stop)
 // --- the command -----------------------------------------------------------------------------------------------------
 
 typedef struct {
-    bt_cmd_case file; ///< the study, and what replaces values of it
+    bt_cmd_case file; ///< the study, and overrides of its values
     bt_ensemble_options run;
 } options;
 
@@ -172,7 +172,7 @@ int bt_cmd_ensemble(int argc, char **argv)
     bt_jobs jobs = {.argc = argc, .argv = argv};
     opt.run.helpers = &(bt_ensemble_helpers){.start = jobs_start, .end = jobs_end, .of = &jobs};
     opt.run.job = jobs_is_one();
-    if (opt.run.job) opt.run.retry = false; // the call that started it has forgotten the failures, and records new ones
+    if (opt.run.job) opt.run.retry = false; // its parent has cleared the failures, and records new ones
     bt_study study = {0};
     bt_errors err = {0};
     bt_status status = bt_cmd_each_may_read(comm, opt.file.path, &err);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with
+// bergtow field: write the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with
 // ice.outlines; or as fixed floes, with base.
 #include "bergtow/field.h"
 #include "app/cmd.h"
@@ -67,7 +67,7 @@ int bt_cmd_field(int argc, char **argv)
     bt_errors err = {0};
     bt_field_init(&field);
     bt_status status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
-    // A field that is read and written in the same form is the file there is.
+    // Reading a field file to write a field file would only copy it.
     const bool outlines = ends_in(opt.output, ".geojson", ".json"), fixed = ends_in(opt.output, ".yml", ".yaml");
     if (status == BT_OK && input.ice.field && !outlines && !fixed)
         status = bt_fail(&err, BT_ERR_CASE,
@@ -95,7 +95,7 @@ int bt_cmd_field(int argc, char **argv)
                           "lead.mode: %s: the file holds the ice without the lead; a run of the case that reads the "
                           "file opens it",
                           input.lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed");
-        input.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: its sizes are as they were drawn
+        input.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: sizes are as drawn
         const bt_field_sizes sizes = bt_field_sizes_of(&input, &field);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", opt.output, field.n,
                field.concentration, field.ice_area, sizes.mean, bt_case_reads_field(&input) ? "read" : "made", took);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the commands share: option parsing with suggestions, the case argument, the way out.
+// Shared by the commands: option parsing with suggestions, the case argument, the end of a command.
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/name.h"
@@ -23,8 +23,8 @@ static int collect(const struct argp *argp, const char **names, int n, int cap)
     return n;
 }
 
-// getopt says that an option is unknown and argp adds a usage line; neither says what was meant. So long options are
-// looked up here first. Unambiguous beginnings stay allowed, as getopt has it.
+// getopt says that an option is unknown and argp adds a usage line; neither suggests the right one. So long options are
+// looked up here first. Unambiguous abbreviations stay allowed, as with getopt.
 static void check_options(const struct argp *argp, int argc, char **argv)
 {
     enum { CAP = 32 };
@@ -46,7 +46,7 @@ static void check_options(const struct argp *argp, int argc, char **argv)
     }
 }
 
-// All ranks have the same command line, so they find the same errors in it and leave with the same code; one says why.
+// All ranks have the same command line, so they find the same errors in it and exit with the same code; one prints why.
 static void parse_aloud(const struct argp *argp, int argc, char **argv, void *input)
 {
     check_options(argp, argc, argv);
@@ -156,7 +156,7 @@ bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, b
 {
     struct stat there, input;
     if (bt_file_may_take(path, err) != BT_OK) return BT_ERR_IO;
-    if (stat(path, &there) != 0) return BT_OK; // what is wrong with the place shows when it is written to
+    if (stat(path, &there) != 0) return BT_OK; // an unusable place shows when it is written to
     if (stat(case_path, &input) == 0 && there.st_dev == input.st_dev && there.st_ino == input.st_ino)
         bt_errors_add(err, "%s: is the case file itself; give the output another name", path);
     else if (!ours && !force && !(S_ISREG(there.st_mode) && there.st_size == 0))

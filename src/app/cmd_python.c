@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The commands of the Python package: their whole line goes to it, once. Nothing of it calls back but to start runs and
-// ensembles, so that judgement and pictures stand in one language.
+// The commands of the Python package, which takes over with the whole command line. It calls this program only to start
+// runs and ensembles, so that evaluation and pictures are in one language.
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/process.h"
@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/// The folder that is `up` steps above a program, with a name below it; the caller frees it.
+/// `name` in the folder `up` steps above a program; the caller frees it.
 static char *beside(const char *program, int up, const char *name)
 {
     char folder[PATH_MAX];
@@ -24,8 +24,8 @@ static char *beside(const char *program, int up, const char *name)
     return bt_file_join(folder, name);
 }
 
-/// The folder with the Python package: in BERGTOW_HOME, in share/bergtow of the prefix that this program was installed
-/// in, or in the source tree that it was built in; the caller frees it.
+/// The folder with the Python package: in BERGTOW_HOME, in share/bergtow of the prefix where this program is installed,
+/// or in the source tree where it was built; the caller frees it.
 static char *find_package(const char *program)
 {
     const char *home = getenv("BERGTOW_HOME");
@@ -36,7 +36,7 @@ static char *find_package(const char *program)
     return beside(program, 3, "postproc"); // build/release/bergtow
 }
 
-/// PYTHONPATH with a folder in front.
+/// Put a folder in front of PYTHONPATH.
 static void find_there_first(const char *folder)
 {
     const char *others = getenv("PYTHONPATH");
@@ -68,12 +68,12 @@ int bt_cmd_python(int argc, char **argv)
         words[argc + 3] = NULL;
         setenv("BERGTOW", program, 1);
         find_there_first(folder);
-        bt_launcher_forget(); // of one rank
-        bt_comm_end(BT_OK);   // a launcher waits for it
+        bt_launcher_forget(); // the launcher of this single rank
+        bt_comm_end(BT_OK);   // a launcher waits for MPI to end
         fflush(NULL);
         // Until its guarded() (postproc/bergtow/cli/command.py) unblocks them: Python answers Ctrl-C with a traceback.
         bt_halt_block(&(sigset_t){0});
-        execv(python, words); // in place of this process: what is sent to it reaches the command
+        execv(python, words); // in place of this process: signals sent to it reach the command
         free(words);
         bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);
     } else {

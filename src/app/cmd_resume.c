@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// bergtow resume: go on with a run from its last checkpoint. bergtow diff: compare two checkpoints.
+// bergtow resume: continue a run from its last checkpoint. bergtow diff: compare two checkpoints.
 #include "output/checkpoint.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
@@ -27,7 +27,7 @@ static bool is_folder(const char *path)
     return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
 }
 
-// A file is taken as the checkpoint of the folder that it is in.
+// A file is used as the checkpoint of the folder that it is in.
 static void take_place(options *opt, char *arg)
 {
     struct stat st;

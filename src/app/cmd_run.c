@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// bergtow run: a case to a result folder.
+// bergtow run: run a case and write a result folder.
 #include "output/checkpoint.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
@@ -74,7 +74,7 @@ static const struct argp run_argp = {.options = run_options,
                                      .children = children,
                                      .doc = "Tow the body of a case through its ice and write a result folder."};
 
-/// A step that this call does not make has no contacts to write.
+/// Refuse to write the contacts of a step that this call does not compute.
 static bt_status check_dump(const bt_run_options *run, const bt_case *input, bt_errors *err)
 {
     const int64_t all = bt_case_steps(input), last = run->max_steps > 0 && run->max_steps < all ? run->max_steps : all;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The program bergtow: options that need no command, and the way to the commands.
+// The program bergtow: options that need no command, and the dispatch to the commands.
 #include "bergtow/comm.h"
 #include "app/cmd.h"
 #include "app/processor.h"
@@ -22,7 +22,7 @@ static const struct {
     const char *name, *summary;
     int (*run)(int argc, char **argv);
     bool parallel; ///< all ranks take part; otherwise rank 0 alone
-    bool steps;    ///< it makes time steps, so that start_with_settings() serves it
+    bool steps;    ///< it makes time steps, so that start_with_settings() applies
 } commands[] = {
     {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true, true},
     {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false, false},
@@ -101,16 +101,16 @@ static int refuse_word(const char *kind, const char *word, const char *const *kn
     return BT_ERR_USAGE;
 }
 
-// With OMP_PROC_BIND libgomp has bound this thread to one place by now, and a program started from here would have that
-// one core for all its threads. Back to all the places it was given.
+// With OMP_PROC_BIND libgomp has already bound this thread to one place, and a program started from here would run all
+// its threads on that one core. Restore all the cores that this process was given.
 static void unbind(void)
 {
     cpu_set_t all;
     if (omp_get_num_places() > 0 && bt_cores_given(&all)) sched_setaffinity(0, sizeof all, &all);
 }
 
-// Disposition of SIGHUP at the start: ignored under nohup. UCX takes the signal for its debugger as soon as it is
-// loaded, in Open MPI 5 with the program and in Open MPI 4 by MPI_Init, and a handler does not outlast execv.
+// Disposition of SIGHUP at the start: ignored under nohup. UCX sets a handler for its debugger when it is loaded: with
+// the program in Open MPI 5, in MPI_Init in Open MPI 4. A handler does not survive execv.
 static struct sigaction hangup;
 static bool hangup_known;
 
@@ -119,32 +119,32 @@ static void give_back_hangup(void)
     if (hangup_known) sigaction(SIGHUP, &hangup, NULL);
 }
 
-// Before the constructors of any library, some of which take milliseconds; and an ignored signal stays so over the
-// second start, while a handler would not.
+// Runs before the constructors of any library, some of which take milliseconds. Signals are ignored rather than
+// handled: that survives the second start, a handler would not.
 static void before_libraries(void)
 {
     bt_processor_check();
     hangup_known = sigaction(SIGHUP, NULL, &hangup) == 0;
-    // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
+    // asks a run for a checkpoint (halt.h); there is nothing to write before its first step or in other commands
     signal(SIGUSR1, SIG_IGN);
-    // a file at its size limit is an error of the write, with a message, not the end of the program
+    // a file at its size limit makes the write fail, with a message, and does not end the program
     signal(SIGXFSZ, SIG_IGN);
 }
 __attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = before_libraries;
 
-// Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
-// cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
-// tenths of a millisecond, then sleep. Serial parts of a step must end within that: with 5,000 turns in place of
-// 20,000 two threads took 1.27 and 1.16 times as long for a tow through 80 and 90 % ice. And sweeps over memory miss
-// the address cache with pages of 4 kB: with large ones, where the system gives them, and the fetching ahead that they
-// allow, 300,000 floes took 20 % less. libgomp and the C library read their settings before main, hence the second
-// start; the user's own win. Loading the libraries again takes 50 ms, which commands without a time step are spared.
+// Threads that spin at a barrier, while another program has the core of the thread they wait for, made a run on two
+// busy cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So spin for a few
+// tenths of a millisecond, then sleep. Serial parts of a step must end within that: with a spin count of 5,000 instead
+// of 20,000 two threads took 1.27 and 1.16 times as long through 80 and 90 % ice. Sweeps over memory miss the TLB with
+// 4 kB pages: huge pages, if available, and the prefetching they allow saved 20 % with 300,000 floes. libgomp and the C
+// library read their settings before main, hence the second start; the user's own prevail. Loading the libraries again
+// takes 50 ms, which commands without time steps are spared.
 static void start_with_settings(int argc, char **argv)
 {
     const int command = argc > 1 ? command_of(argv[1]) : -1;
     if (command < 0 || !commands[command].steps) return;
     if (getenv("BERGTOW_STARTED")) {
-        prctl(PR_SET_NAME, "bergtow"); // else ps, top and killall know it as exe
+        prctl(PR_SET_NAME, "bergtow"); // otherwise ps, top and killall show it as exe
         return;
     }
     bool set = setenv("BERGTOW_STARTED", "1", 1) == 0;
@@ -170,8 +170,8 @@ static int list_of(const char *word)
     return -1;
 }
 
-// A reader of the output that ends, such as head or a terminal, must not take a run or a field with it: the text is
-// lost, and the end says so. What only prints has no other work to do then.
+// A reader of the output that ends, such as head or a terminal, must not end a run or a field: the text is lost, and
+// the command reports that at its end. A command that only prints may end with its reader.
 static int start(int command, int argc, char **argv)
 {
     if (commands[command].steps) signal(SIGPIPE, SIG_IGN);
@@ -193,7 +193,7 @@ static int bergtow(int argc, char **argv)
     }
     const int command = command_of(word);
     if (command >= 0) return first || commands[command].parallel ? start(command, argc - 1, argv + 1) : BT_OK;
-    if (!first) return BT_OK; // what follows concerns the console
+    if (!first) return BT_OK; // the rest only prints
 
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"),
          version = !strcmp(word, "--version") || !strcmp(word, "-V");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Has this processor what the program was compiled for?
+// Does this processor support the instructions for which the program was compiled?
 //
-// As the Makefile builds it, the program runs on any x86-64 or ARM, and takes AVX2 where it is. With
-// EXTRA_CFLAGS=-march=native, or as a packager has set it, an older processor of the same cluster would end it at the
-// first instruction that it does not know, with SIGILL and no word.
+// As built by the Makefile, the program runs on any x86-64 or ARM, and uses AVX2 if available. If
+// EXTRA_CFLAGS=-march=native or a packager's flags allow more, an older processor of the same cluster would end it at
+// the first instruction that it does not know, with SIGILL and no message.
 #include "app/processor.h"
 
 #include <stddef.h>
@@ -16,7 +16,7 @@
 #define NEEDS(feature) \
     if (!__builtin_cpu_supports(feature)) return feature
 
-/// The first of the extensions that the compiler was allowed that is not here, or NULL.
+/// The first extension allowed to the compiler that this processor lacks, or NULL.
 static const char *missing(void)
 {
     __builtin_cpu_init();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Has this processor what the program was compiled for?
+// Does this processor support the instructions for which the program was compiled?
 #ifndef BT_PROCESSOR_H
 #define BT_PROCESSOR_H
 

@@ -22,7 +22,7 @@ static bt_estimate just(double force, bool valid, const char *note)
     return (bt_estimate){.force = force, .low = force, .high = force, .valid = valid, .note = note};
 }
 
-/// Is the ice as dense as that? A field as made misses the concentration asked for by rounding.
+/// Is the ice at least that dense? A generated field misses the concentration asked for by rounding.
 static bool reaches(double concentration, double limit) { return concentration >= limit - BT_MADE_OFF; }
 
 static bt_estimate lichey_hellmer(const bt_estimate_input *in)
@@ -74,7 +74,7 @@ static bt_estimate dilute(const bt_estimate_input *in)
                 thin ? "A <= 0.25 (assumed): floes are met one by one" : "A > 0.25 (assumed): floes hit each other");
 }
 
-/// Regression of the resistance of ships over the pack-ice Froude number.
+/// Regression of the resistance of ships against the pack-ice Froude number.
 static double ships_of(const bt_estimate_input *in, double k, double b, double n)
 {
     const double froude = in->along / sqrt(BT_GRAVITY * in->thickness * in->concentration);
@@ -109,7 +109,7 @@ static bt_estimate open_water(const bt_estimate_input *in)
     return just(in->drag * in->water_speed * in->water_along, true, "drag of the water alone");
 }
 
-/// Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9.
+/// Lichey & Hellmer's drag of ice does not depend on the concentration from 0.15 to 0.9.
 static bool is_dense(const bt_estimate_input *in) { return reaches(in->concentration, BT_EST_DENSE); }
 
 // --- the registry ----------------------------------------------------------------------------------------------------
@@ -167,7 +167,7 @@ bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = def->name ? def->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // the summary has curves of them all
+    if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // taken by the summary for all curves
         bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
     for (int k = 0; k < n_estimates; k++)
         if (!strcmp(estimates[k].name, name))
@@ -207,7 +207,7 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
     return estimate;
 }
 
-/// Mean diameter weighted with area, <d³>/<d²>.
+/// Area-weighted mean diameter, <d³>/<d²>.
 static double weighted_size(const bt_case *input)
 {
     return bt_case_size_moment(input, 3) / bt_case_size_moment(input, 2);
@@ -251,7 +251,7 @@ void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_
     const double ahead = input->tow.direction - input->body.yaw;
     in->width = bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead));
     if (input->tow.mode == BT_TOW_NONE) return;
-    double current[2]; // of a current that changes the mean over the run
+    double current[2]; // if it changes, its mean over the run
     bt_environment_mean(input, true, current);
     const double *drift = isnan(ice[0]) ? current : ice;
     const double rx = input->tow.speed * ux - current[0], ry = input->tow.speed * uy - current[1],

@@ -12,7 +12,7 @@
 
 static const double ALONG = 0.9; // least cosine between the tow and the axis of the domain it is taken to follow
 
-/// Time at which the tow has gone so far, also beyond the end of the run; INFINITY if it never does.
+/// Time at which the tow has covered this distance, also beyond the end of the run; INFINITY if it never does.
 static double time_of(const bt_case *input, double way)
 {
     bt_case longer = *input;
@@ -51,7 +51,7 @@ bt_packing bt_packing_of(const bt_case *input, double concentration)
     const double room = W * (packing.packed * L - concentration * ice),
                  taken = packing.packed * W - concentration * (W - b);
     packing.way = room <= 0 ? 0 : room / taken;
-    if (!(packing.way <= L)) return (bt_packing){NAN, NAN, packing.packed}; // the body is there first
+    if (!(packing.way <= L)) return (bt_packing){NAN, NAN, packing.packed}; // the body reaches it first
     packing.time = packing.way > 0 ? time_of(input, packing.way / fabs(x ? ux : uy)) : 0;
     return packing;
 }

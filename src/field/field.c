@@ -10,9 +10,7 @@
 #include "base/elementary.h"
 #include "field/field_make.h"
 
-// --- to all ranks ----------------------------------------------------------------------------------------------------
-
-// The ice field of rank 0 to all ranks.
+// --- broadcast to all ranks ------------------------------------------------------------------------------------------
 
 static void array(const bt_comm *comm, double **x, int64_t n)
 {
@@ -52,7 +50,7 @@ void bt_field_share(const bt_comm *comm, bt_field *field)
 void bt_field_init(bt_field *field)
 {
     *field = (bt_field){0};
-    field->offsets = bt_alloc(1, sizeof *field->offsets); // the number of vertices of no floes
+    field->offsets = bt_alloc(1, sizeof *field->offsets); // offsets[0] = 0
 }
 
 void bt_field_free(bt_field *field)
@@ -193,7 +191,7 @@ void bt_field_sort(bt_field *f, const bt_region *region)
     bt_field g;
     bt_field_init(&g);
     reserve(&g, f->n, f->offsets[f->n]);
-    // Copied as they are: bt_field_add would centre once more and change last digits.
+    // Copy floes unchanged: bt_field_add would centre them again and change last digits.
     for (bt_idx k = 0; k < f->n; k++) bt_field_append(&g, f, order[k].i);
     g.ice_area = f->ice_area;
     g.concentration = f->concentration;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all readers of ice fields share: which outlines get in, and whether they lie where they can.
+// Checks shared by all readers of ice fields: which outlines are accepted, and where floes may lie.
 #include "field/field_admit.h"
 
 #include <math.h>
@@ -28,12 +28,12 @@ void bt_refuse(bt_refusals *refusals, const char *fmt, ...)
     else bt_errors_add(refusals->err, "%s: %s", refusals->path, text);
 }
 
-// Corners that coordinates of so many digits cannot tell from convex ones: 1e-7 degrees are a centimetre. A thousandth
-// of the extent, the overlap that the solver leaves alone (solver.slop), is also what the shape of a floe is known to.
-// Rejected: the last digit of the numbers as the measure, which a change of coordinates before takes away.
+// Depth of reflex corners, as a share of the extent, that the rounding of coordinates explains (1e-7 degrees is a
+// centimetre). A thousandth is the overlap that the solver tolerates (solver.slop), so shapes need no more accuracy.
+// Rejected: a limit from the last digit of the numbers, which an earlier change of coordinates erases.
 static const double ROUNDING = 1e-3;
 
-/// The hull, if no corner lies deeper in it than rounding; counted.
+/// Replace the outline by its hull, and count it, if rounding explains the depth of every corner in the hull.
 static bool smooth(int *n, double *v, bt_outline_counts *counts)
 {
     double hull[2 * BT_MAX_VERTICES], extent = 0, deepest = 0;
@@ -59,8 +59,8 @@ static bool smooth(int *n, double *v, bt_outline_counts *counts)
 
 const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outline_counts *counts)
 {
-    // A hull needs no more of the outline than that it goes once round an area; it may have fewer vertices than the
-    // outline.
+    // Making a hull only needs an outline that does not cross itself. The hull may have few enough vertices even if the
+    // outline has too many.
     const bool many = *n > BT_MAX_VERTICES && nonconvex == BT_NONCONVEX_HULL;
     const char *fault = !many                       ? bt_outline_fault(*n, v)
                         : bt_outline_crosses(*n, v) ? "its edges cross or touch each other"
@@ -96,11 +96,11 @@ typedef struct place {
     const bt_field *f;
     const double *outline; ///< turned by the yaw, relative to the centroid
     bt_parts **parts;      ///< [n] of floes that are not convex; NULL otherwise
-    double allowed;        ///< overlap that is left to the position projection, m
+    double allowed;        ///< overlap left to the position projection, m
     const char *noun;
     bt_refusals *r;
-    int64_t overlapping;   ///< pairs that overlap by more
-    double deepest;        ///< of them, m
+    int64_t overlapping;   ///< pairs that overlap by more than that
+    double deepest;        ///< their deepest overlap, m
 } place;
 
 /// One convex piece of a floe.
@@ -157,7 +157,7 @@ static void check_bounds(const bt_case *input, const place *where, bt_idx i)
     const double x = field->pose[3 * i], y = field->pose[3 * i + 1],
                  slack = 1e-9 * (input->domain.length + input->domain.width);
     const double x1 = input->domain.x0 + input->domain.length, y1 = input->domain.y0 + input->domain.width;
-    double low[2] = {x, y}, high[2] = {x, y}; // walls hold the whole outline, other boundaries the centroid
+    double low[2] = {x, y}, high[2] = {x, y}; // walls bound the whole outline, other boundaries the centroid
     for (int64_t k = field->offsets[i]; k < field->offsets[i + 1]; k++)
         for (int a = 0; a < 2; a++) {
             if ((a ? input->domain.sides : input->domain.ends) != BT_BOUND_WALL) continue;
@@ -176,7 +176,7 @@ static void check_bounds(const bt_case *input, const place *where, bt_idx i)
                   where->noun, (int)i, low[1], high[1], input->domain.y0, y1);
 }
 
-/// Ready for pairs of floes of `field`, wherever in the domain they lie.
+/// Prepare `where` and `region`, the whole domain, for checks of pairs of floes.
 static void begin_places(place *where, bt_region *region, const bt_case *input, const bt_field *field)
 {
     bt_region_of_domain(region, input);
@@ -195,12 +195,12 @@ static void check_pairs(place *where, const bt_region *region)
 {
     bt_field_visit_pairs(region, where->f, where->outline, 1, visit, where);
     if (where->overlapping <= 1) return;
-    // A line of its own, whatever has been reported one by one.
+    // A summary, however many pairs have been reported one by one.
     bt_errors_add(where->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", where->r->path,
                   (long long)where->overlapping, where->noun, where->deepest);
 }
 
-/// Floes in the towed body or a floe given by hand.
+/// Refuse floes that overlap the towed body or a floe given by hand.
 static void check_obstacles(const place *where, const bt_region *region)
 {
     const bt_field *field = where->f;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// What the readers of ice fields share: which outlines get in, and whether they lie where they can.
+// Checks shared by all readers of ice fields: which outlines are accepted, and where floes may lie.
 #ifndef BT_FIELD_ADMIT_H
 #define BT_FIELD_ADMIT_H
 
 #include "bergtow/field.h"
 
-enum { BT_MOST_MESSAGES = 10 }; ///< faults of one file that are reported one by one
+enum { BT_MOST_MESSAGES = 10 }; ///< faults of a file reported one by one
 
-/// Faults of one file, the first few of them in words.
+/// Faults of one file; only the first few are reported in words.
 typedef struct bt_refusals {
     const char *path;
     bt_errors *err;
@@ -17,18 +17,17 @@ typedef struct bt_refusals {
 
 void bt_refuse(bt_refusals *refusals, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/// May this outline be a floe? v [*n][2], clean and anticlockwise, becomes its hull if the case says so; what was done
-/// is counted. Returns why not, or NULL. Without bays but those that rounding makes it is taken for convex, and
-/// counted.
+/// May this outline be a floe? Returns why not, or NULL. v [*n][2] must be clean and anticlockwise. It becomes its hull
+/// if `nonconvex` says so, or if rounding explains its reflex corners; `counts` records the changes.
 const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outline_counts *counts);
 
-/// Refuse floes outside the domain (walls hold the whole outline, other boundaries the centroid) and floes that overlap
-/// each other by more than the solver's slop: the first few one by one, and how many and how deep. `noun`: what the
-/// file calls a floe.
+/// Refuse floes outside the domain (walls bound the whole outline, other boundaries the centroid) and floes that
+/// overlap each other by more than the solver's slop. The first few are reported one by one, then the number of
+/// overlapping pairs and the deepest overlap. `noun`: the file's word for a floe.
 void bt_field_check_apart(const bt_case *input, const bt_field *field, const char *noun, bt_refusals *refusals);
 
-/// The same, and floes in the towed body or a floe given by hand. Not of a field that was made before, out of which a
-/// lead may take them.
+/// The same, and refuse floes that overlap the towed body or a floe given by hand. Not for a field file (ice.field),
+/// where a lead may remove such floes.
 void bt_field_check_places(const bt_case *input, const bt_field *field, const char *noun, bt_refusals *refusals);
 
 #endif

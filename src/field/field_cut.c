@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
-// A field that was made for a larger region, cut to the ice region (ice.extent), so that domains of other widths and
+// Cut a field generated for a larger region to the ice region (ice.extent), so that domains of different widths and
 // lengths share their floes.
 //
-// A floe within the ice region stays as it is, to the bit, with its thickness. One across a side at which the extent
-// goes on is cut along it, less the clearance c that a made field keeps from bodies: the part within lies apart from
-// the wall, and at a periodic seam 2c from the part at the other end, with which it no longer makes one floe. Convex
-// stays convex. A part of less than LEAST_PART of its floe is left out. So nothing overlaps, whatever the boundaries.
+// A floe inside the ice region stays bit-identical, with its thickness. A floe across a side beyond which the extent
+// continues is cut parallel to that side, at the clearance c that a generated field keeps from bodies. So the part
+// inside is clear of a wall, and at a periodic seam 2c from the part at the other end: they are no longer one floe.
+// Parts of convex floes are convex. Parts below LEAST_PART of their floe are left out. So nothing overlaps at any
+// boundary.
 //
-// A part of a field has another concentration than the whole (theory.md has the scatter measured). Floes whose centroid
-// is within the strip of width s of a cut side, and those that were cut, are scaled about their centroids by one
-// factor, as far as each has room, until Σ area = concentration × ice area. s is one mean diameter, or as many more as
-// it takes for areas to change by no more than MOST_CHANGE; in the widest strip they may by LAST_CHANGE, which small
-// domains of few floes need.
+// The concentration of a part differs from that of the whole field (theory.md gives the measured scatter). Floes that
+// were cut, and those whose centroid is in the strip of width s along a cut side, are scaled about their centroids by a
+// common factor, each as far as it has room, until Σ area = concentration × ice area. s is the least multiple of the
+// mean diameter for which no area changes by more than MOST_CHANGE. In the widest strip the limit is LAST_CHANGE, which
+// small domains with few floes need.
 //
-// Rejected: floes taken out or put in at random, of whole floes, which leaves the half of a floe; all floes scaled,
-// which leaves no floe that two widths have in common; another shake of the strip, in which some floes would go.
+// Rejected: removing or adding whole floes at random, which leaves an error of half a floe; scaling all floes, which
+// leaves no floe that two widths share; shaking the strip again, which would lose some floes.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,16 +24,16 @@
 #include "bergtow/shape.h"
 #include "field/field_make.h"
 
-static const double LEAST_PART = 0.1;   // of a floe's area
-static const double SHORT_EDGE = 0.02;  // of the diameter of a part
-static const double MOST_CHANGE = 0.25; // of a floe's area in the strip, as long as that can be widened
-static const double LAST_CHANGE = 0.5;  // in the widest strip
-static const double WIDEST = 0.25;      // of the ice region across a cut: more than half of it is left as it is
-static const double TOLERANCE = 0.005;  // of the concentration
+static const double LEAST_PART = 0.1;   // least part kept / area of its floe
+static const double SHORT_EDGE = 0.02;  // shortest edge kept / diameter of a part
+static const double MOST_CHANGE = 0.25; // of a floe's area, while the strip can be widened
+static const double LAST_CHANGE = 0.5;  // the same in the widest strip
+static const double WIDEST = 0.25;      // strip / ice region across a cut: at least half of the region keeps its floes
+static const double TOLERANCE = 0.005;  // relative, of the concentration
 static const double TOUCH = 1 - 1e-9, ROUND_OFF = 1e-12;
 enum { MORE_PASSES = 20 };
 
-/// One axis of a cut: where the ice region begins and ends, and which of the two the extent reaches beyond.
+/// One axis of a cut: the ends of the ice region, and beyond which of them the extent continues.
 typedef struct axis {
     double low, high, period; ///< m; period of the extent, 0 = none
     bool at_low, at_high;
@@ -41,7 +42,7 @@ typedef struct axis {
 static axis axis_of(double low, double high, double from, double to, bool periodic)
 {
     const bool differ = low != from || high != to;
-    // where the extent joins on to itself at an end that both have, its floes lie across it, and are cut
+    // a periodic extent joins itself at an end it shares with the region: floes across that end are cut, too
     return (axis){.low = low, .high = high, .period = differ && periodic ? to - from : 0,
                   .at_low = differ && (periodic || low != from), .at_high = differ && (periodic || high != to)};
 }
@@ -60,15 +61,15 @@ static bool in_obstacle(const bt_region *region, int n, const double *v, double 
     return false;
 }
 
-/// Least and most of the vertices, m, along one coordinate.
+/// Range of the vertices along coordinate k, m.
 static void reach_of(int n, const double *v, int k, double *low, double *high)
 {
     *low = INFINITY, *high = -INFINITY;
     for (int i = 0; i < n; i++) *low = bt_min(*low, v[2 * i + k]), *high = bt_max(*high, v[2 * i + k]);
 }
 
-/// What of the polygon v, in place, lies within the sides that it crosses; its vertices, 0 = nothing, into v. `crossed`
-/// is set when that is not all of it.
+/// Clip the polygon v in place at the cut sides that it crosses, less the clearance; returns the number of vertices
+/// left, 0 = none. Sets `crossed` if it was clipped.
 static int part_within(const axis axes[2], double clearance, int n, double *v, bool *crossed)
 {
     double out[2 * BT_MAX_VERTICES + 16];
@@ -86,7 +87,7 @@ static int part_within(const axis axes[2], double clearance, int n, double *v, b
     return n;
 }
 
-/// Add floe i of `from`, or one of its images (dx, dy) away, as far as it lies in the region.
+/// Add the part of floe i of `from`, or of its image (dx, dy) away, that lies in the region.
 static void add_part(const bt_region *region, const axis axes[2], const bt_field *from, const double *outline, bt_idx i,
                      double dx, double dy, bt_field *to, bool **parted)
 {
@@ -100,7 +101,7 @@ static void add_part(const bt_region *region, const axis axes[2], const bt_field
     }
     bool changed = false;
     int n = part_within(axes, region->clearance, all, v, &changed);
-    // a body that reaches over the seam of the domain stands where the extent had no image of it
+    // a body that reaches across the seam of the domain has an image here that it does not have in the extent
     if (n >= 3 && in_obstacle(region, all, own, x, z, radius)) {
         n = bt_tessellation_clear(region, n, v, false);
         changed = true;
@@ -133,8 +134,8 @@ static double to_cut(const axis axes[2], const double *at)
     return least;
 }
 
-/// How much each floe may be scaled, but for those held, so that none touches another and no area has changed by more
-/// than `change` from what it was.
+/// Factors by which all floes may be scaled at the same time so that no two touch and no area exceeds (1 + change)
+/// times the original one, `first`.
 static void room_of(const bt_region *region, const bt_field *field, const double *first, double change,
                     double *clearance)
 {
@@ -143,7 +144,7 @@ static void room_of(const bt_region *region, const bt_field *field, const double
         clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + change) * first[i] / field->area[i]));
 }
 
-/// Scale the floes of the strip; the area reached, m².
+/// Scale the floes of the strip; returns the area reached, m².
 static double scale_strip(const bt_region *region, const axis axes[2], const bool *parted, double size, double wanted,
                           bt_field *field)
 {
@@ -165,7 +166,7 @@ static double scale_strip(const bt_region *region, const axis axes[2], const boo
             break;
         }
     }
-    // What one neighbour does not take of the gap between two, the other may.
+    // Room in a gap that one neighbour does not use is available to the other.
     for (int pass = 0; pass < MORE_PASSES && area < (1 - ROUND_OFF) * wanted; pass++) {
         room_of(region, field, first, LAST_CHANGE, clearance);
         area = bt_field_fit(field, clearance, held, wanted);

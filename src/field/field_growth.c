@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // How far floes are from touching: separating axes, pairs from a grid, room to grow. Independent of the contact code,
-// so that it can check it.
+// so that tests can use it to check that code.
 //
 // Two convex polygons a, b, scaled by t about their centroids, with D from centroid to centroid: they are apart if an
 // edge normal n of either has n·D > t (h_a(n) + h_b(−n)), h the support function. So they touch at
@@ -112,7 +112,7 @@ void bt_field_visit_pairs(const bt_region *region, const bt_field *field, const 
     for (size_t b = 0; b < bins; b++)
         for (int64_t p = first[b]; p < first[b + 1]; p++)
             for (int64_t q = p + 1; q < first[b + 1]; q++) {
-                // ascending, so c is a floe itself or both are images
+                // ascending, so if c is an image, d is one, too
                 const entry *c = &all[member[p]], *d = &all[member[q]];
                 if (member[p] >= (uint32_t)field->n) continue;
                 double ox = bt_max(c->x0, d->x0), oy = bt_max(c->y0, d->y0);

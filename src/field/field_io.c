@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Ice fields in HDF5: written whole or not at all, and checked value by value when read.
 //
-//     /floes/offsets    [n+1]   first vertex of each floe, and their number
+//     /floes/offsets    [n+1]   first vertex of each floe, and the number of vertices
 //     /floes/vertices   [V][2]  m, body frame: anticlockwise about the centroid
 //     /floes/pose       [n][3]  x m, y m, yaw rad
 //     /floes/thickness  [n]     m
 //     /floes/area       [n]     m², optional when read
-//     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes, frame (the
-//                       domain.frame that x and y are of), x_min, y_min, x_max, y_max m (the ice region)
+//     /floes            attributes ice_area m² (to which concentration refers), concentration, n_floes, frame (the
+//                       domain.frame of x and y), x_min, y_min, x_max, y_max m (the ice region)
 //     /case             the resolved case the field was made from
-// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a
-// checksum (checksum.h): of such a file any damage is refused before HDF5, which crashes on some, reads a byte. A file
-// without one, made by h5py say, is passed on to the checks of its values; what damage does to HDF5 itself it cannot
-// be kept from.
+// The reader trusts nothing: the file may be cut off, damaged, or made by hand. Files of this program carry a checksum
+// (checksum.h), so damage is refused before HDF5, which some damage crashes, reads a byte. In a file without one, made
+// by h5py say, only the values are checked; damage to such a file may still crash HDF5.
 #include <errno.h>
 #include <hdf5.h>
 #include <math.h>
@@ -42,7 +41,7 @@ const char *bt_field_frame(const bt_case *input)
 
 bt_status bt_field_write(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
-    // Under another name until it is complete, so that a full disk never leaves half a field under the right one.
+    // Write under another name until complete, so that a full disk never leaves half a field under the right one.
     char *part = bt_text_of("%s.part", path);
     bt_h5 h5;
     bt_status status = bt_h5_create(&h5, part, err);
@@ -127,7 +126,7 @@ static void *read_dataset(reader *in, const char *name, bool integers, hsize_t w
     return data;
 }
 
-/// A number of /floes; NaN where it is missing or none.
+/// A numeric attribute of /floes; NaN if missing or not a number.
 static double read_number(const reader *in, const char *name)
 {
     double number = NAN;
@@ -143,8 +142,8 @@ static double read_number(const reader *in, const char *name)
     return number;
 }
 
-/// The frame that the file names, or "": those of other programs may not. Of fixed length: HDF5 1.10 may search for
-/// ever for a text of any length in a file with flipped bits.
+/// The frame that the file names, or "": files of other programs may name none. Only strings of fixed length are read:
+/// HDF5 1.10 may search for one of variable length forever if bits of the file are flipped.
 static void read_frame(const reader *in, char frame[16])
 {
     *frame = 0;
@@ -160,7 +159,7 @@ static void read_frame(const reader *in, char frame[16])
     H5Aclose(a);
 }
 
-/// The ice region, where the file says all of it: those of other programs may not.
+/// The ice region, if the file has all four limits; files of other programs may not.
 static void read_region(const reader *in, double region[4])
 {
     double x[4];
@@ -185,7 +184,7 @@ static void check_offsets(reader *in, const int64_t *offsets, hsize_t n, hsize_t
 {
     if (in->r.status != BT_OK) return;
     if (offsets[0] != 0) bt_refuse(&in->r, "dataset /floes/offsets: begins with %lld, not 0", (long long)offsets[0]);
-    // Differences of hostile numbers overflow: compare, and only then subtract.
+    // Differences of hostile numbers may overflow: compare first, then subtract.
     for (hsize_t i = 0; i < n && in->r.status == BT_OK; i++) {
         int64_t a = offsets[i], b = offsets[i + 1];
         if (a < 0 || b <= a || (hsize_t)b > n_vertices)
@@ -261,7 +260,7 @@ static void read_floes(reader *in, bt_field *field)
             sum += field->area[i];
             size += sqrt(4 * field->area[i] / BT_PI);
         }
-        // Of outlines with floes outside the ice region our own files have a concentration that is less.
+        // Our own files, if made from outlines with floes outside the ice region, hold a lower concentration.
         field->concentration = sum / field->ice_area;
         const double said = in->bare ? NAN : read_number(in, "concentration");
         if (said < field->concentration * (1 - 1e-9)) field->concentration = said, sum = said * field->ice_area;
@@ -272,8 +271,7 @@ static void read_floes(reader *in, bt_field *field)
     free(stored_area);
 }
 
-/// Floes that are not convex as they are admitted, by their hulls or as they are; the others to the bit as they were
-/// read.
+/// Replace the outlines of floes that are not convex by the admitted ones; unchanged outlines stay bit-identical.
 static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
 {
     bt_field g;
@@ -288,7 +286,7 @@ static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
         memcpy(own, v, 2 * (size_t)n * sizeof *v);
         if (!bt_outline_convex(n, v)) bt_outline_admit(nonconvex, &left, own, &counted);
         bt_field_add(&g, left, own, p[0], p[1], p[2], f->thickness[i]);
-        if (left == n) { // centred once more, which changes last digits
+        if (left == n) { // unchanged: undo the last digits that centring again has changed
             memcpy(g.vertices + 2 * g.offsets[i], v, 2 * (size_t)n * sizeof *v);
             memcpy(g.pose + 3 * (size_t)i, p, 3 * sizeof *p);
             g.area[i] = f->area[i];
@@ -297,7 +295,7 @@ static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
     }
     g.ice_area = f->ice_area;
     memcpy(g.frame, f->frame, sizeof g.frame);
-    // that of the file may leave out floes beyond its ice region
+    // the file's concentration may leave out floes beyond its ice region
     g.concentration = bt_min(f->concentration * (sum / before), bt_max(f->concentration, 1));
     bt_field_free(f);
     *f = g;
@@ -308,13 +306,13 @@ bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconve
     bool bare;
     const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
     if (checked != BT_OK) return checked;
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // only our own message
     if (H5Fis_hdf5(path) <= 0)
         return bt_fail(err, BT_ERR_CASE,
                        "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`, or name "
                        "outlines (GeoJSON) with ice.outlines",
                        path);
-    int errnum = 0; // of a read that failed: then what was found in the file says nothing of it
+    int errnum = 0; // of a failed read: messages about the contents then mean nothing
     bt_errors found = {0};
     reader in = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
     in.file = bt_h5_open_file(path, &errnum);
@@ -323,7 +321,7 @@ bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconve
     if (in.file >= 0) H5Fclose(in.file);
     if (errnum) in.r.status = bt_file_fail(path, "read the file", errnum, err);
     else bt_errors_move(err, &found);
-    bt_errors_free(&found); // what was found in spite of errnum
+    bt_errors_free(&found); // those that errnum makes meaningless
     if (in.r.status == BT_OK) {
         if (in.counts.hulled || in.counts.rounded) take_admitted(field, nonconvex);
         field->outlines = in.counts;
@@ -336,9 +334,9 @@ bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconve
 
 // --- as fixed floes --------------------------------------------------------------------------------------------------
 
-// A field as a list of fixed floes by hand: a coast or structures from a map, for a case of any other ice.
+// Write a field as a list of fixed floes: a coast or structures from a map, for a case with any other ice.
 
-/// By this a file is known again as one that this program has written.
+/// Beginning of a file that this program has written.
 #define HEAD "# fixed floes, written by bergtow "
 
 bool bt_field_fixed_ours(const char *path) { return bt_file_begins(path, HEAD); }

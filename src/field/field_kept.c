@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Fields kept for other runs; reasons in field_kept.h.
+// Fields kept for other runs; design in field_kept.h.
 //
-//     head: magic, digest of all that follows, digest of the name, numbers of the field
+//     head: magic, digest of everything after it, name (the digest of the case), numbers of the field
 //     offsets [n+1], vertices [V][2], pose [n][3], thickness [n], area [n] as in bt_field
 #include "field/field_kept.h"
 
@@ -21,7 +21,7 @@
 
 #define MAGIC "bergtow kept field\n"
 
-/// Keys of these sections on which no ice that is made or read depends.
+/// Keys of these sections that do not affect the ice field, generated or read.
 static const char *const idle[] = {
     "ice.added_mass", "ice.added_inertia", "ice.crushing.", "ice.density", "ice.drag.", "ice.friction", "ice.rafting.",
     "ice.restitution", "ice.splitting.", "ice.start", "domain.wall_", "body.added_", "body.density", "body.draft",
@@ -57,13 +57,13 @@ void bt_field_digest(const bt_case *input, char digest[BT_CHECKSUM_DIGEST])
         if (!BEGINS(key->name, sections) || BEGINS(key->name, idle)) continue;
         write_keys(t.out, key, 1, input);
         const char *path = bt_case_file(input, key);
-        bt_errors unheard = {0}; // who reads it says so
+        bt_errors unheard = {0}; // the reader of the file reports it
         int64_t bytes;
         if (path && bt_checksum_digest_file(path, digest, &bytes, &unheard) == BT_OK) fprintf(t.out, "%s\n", digest);
         bt_errors_free(&unheard);
     }
     for (bt_idx i = 0; i < input->n_floes; i++) write_keys(t.out, bt_floe_keys, bt_n_floe_keys, &input->floes[i]);
-    double v[2 * BT_MAX_VERTICES]; // a shape that a program adds is known by its name alone
+    double v[2 * BT_MAX_VERTICES]; // keys only name a shape that a program adds
     const int n = bt_case_waterline(input, v);
     for (int k = 0; k < 2 * n; k++) fprintf(t.out, "%a\n", v[k]);
     char *text = bt_text_end(&t);
@@ -80,7 +80,7 @@ typedef struct head {
 } head;
 
 enum { ARRAYS = 5 };
-static const size_t sealed = offsetof(head, name); ///< from here on the digest is of
+static const size_t sealed = offsetof(head, name); ///< the digest covers everything from here on
 
 typedef struct piece { void *at; size_t bytes; } piece;
 
@@ -93,7 +93,7 @@ static void pieces_of(bt_field *field, int64_t n, int64_t n_vertices, piece p[AR
     memcpy(p, all, sizeof all);
 }
 
-/// The bytes of a file; the caller frees them.
+/// A field as the bytes of a file; the caller frees them.
 static char *packed(bt_field *field, const char *name, size_t *size)
 {
     piece p[ARRAYS];
@@ -115,7 +115,7 @@ static char *packed(bt_field *field, const char *name, size_t *size)
     return bytes;
 }
 
-/// The field of a file's bytes; false: they are not those of a whole file of this name.
+/// The field from the bytes of a file; false unless they are those of a complete file of this name.
 static bool unpacked(bt_field *field, const char *name, const char *bytes, size_t size)
 {
     head h;
@@ -159,7 +159,7 @@ static bool take(const char *path, const char *name, bt_field *field)
     return whole;
 }
 
-/// By way of a name of this process; not brought to the disk, for a file that is not whole is made anew.
+/// Write under a name of this process, then rename. No fsync: a file that is not complete is made again.
 static void keep(const char *path, const char *name, bt_field *field)
 {
     size_t size;
@@ -175,7 +175,7 @@ bt_status bt_field_load_kept(const char *dir, const bt_case *input, bt_field *fi
 {
     if (!dir) return bt_field_load(input, field, err);
     char name[BT_CHECKSUM_DIGEST];
-    bt_field_digest(input, name); // first: a file of the ice that changes later then gives another digest
+    bt_field_digest(input, name); // before loading: if a file of the ice changes later, its digest differs
     char *path = bt_text_of("%s/%s", dir, name);
     bt_errors unheard = {0};
     const bool room = bt_file_make_dir(dir, &unheard) == BT_OK;

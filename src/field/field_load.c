@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The ice field of a case, made or read, and what is said of outlines that were read.
+// The ice field of a case, generated or read, and the warnings about outlines that were read.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +12,7 @@
 #include "field/field_make.h"
 #include "field/map_crs.h"
 
-/// The area that the file's concentration refers to, and that of the domain.
+/// Note the area that the file's concentration refers to, and the ice area of the domain.
 static void note_region(const bt_case *input, bt_field *field)
 {
     bt_region region;
@@ -46,7 +46,7 @@ bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
 
 // --- messages --------------------------------------------------------------------------------------------------------
 
-/// Ice and ice region that are not the same.
+/// Ice that does not match the ice region.
 static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
 {
     if (counts->outside)
@@ -63,7 +63,7 @@ static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
 
 static void warn_of_latitude(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
 {
-    // a basin lies nowhere
+    // a basin has no geographic position
     if (!counts->read || !isfinite(counts->lat) || input->domain.frame != BT_FRAME_GEOGRAPHIC) return;
     const double place = counts->lat * 180 / BT_PI, lon = counts->lon * 180 / BT_PI;
     if (isnan(input->ice.origin_lon) && place < 0 && lon >= 37 && lon <= 90)
@@ -83,7 +83,7 @@ static void warn_of_latitude(const bt_outline_counts *counts, const bt_case *inp
                 place, given);
 }
 
-/// What a projection does to lengths and directions, by its scale at x = y = 0.
+/// Distortion of lengths and directions by a projection, from its scale at x = y = 0.
 static void warn_of_plane(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
 {
     const bt_map_crs crs = bt_map_crs_of(counts->crs);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The generator: sizes, cells, floes shrunk to the concentration, shaken, checked, put in order.
+// The generator: draw sizes, make cells, shrink floes to the concentration, shake, check, sort.
 //
 // Floes are drawn from the size law until their areas fill concentration × ice area; a common factor (near 1) makes it
 // exact. Cells (tessellation, sawn strips) fill the region in the same proportions. A floe is its cell scaled about the
@@ -22,9 +22,9 @@
 
 // --- sizes -----------------------------------------------------------------------------------------------------------
 
-// Sizes of floes as drawn from the law of the case (case/size_law.h), and as they came out.
+// Floe sizes as drawn from the law of the case (case/size_law.h), and as they come out.
 
-#define LEAST_SPREAD 1e-6 // a distribution narrower than this has numbers that no double holds: 1/spread²
+#define LEAST_SPREAD 1e-6 // a narrower spread counts as none: 1/spread² may overflow
 
 double bt_sizes_draw(const bt_sizes *sizes, int64_t seed, int64_t id)
 {
@@ -47,12 +47,12 @@ double bt_sizes_draw(const bt_sizes *sizes, int64_t seed, int64_t id)
     }
 }
 
-#define SIZE_OFF 0.05   // of the mean, from which on it is said
-#define SPREAD_OFF 0.1  // of the spread, likewise
-#define BELOW_OFF 0.01  // of the floes, likewise
-#define BELOW_SLACK 1e-2 // of size_min: a common factor near 1 brings the areas to the concentration
+#define SIZE_OFF 0.05   // relative deviation of the mean size that is reported
+#define SPREAD_OFF 0.1  // likewise of the spread
+#define BELOW_OFF 0.01  // share of floes below size_min that is reported
+#define BELOW_SLACK 1e-2 // of size_min, by which the common factor near 1 may shrink floes below it
 
-/// Every floe is one that the size law drew, put into a cell.
+/// Is every floe one drawn from the size law, and put into a cell?
 static bool as_drawn(const bt_case *input) { return !bt_case_reads_field(input) && input->lead.mode == BT_LEAD_NONE; }
 
 bt_field_sizes bt_field_sizes_of(const bt_case *input, const bt_field *field)
@@ -71,7 +71,7 @@ bt_field_sizes bt_field_sizes_of(const bt_case *input, const bt_field *field)
 void bt_field_size_warn(const bt_case *input, const bt_field_sizes *found, bt_errors *warnings)
 {
     bt_sizes sizes;
-    bt_errors refused = {0}; // such a case makes no ice
+    bt_errors refused = {0}; // a case with faulty sizes makes no ice
     const bt_idx n = found->n;
     if (as_drawn(input) && n > 0 && bt_sizes_init(&sizes, input, &refused) == BT_OK) {
         const double mean = bt_sizes_mean(&sizes), second = bt_sizes_mean_area(&sizes) * 4 / BT_PI;
@@ -108,8 +108,8 @@ static const double TOUCH = 1 - 1e-9; // part of the clearance used: rounding mu
 static const double STRIDE = 0.3;     // move of a floe in a step of the shake / mean gap
 static const double PUSH = 1.02;      // growth of a floe that has no room
 static const double GROWN = 1e-3;     // shortfall of area at which a growing floe counts as grown
-static const double MORE_GAPS = 10;    // by which floes fly on that a shake has left in one another / mean gap
-static const double MOST = 0.06;      // and at most this part of the size: a step turns a floe by a tenth of a radian
+static const double MORE_GAPS = 10;    // length of another shake, if one leaves floes in each other / mean gap
+static const double MOST = 0.06;      // largest move in a step / mean size: then a floe turns by a tenth of a radian
 enum { GROWTH_STAGES = 120, MORE_SHAKES = 3 };
 
 static bt_status cannot_pack(const bt_case *input, double reached, bt_errors *err)
@@ -169,8 +169,8 @@ static double mean_gap(const bt_region *region, const bt_field *field, double *s
     for (bt_idx i = 0; i < field->n; i++) d += 2 * sqrt(field->area[i] / BT_PI) / field->n;
     *size = d;
     double root = sqrt(area / region->ice_area);
-    // Between floes of diameter d in cells of diameter d/√c; far apart, a third of the spacing stands for it, so
-    // that a shake of fifteen gaps is five spacings, which is enough to forget a lattice.
+    // Gap between floes of diameter d in cells of diameter d/√c. In sparse ice, a third of the spacing replaces it, so
+    // that a shake of fifteen gaps is five spacings, enough to forget a lattice.
     return d / root * bt_min(1 - root, 1.0 / 3);
 }
 
@@ -190,7 +190,7 @@ static bt_tessellation make_cells(const bt_case *input, const bt_region *region,
     }
 }
 
-// One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.
+// One floe per cell, the cell shrunk to the target area; all floes together make up for what does not fit.
 static bt_status floes_from_cells(const bt_case *input, const bt_region *region, const bt_tessellation *cells,
                                   double wanted, bt_field *field, bt_errors *err)
 {
@@ -223,7 +223,7 @@ static double fit_into(int nc, const double *cell, double x, double y, int n, co
     return t;
 }
 
-// Regular polygons where they fit in their cells, then grown between shakes until every one has its target area.
+// Regular polygons as large as fit in their cells, then grown between shakes until each has its target area.
 static bt_status polygons_in_cells(const bt_case *input, const bt_region *region, const bt_tessellation *cells,
                                    double wanted, bt_field *field, bt_errors *err)
 {
@@ -254,13 +254,13 @@ static bt_status polygons_in_cells(const bt_case *input, const bt_region *region
     int idle = 0;
     for (int stage = 1; status == BT_OK; stage++) {
         bt_field_growth(region, field, 2, clearance);
-        double least = 1; // part of its goal that the smallest floe has
+        double least = 1; // least area / goal of all floes
         for (bt_idx i = 0; i < field->n; i++) {
             if (clearance[i] < 1) bt_field_scale(field, i, TOUCH * clearance[i]);
             least = bt_min(least, field->area[i] / goal[i]);
         }
         double area = total_area(field);
-        // A shake leaves overlaps of about its slop, which have just cost that much of the area: settle makes it up.
+        // A shake leaves overlaps of about its slop. Removing them has just cost that much area; settled() restores it.
         if (least > 1 - GROWN) break;
         idle = area > best_area * (1 + 2e-4) || least > best_least + 2e-3 ? 0 : idle + 1;
         best_area = bt_max(best_area, area);
@@ -283,8 +283,7 @@ static bt_status polygons_in_cells(const bt_case *input, const bt_region *region
     return status;
 }
 
-// Take out what overlap the shake has left, and bring the area back to what was asked; false, with the reason, where
-// that cannot be done.
+// Remove the overlap that the shake has left, and restore the area asked for; false, with the reason, if impossible.
 static bool settled(const bt_region *region, bt_field *field, double wanted, char why[160])
 {
     double *clearance = bt_alloc((size_t)field->n, sizeof *clearance);
@@ -336,8 +335,8 @@ static bt_status make(const bt_case *input, const bt_region *region, const bt_si
     if (status != BT_OK) return status;
     bt_field_sort(field, region);
     double size, gap = mean_gap(region, field, &size);
-    // A floe that turns fast may be deep in another for a moment. Flying on parts the two, and resting does not: rarely
-    // (one of 1,500 random cases) the shake ends in such a moment.
+    // A floe that turns fast may briefly lie deep in another. More flight separates the two, rest does not. Rarely (in
+    // one of 1,500 random cases) the shake ends at such a moment.
     for (int again = 0; status == BT_OK && again <= MORE_SHAKES; again++) {
         const double length = again ? MORE_GAPS : input->ice.shake;
         status = bt_field_shake(input, region, field, length * gap, bt_min(STRIDE * gap, MOST * size),
@@ -361,7 +360,7 @@ bt_status bt_field_generate(const bt_case *input, bt_field *field, bt_errors *er
     bt_sizes sizes;
     bt_status status = bt_sizes_init(&sizes, input, err);
     if (status != BT_OK) return status;
-    // The field is that of the extent; where it is larger than the ice region, it is cut to it afterwards.
+    // Make the field of the extent; if that is larger than the ice region, cut it afterwards.
     const bt_case whole = bt_case_of_extent(input);
     bt_region region, of;
     status = bt_region_init(&region, input, CLEARANCE * bt_sizes_mean(&sizes), err);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the parts of the field generator share: the placement region, sizes, cells, clearance.
+// Shared by the parts of the field generator: the placement region, sizes, cells, clearance.
 #ifndef BT_FIELD_MAKE_H
 #define BT_FIELD_MAKE_H
 
@@ -18,8 +18,8 @@ typedef struct bt_obstacle {
 /// The ice region and what lies in it.
 typedef struct bt_region {
     double x0, x1, y0, y1;         ///< ice region, m
-    bool periodic_x, periodic_y;   ///< the region is the whole of a periodic direction
-    double clearance;              ///< water kept between made floes and obstacles, m
+    bool periodic_x, periodic_y;   ///< the region spans the domain in a periodic direction
+    double clearance;              ///< water kept between generated floes and obstacles, m
     int n_obstacles;               ///< towed body and floes given by hand, with their periodic images
     bt_obstacle *obstacles;
     double ice_area;               ///< region less the obstacles, m²
@@ -27,19 +27,19 @@ typedef struct bt_region {
 
 /// Region, obstacles and ice area of a case. clearance: m. Errors: BT_ERR_CASE.
 bt_status bt_region_init(bt_region *region, const bt_case *input, double clearance, bt_errors *err);
-/// The whole domain as a region, for ice that is there: no room for more is no error.
+/// The whole domain as a region, for ice that exists already: no room for more is not an error.
 void bt_region_of_domain(bt_region *region, const bt_case *input);
 void bt_region_free(bt_region *region);
-/// Area of a polygon within the region, m², with its images over the edges at which the domain of the case wraps.
+/// Area within the region of a polygon and of its images across edges where the domain of the case wraps, m².
 double bt_region_area_of(const bt_region *region, const bt_case *input, int n, const double *v);
 /// Bring a point into the region along its periodic directions.
 void bt_region_wrap(const bt_region *region, double *px, double *py);
 
 double bt_sizes_draw(const bt_sizes *sizes, int64_t seed, int64_t id); ///< diameter of floe id, m
 
-#define BT_TESSELLATION_VERTICES 12 ///< most vertices of a made floe
+#define BT_TESSELLATION_VERTICES 12 ///< most vertices of a generated floe
 
-/// Convex cells, each holding one floe; n = 0 vertices: no floe.
+/// Convex cells, each holding one floe; nv = 0: no floe.
 typedef struct bt_tessellation {
     bt_idx n;
     int *nv;         ///< [n]
@@ -54,10 +54,10 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *region, bt_idx n, co
 /// obstacles: 0 keeps rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
 bt_tessellation bt_tessellation_saw(const bt_region *region, bt_idx n, const double *target, double aspect,
                                     int64_t seed, int effort);
-/// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
-/// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
+/// Cut obstacles out of a cell, each along its edge that leaves most of the cell; returns the new vertex count. v: room
+/// for max(n, 4 BT_TESSELLATION_VERTICES + 1) vertices. boxed: use bounding boxes (rectangles stay rectangles).
 int bt_tessellation_clear(const bt_region *region, int n, double *v, bool boxed);
-/// Remove edges shorter than this, m, and vertices beyond `most` inwards; returns the new count.
+/// Drop vertices, inwards, until no edge is below `shortest`, m, and at most `most` are left; returns the new count.
 int bt_tessellation_clean(int n, double *v, double shortest, int most);
 
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
@@ -79,11 +79,11 @@ void bt_field_growth(const bt_region *region, const bt_field *field, double limi
 void bt_field_scale(bt_field *field, bt_idx i, double s);
 /// Area with every floe but those held scaled by min(clearance, √λ), m². held: NULL = none.
 double bt_field_area_at(const bt_field *field, const double *clearance, const bool *held, double lambda);
-/// Scale them so by the λ that makes Σ area = wanted; returns the area reached.
+/// Scale floes in this way by the λ for which Σ area = wanted; returns the area reached.
 double bt_field_fit(bt_field *field, const double *clearance, const bool *held, double wanted);
 /// Append floe i of another field as it is, to the bit.
 void bt_field_append(bt_field *field, const bt_field *from, bt_idx i);
-/// Cut the field of region `whole` to the region of the case, with its concentration; size: mean diameter, m.
+/// Cut the field of region `whole` to the region of the case, at the case's concentration; size: mean diameter, m.
 bt_status bt_field_cut(const bt_case *input, const bt_region *whole, const bt_region *region, double size,
                        bt_field *field, bt_errors *err);
 /// Sort floes along a Morton curve.

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double MOST_GROWTH = 20; // of a body by the clearance: beyond that it is a line
+static const double MOST_GROWTH = 20; // of a body by the clearance: a body that needs more is a line
 
 static void place(int n, double *v, double x, double y, double yaw)
 {
@@ -31,7 +31,7 @@ static double area_inside(const bt_region *region, int n, const double *v)
     return n >= 3 ? bt_shape_centroid(n, b).area : 0;
 }
 
-// Of a convex part of a floe, with its images over the edges at which the domain wraps.
+// The same for a convex part of a floe and its images across edges where the domain wraps.
 static double part_inside(const bt_region *region, const bt_case *input, int n, const double *v)
 {
     const int over_x = bt_bound_wraps(input->domain.ends), over_y = input->domain.sides == BT_BOUND_PERIODIC;
@@ -60,7 +60,7 @@ double bt_region_area_of(const bt_region *region, const bt_case *input, int n, c
     return sum;
 }
 
-/// Box about polygon v of n vertices along its longest edge, `clearance` beyond it on all sides.
+/// Box around polygon v, aligned with its longest edge, and larger by `clearance` on all sides.
 static void box_about(int n, const double *v, double clearance, double box[8])
 {
     double longest = 0, ux = 1, uy = 0, low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
@@ -81,10 +81,9 @@ static void box_about(int n, const double *v, double clearance, double box[8])
     }
 }
 
-// Add a convex body, or a part of one, and its periodic images that reach into the region; the ice loses what they
-// cover. False for a body so slender that room for the clearance cannot be made by scaling: it would keep floes away
-// all along its line, and its images would be without number. A part so slender is a sliver along an edge, and gets a
-// box.
+// Add a convex body, or a part of one, and its periodic images that reach into the region; subtract the area they cover
+// from the ice. False for a body too slender to gain the clearance by scaling: it would keep floes away all along its
+// line, with no limit on the number of images. A part that slender is a sliver along an edge, and gets a box.
 static bool add_obstacle(bt_region *region, int n, const double *v, bool part)
 {
     double lx = region->x1 - region->x0, ly = region->y1 - region->y0;
@@ -98,14 +97,14 @@ static bool add_obstacle(bt_region *region, int n, const double *v, bool part)
         box_about(n, v, region->clearance, box);
         r = bt_shape_extent(4, box).radius + moments.radius;
     }
-    // A body far outside a periodic domain is brought back first, so that images next to it suffice.
+    // First bring a body far outside a periodic domain back, so that adjacent images suffice.
     double wx = moments.cx, wy = moments.cy;
     bt_region_wrap(region, &wx, &wy);
     int reach_x = region->periodic_x ? 1 + (int)(r / lx) : 0, reach_y = region->periodic_y ? 1 + (int)(r / ly) : 0;
     for (int ix = -reach_x; ix <= reach_x; ix++)
         for (int iy = -reach_y; iy <= reach_y; iy++) {
             double cx = wx + ix * lx, cy = wy + iy * ly;
-            // Floes at home reach over a periodic edge by less than half a period.
+            // Floes with their centroid in the region reach across a periodic edge by less than half a period.
             double over_x = region->periodic_x ? lx / 2 : 0, over_y = region->periodic_y ? ly / 2 : 0;
             if (cx + r < region->x0 - over_x || cx - r > region->x1 + over_x || cy + r < region->y0 - over_y ||
                 cy - r > region->y1 + over_y)
@@ -223,7 +222,7 @@ void bt_region_wrap(const bt_region *region, double *px, double *py)
     if (region->periodic_y) *py = wrap(*py, region->y0, region->y1);
 }
 
-// Area left of a cell cut by edge e of a polygon (outer side kept).
+// Clip a cell to the outer side of edge e of polygon o; returns the number of vertices in out.
 static int cut_outside(int n, const double *v, int m, const double *o, int e, double *out)
 {
     const double *p = o + 2 * e, *q = o + 2 * ((e + 1) % m);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Shake: floes fly about and collide elastically until the place they were made in is forgotten.
+// Shake: floes fly about and collide elastically until they have forgotten where they were made.
 //
-// The project's own contact dynamics without water, friction or loss (e = 1), in closed walls (or periodic), around the
-// fixed obstacles: the hard-particle gas, whose states at given concentration are all equally likely, so the field is
-// random without being any particular construction. Every floe starts with the same energy in each of its freedoms, in
-// a random direction: speed v with v² ∝ 1/area, spin v/(√2 radius of gyration); collisions make the velocities
-// Maxwellian. Equal speeds instead would soon hand the energy of large floes to small ones, which then outrun the step.
-// Units: v = 1 m/s for the floe of median area, mass = area.
+// It uses the project's own contact dynamics without water, friction or loss (e = 1), between closed walls (or
+// periodic), around the fixed obstacles. That is a hard-particle gas: all its states at a given concentration are
+// equally likely, so the field is random and not any particular construction. Every floe starts with the same energy in
+// each degree of freedom, in a random direction: speed v with v² ∝ 1/area, spin v/(√2 radius of gyration); collisions
+// make the velocities Maxwellian. With equal speeds, large floes would soon pass their energy to small ones, which
+// would then move too far in a step. Units: v = 1 m/s for the floe of median area, mass = area.
 // A step moves a floe by `stride`, the whole shake by `length` on average. Collisions need not be solved to the last
-// digit: a few sweeps do, and what overlap that leaves is pushed out as it comes, and at rest at the end.
+// digit: a few sweeps suffice. The overlap they leave is projected out in every step, and at rest at the end.
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -22,7 +22,7 @@
 #include "base/rng.h"
 
 enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40, FEW = 4000 };
-static const double LARGE = 4; // floes of more than this many mean diameters are in no cell: cells fit the rest
+static const double LARGE = 4; // mean diameters: larger floes are kept out of the cells, which fit the rest
 
 static void add_static(bt_world *world, int n, double *v)
 {
@@ -57,7 +57,7 @@ static void add_surroundings(bt_world *world, const bt_region *region, double th
         add_box(world, region->x0 - thick, region->x1 + thick, region->y1, region->y1 + thick);
     }
     for (int k = 0; k < region->n_obstacles; k++) {
-        // The world makes its own periodic images: only the one at home is a body.
+        // The world makes its own periodic images: add only the obstacle inside the region.
         const bt_obstacle *obstacle = &region->obstacles[k];
         if ((region->periodic_x && (obstacle->x < region->x0 || obstacle->x >= region->x1)) ||
             (region->periodic_y && (obstacle->y < region->y0 || obstacle->y >= region->y1)))
@@ -78,7 +78,7 @@ static double median_area(const bt_field *field)
     return median;
 }
 
-/// The floes as bodies of mass = area, each with a random heading and as much energy as any other. size: their mean.
+/// Add the floes as bodies of mass = area, each with a random heading and the same energy. size: mean diameter.
 static void add_floes(bt_world *world, const bt_case *input, const bt_field *field, double size, int64_t stage)
 {
     const double median = median_area(field);
@@ -112,7 +112,7 @@ static void fly(bt_world *world, bt_idx n_floes, int64_t steps)
     double energy = 0;
     for (int64_t k = 0; k < steps; k++) {
         bt_world_step(world);
-        // Collisions solved to a tolerance gain a little energy: taken out, so that strides stay as asked.
+        // Collisions solved to a tolerance add a little energy; remove it, so that strides stay as asked for.
         if (k == 0) energy = world->stats.kinetic_energy;
         if (world->stats.kinetic_energy > 1.1 * energy) {
             double s = sqrt(energy / world->stats.kinetic_energy);
@@ -124,8 +124,8 @@ static void fly(bt_world *world, bt_idx n_floes, int64_t steps)
     }
 }
 
-/// Contacts are linear in the turn of a step: a floe that turns by θ may end θ²/2 radii inside another. At rest the
-/// position projection alone acts, and takes that out.
+/// Contacts are linearised in the rotation of a step: a floe that turns by θ may end θ²/2 radii inside another. At rest
+/// only the position projection acts, and removes that overlap.
 static void settle(bt_world *world, bt_idx n_floes)
 {
     world->par.position_sweeps = REST_SWEEPS;
@@ -133,7 +133,7 @@ static void settle(bt_world *world, bt_idx n_floes)
         for (bt_idx i = 0; i < n_floes; i++) {
             const bt_idx at = bt_world_index(world, i);
             world->bodies.vel[at] = (bt_vel){0};
-            // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
+            // mark it: its last move may have left an overlap, and no contacts are sought between bodies at rest
             world->bodies.disturbed[at] = 1;
         }
         bt_world_step(world);
@@ -177,12 +177,12 @@ bt_status bt_field_shake(const bt_case *input, const bt_region *region, bt_field
         .plain_sweeps = true, .slop = 2e-5 * size, .position_sweeps = FLIGHT_SWEEPS, .rest_speed = 0, .size = size,
     };
     bt_world *world = bt_world_create(&par);
-    bt_forces_leave_added(world->forces); // the ice follows from the case alone
+    bt_forces_leave_added(world->forces); // the ice depends on the case alone
     add_floes(world, input, field, size, stage);
     add_surroundings(world, region, bt_max(4 * largest, size));
 
-    // Threads that meet at every colour of every sweep cost more than they bring for few floes, and very much more on a
-    // busy machine. The result does not depend on their number.
+    // For few floes, threads that synchronise at every colour of every sweep cost more than they gain, and far more on
+    // a busy machine. The result does not depend on the number of threads.
     const int threads = omp_get_max_threads();
     if (field->n < FEW) omp_set_num_threads(1);
     fly(world, field->n, (int64_t)steps);

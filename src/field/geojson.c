@@ -5,19 +5,18 @@
 //       {"type": "Feature", "id": 7, "properties": {"thickness": 1.2},
 //        "geometry": {"type": "Polygon", "coordinates": [[[east, north], [east, north], ..., [east, north]]]}}, ...]}
 //
-// Positions are [longitude, latitude] in degrees, unless a member `crs` as before RFC 7946 [GeoJSON 2008] says that
-// they are metres [east, north] of a projection (map_crs.h), or the case says so of a file without one
-// (ice.outlines_crs). Degrees are projected about an origin (bergtow/outline.h), metres are taken as they are, less
-// those of an origin. Then, on the map and in the frame of the case,
+// Positions are [longitude, latitude] in degrees, unless a member `crs` of the older form [GeoJSON 2008] says that they
+// are metres [east, north] of a projection (map_crs.h), or the case says so for a file without one (ice.outlines_crs).
+// Degrees are projected about an origin (bergtow/outline.h); metres only have an origin subtracted. Then the frame of
+// the case lies on the map as
+//     basin:       x = east,  y = north      right-handed seen from above
+//     geographic:  x = north, y = east       left-handed seen from above
 //
-//     basin:       x = east,  y = north      both pairs run anticlockwise seen from above
-//     geographic:  x = north, y = east       both run clockwise: this frame is left-handed seen from above
-//
-// so that a floe lies on the ground as it lies on the map, in both frames: no mirror. A basin has no north; its x,
-// along, is drawn to the right. Rings that run anticlockwise on the map, as RFC 7946 has them, run clockwise in the
-// geographic frame: rings are turned as needed. A MultiPolygon of one polygon is one, too. A height (third coordinate)
-// is passed over. Files of this program before had metres [x, y] of the frame, by their mark `bergtow`: they are read
-// as they were written.
+// so in both frames a floe lies on the ground as on the map, never mirrored. A basin has no north; its x, along the
+// basin, is drawn to the right. Rings that are anticlockwise on the map, as RFC 7946 requires, are clockwise in the
+// geographic frame; rings are reversed as needed. A MultiPolygon of one polygon counts as a Polygon. A height (third
+// coordinate) is ignored. With ice.outlines_crs: frame, files of earlier versions of this program are read: metres [x,
+// y] of the frame.
 #include <errno.h>
 #include <jansson.h>
 #include <math.h>
@@ -39,21 +38,21 @@
 
 static const double DEGREE = BT_PI / 180;
 
-/// What the coordinates of a file are.
+/// Kind of the coordinates of a file.
 typedef enum { DEGREES, PLANE, FRAME } coordinates;
 
-/// All coordinates of a file, as they stand there.
+/// Range of all coordinates of a file, as written there.
 typedef struct survey {
     double low[2], high[2];
-    size_t feature; ///< the first that is not a place in degrees; SIZE_MAX: none
+    size_t feature; ///< first with a vertex that is not a place in degrees; SIZE_MAX: none
     double odd[2];  ///< its vertex
 } survey;
 
-/// A feature as it stands in the file.
+/// A feature as read from the file.
 typedef struct map_feature {
-    int64_t vertex;     ///< its first in `ring`
-    const char *why;    ///< it is not an outline, or NULL
-    json_t *id;         ///< or NULL, as the next
+    int64_t vertex;     ///< first vertex in `ring`
+    const char *why;    ///< why it is not an outline, or NULL
+    json_t *id;         ///< or NULL; likewise thickness
     json_t *thickness;
 } map_feature;
 
@@ -61,16 +60,16 @@ typedef struct reader {
     const bt_case *c;
     bt_refusals r;
     bt_field *f;
-    map_feature *feature; ///< [n_features + 1], the last one only where the coordinates end
+    map_feature *feature; ///< [n_features + 1], the last one only marks the end of the coordinates
     size_t n_features, cap_features;
     double *ring;         ///< [vertices][2] coordinates
     int64_t cap_vertices;
     coordinates kind;
-    bool assumed;      ///< degrees because nothing says else
+    bool assumed;      ///< degrees because nothing says otherwise
     bt_map_crs crs;
     double lon0, lat0;   ///< rad
     double east0, north0; ///< m
-    int names;         ///< distinct near names in outlines.nearly
+    int names;         ///< number of names in outlines.nearly
 } reader;
 
 /// "feature 3" or "feature 3 (id 17)".
@@ -112,7 +111,7 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     return NULL;
 }
 
-/// Coordinates of a feature as they are in the file, the closing one left out; their number, 0 and why not.
+/// Coordinates of a feature as in the file, without the closing one; returns their number, or 0 and why not.
 static int coordinates_of(const json_t *feature, double *v, const char **why)
 {
     const json_t *ring = ring_of(feature, why);
@@ -136,7 +135,7 @@ static int coordinates_of(const json_t *feature, double *v, const char **why)
     return n < 3 ? 0 : (int)n;
 }
 
-/// A vertex of feature i into the survey.
+/// Add a vertex of feature i to the survey.
 static void see(survey *seen, size_t i, const double v[2], bool narrow)
 {
     for (int a = 0; a < 2; a++) seen->low[a] = bt_min(seen->low[a], v[a]), seen->high[a] = bt_max(seen->high[a], v[a]);
@@ -154,7 +153,7 @@ static survey look_over(const reader *in, bool narrow)
     return seen;
 }
 
-/// The origin in the mark that this program leaves in its files, if there is one.
+/// Take the origin from the mark that this program leaves in its files, if there is one.
 static void take_origin(const json_t *mark, double origin[2])
 {
     const json_t *list = json_object_get(mark, "origin"), *x = json_array_get(list, 0), *y = json_array_get(list, 1);
@@ -165,8 +164,8 @@ static void take_origin(const json_t *mark, double origin[2])
     origin[1] = json_number_value(y);
 }
 
-/// Degrees out of range, or latitude before longitude; and the place of x = y = 0: the case's, that of the
-/// file's mark, or the middle of all coordinates.
+/// Refuse degrees out of range and latitude before longitude; set the place of x = y = 0: that of the case, else of the
+/// file's mark, else the middle of all coordinates.
 static void begin_degrees(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
@@ -201,11 +200,11 @@ static void begin_degrees(reader *in, const json_t *mark)
     }
     take_origin(mark, middle);
     in->lon0 = given ? input->ice.origin_lon : middle[0] * DEGREE;
-    in->lat0 = given ? input->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE; // the mark says anything
+    in->lat0 = given ? input->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE; // a mark may say anything
 }
 
-/// The place of x = y = 0 in a plane: the case's, that of the file's mark, the middle where the crs is a projection,
-/// whose zeros are far away; otherwise zero.
+/// Set the place of x = y = 0 in a plane: that of the case, else of the file's mark, else the middle of the coordinates
+/// if the crs is a projection, whose zero is far away, else zero.
 static void begin_plane(reader *in, const json_t *mark)
 {
     const bt_case *input = in->c;
@@ -245,7 +244,7 @@ static void begin_plane(reader *in, const json_t *mark)
                   north + in->north0, far_north + in->north0);
 }
 
-/// A vertex on the map to the case's frame.
+/// Convert a vertex on the map to the case's frame.
 static void to_frame(const bt_case *input, double east, double north, double v[2])
 {
     const bool basin = input->domain.frame == BT_FRAME_BASIN;
@@ -253,7 +252,7 @@ static void to_frame(const bt_case *input, double east, double north, double v[2
     v[1] = basin ? north : east;
 }
 
-/// To metres in the case's frame, in place; why not, or NULL.
+/// Convert vertices to metres in the case's frame, in place; returns why not, or NULL.
 static const char *place(const reader *in, int n, double *v)
 {
     for (int i = 0; i < n && in->kind == PLANE; i++)
@@ -301,7 +300,7 @@ bool bt_outline_near_thickness(const char *name)
     return strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
 }
 
-/// Count a feature that has no thickness but one of nearly this name, and keep the first such names.
+/// Count a feature without `thickness` that has a property with a similar name; keep the first such names.
 static void look_for_thickness(reader *in, const json_t *properties)
 {
     bt_outline_counts *counts = &in->f->outlines;
@@ -323,7 +322,7 @@ static void look_for_thickness(reader *in, const json_t *properties)
     counts->unnamed += any;
 }
 
-/// Feature by feature as it is parsed.
+/// Called with each feature as it is parsed.
 static void take_feature(void *context, size_t index, const json_t *feature)
 {
     reader *in = context;
@@ -378,7 +377,7 @@ static void read_feature(reader *in, size_t index)
     if (given) thickness = json_is_number(given) ? json_number_value(given) : NAN;
     else {
         counts->bare++;
-        if (isnan(in->c->ice.thickness)) return; // check_thickness
+        if (isnan(in->c->ice.thickness)) return; // check_thickness reports it
         thickness = bt_field_thickness(in->c, in->f->n);
     }
     const bt_idx i = in->f->n;
@@ -396,14 +395,14 @@ static void read_feature(reader *in, size_t index)
     if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&in->r, "%s: %s", name_of(in, index, name), why);
 }
 
-/// Metres as the case calls them, of a file that does not say it.
+/// Metres of the kind the case names, for a file without a crs.
 static void choose_metres(reader *in)
 {
     in->kind = in->c->ice.outlines_crs == BT_CRS_PLANE ? PLANE : FRAME;
     snprintf(in->crs.name, sizeof in->crs.name, "local");
 }
 
-/// What the coordinates are: by the file's crs, or the case; a file that contradicts the case is refused.
+/// Find the kind of the coordinates from the file's crs or the case; refuse a file that contradicts the case.
 static void choose_coordinates(reader *in, const json_t *root)
 {
     const json_t *crs = json_object_get(root, "crs"), *mark = json_object_get(root, "bergtow");
@@ -461,7 +460,7 @@ static void choose_coordinates(reader *in, const json_t *root)
     }
 }
 
-/// Area of floe i within the ice region, m²; to the bit that of the floe where nothing of it is outside.
+/// Area of floe i within the ice region, m²; exactly the area of the floe if no part is outside.
 static double area_in_region(reader *s, const bt_region *region, bt_idx i)
 {
     const bt_field *field = s->f;
@@ -481,7 +480,7 @@ static double area_in_region(reader *s, const bt_region *region, bt_idx i)
     return bt_region_area_of(region, s->c, n, v);
 }
 
-/// What lies outside the region is there, and is no part of a concentration in it.
+/// Set the concentration in the ice region: ice outside is kept, but does not count.
 static void set_concentration(reader *in)
 {
     bt_region region;
@@ -498,7 +497,7 @@ static void set_concentration(reader *in)
     bt_region_free(&region);
 }
 
-/// Floes without a thickness in a case that has none.
+/// Refuse floes without a thickness if the case has none either.
 static void check_thickness(reader *in, size_t features)
 {
     const bt_outline_counts *counts = &in->f->outlines;
@@ -510,7 +509,7 @@ static void check_thickness(reader *in, size_t features)
               *counts->nearly ? ")" : "");
 }
 
-/// What the floes are together: far too small or large, they are in other units.
+/// Check the floes as a whole: if far too small or too large, their coordinates are in other units.
 static void check_whole(reader *in)
 {
     double size = 0, thickness = 0;
@@ -557,7 +556,7 @@ static void read_features(reader *in, const json_t *root, size_t n)
     if (in->r.status != BT_OK) return;
     set_concentration(in);
     if (in->r.status == BT_OK) check_whole(in);
-    // Numbers of floes are those of features only when none is missing.
+    // Floes have the numbers of their features only if none was refused.
     if (in->r.status == BT_OK) bt_field_check_places(in->c, in->f, "feature", &in->r);
 }
 
@@ -591,7 +590,7 @@ typedef struct map {
     bt_map_place place;
 } map;
 
-/// A vertex of the case's frame as it stands in the file.
+/// Write a vertex of the case's frame as a position of the file.
 static void write_position(FILE *out, const map *m, double x, double y)
 {
     const bool basin = m->c->domain.frame == BT_FRAME_BASIN;
@@ -614,7 +613,7 @@ static void write_floe(FILE *out, const map *m, bt_idx i)
             "%s\n{\"type\":\"Feature\",\"id\":%d,\"properties\":{\"thickness\":%.17g},\"geometry\":{\"type\":"
             "\"Polygon\",\"coordinates\":[[",
             i ? "," : "", (int)i, field->thickness[i]);
-    for (int64_t k = 0; k <= n; k++) { // the first once more: a ring is closed
+    for (int64_t k = 0; k <= n; k++) { // the first again: a ring is closed
         const double *v = field->vertices + 2 * (first + (mirrored ? (2 * n - 1 - k) % n : k % n));
         if (k) fputc(',', out);
         write_position(out, m, p[0] + c * v[0] - s * v[1], p[1] + s * v[0] + c * v[1]);
@@ -622,7 +621,7 @@ static void write_floe(FILE *out, const map *m, bt_idx i)
     fprintf(out, "]]}}");
 }
 
-/// By this a file is known again as one that this program has written.
+/// Beginning of a file that this program has written.
 #define HEAD "{\"type\":\"FeatureCollection\",\n\"bergtow\":"
 
 bool bt_field_outlines_ours(const char *path) { return bt_file_begins(path, HEAD); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The lead ahead of the towed body; what it is: field/lead.h.
+// The lead ahead of the towed body; model in field/lead.h.
 #include "field/lead.h"
 
 #include <math.h>
@@ -15,10 +15,10 @@
 #include "base/largest.h"
 
 static const double SLIT = 1e-4;        // width of a cut / diameter of the largest piece, assumed
-static const double SHORT_EDGE = 0.01;  // edges cut off / root of a piece's area, as in the generator
+static const double SHORT_EDGE = 0.01;  // edges shorter than this are removed / √area of a piece
 enum { JOINT = 32, ROOM = BT_MAX_VERTICES + 2 };
 
-/// One convex part of the strip: a leg, or the round of a joint.
+/// One convex part of the strip: a leg, or the disc at a joint.
 typedef struct {
     int n;
     double v[2 * JOINT]; ///< about (x, y), m
@@ -54,7 +54,7 @@ static strip make_strip(const bt_lead *lead)
     return s;
 }
 
-/// Periods from which a floe at x with its radius may meet a part: first and last.
+/// First and last period by which the image of a part, at x from a floe, comes within `reach` of the floe.
 static void images(double x, double reach, double period, int *first, int *last)
 {
     *first = *last = 0;
@@ -98,7 +98,7 @@ static void long_axis(int n, const double *v, double axis[2])
     axis[0] = bt_cos(angle), axis[1] = bt_sin(angle);
 }
 
-/// Drop vertices at short edges: what stays is convex and lies within.
+/// Drop vertices at short edges: the rest is convex and lies within.
 static int drop_short_edges(int n, double *v)
 {
     const double shortest = SHORT_EDGE * sqrt(bt_shape_centroid(n, v).area);
@@ -175,7 +175,7 @@ static void cut_floe(const strip *s, const bt_field *field, bt_idx i, bt_field *
     }
 }
 
-/// Floes that overlap the strip, and their area.
+/// Mark the floes that overlap the strip, and add up their area.
 static void mark(const strip *s, const bt_field *field, uint8_t *taken, bt_lead_stats *st)
 {
     double *outline = bt_field_outlines(field);
@@ -197,7 +197,7 @@ static void copy(const bt_field *field, bt_idx i, bt_field *out)
     const bt_idx k = out->n;
     bt_field_add(out, (int)n, field->vertices + 2 * field->offsets[i], field->pose[3 * (size_t)i],
                  field->pose[3 * (size_t)i + 1], field->pose[3 * (size_t)i + 2], field->thickness[i]);
-    // As it was, to the bit: adding has centred it once more.
+    // Restore it to the bit: bt_field_add has centred it again.
     memcpy(out->vertices + 2 * at, field->vertices + 2 * field->offsets[i], 2 * (size_t)n * sizeof *field->vertices);
     memcpy(out->pose + 3 * (size_t)k, field->pose + 3 * (size_t)i, 3 * sizeof *field->pose);
     out->area[k] = field->area[i];
@@ -216,8 +216,8 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
     strip s = make_strip(lead);
     uint8_t *taken = bt_alloc((size_t)field->n, sizeof *taken);
     mark(&s, field, taken, st);
-    // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only what is larger
-    // than allowed is cut.
+    // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only pieces larger than
+    // allowed are cut.
     const double most =
         lead->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * lead->floe_size * lead->floe_size) : 0;
     bt_status status = BT_OK;
@@ -249,8 +249,7 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
     return status;
 }
 
-/// Area of the floes within the ice region, m²: of ice that was read a part may lie outside, which is no part of a
-/// concentration in it.
+/// Area of the floes within the ice region, m². Ice that was read may lie partly outside, where it does not count.
 static double area_in_region(const bt_case *input, const bt_region *region, const bt_field *field)
 {
     double area = 0, v[2 * BT_MAX_VERTICES];
@@ -267,14 +266,14 @@ static double area_in_region(const bt_case *input, const bt_region *region, cons
     return area;
 }
 
-/// The points of a path, and how much of its length is left.
+/// The points of a path, and the length still to go.
 typedef struct {
     double *at; ///< [n][2]
     int n;
     double left;
 } planned;
 
-/// On to (x, y), or as far towards it as there is length left.
+/// Extend the path to (x, y), or as far towards it as the remaining length allows.
 static void go_on(planned *p, double x, double y)
 {
     const double *last = p->at + 2 * (p->n - 1), dx = x - last[0], dy = y - last[1], far = bt_hypot(dx, dy);
@@ -286,11 +285,11 @@ static void go_on(planned *p, double x, double y)
     p->n++;
 }
 
-/// From the body to where the towing end starts, and along its path, arcs in pieces; lead.length in all. Without
-/// way-points straight on from the body. Caller frees; NULL with the reason in why.
+/// Path from the body to the start of the path of the towing end, then along that path, arcs in pieces; lead.length in
+/// all. Without way-points, straight ahead of the body. Caller frees; NULL with the reason in why.
 static double *planned_path(const bt_case *input, int *n, char why[200])
 {
-    enum { PIECES = 64 }; // of an arc: 3e-4 of its radius off, for half a turn
+    enum { PIECES = 64 }; // of an arc: within 3e-4 of its radius for half a turn
     bt_path path;
     if (!bt_case_tow_path(input, &path, why)) return NULL;
     planned p = {.at = bt_alloc(2 + PIECES * (size_t)path.n, 2 * sizeof *p.at), .n = 1, .left = input->lead.length};
@@ -337,8 +336,8 @@ bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *sta
         .path = path,
         .x0 = input->domain.x0,
         .y0 = input->domain.y0,
-        // A moving window, too: a floe at its back reaches over the seam into a lead that ends at its front, and what
-        // it lets in is cut as far as the lead goes beyond that, along x (case/case_environment.c).
+        // Also in a moving window: a floe at its rear may reach across the seam into a lead that ends at its front. A
+        // longer lead lies along x (case/constraints.c), and goes round: it cuts the ice that the window takes in.
         .period_x = bt_bound_wraps(input->domain.ends) ? input->domain.length : 0,
         .period_y = input->domain.sides == BT_BOUND_PERIODIC ? input->domain.width : 0,
     };
@@ -350,7 +349,7 @@ bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *sta
     bt_case of = *input; // with the region that the concentration refers to
     if (input->ice.field) {
         const double *r = bt_outline_region(&field->outlines);
-        if (!r) { // a file that does not say: as if the lead took as large a share in it as beyond it
+        if (!r) { // unknown: assume that the lead takes the same share of the ice inside as outside
             field->concentration = stats->concentration_before * (bt_field_floe_area(field) / whole);
             stats->concentration_after = NAN;
             return BT_OK;

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Names of coordinate reference systems that are known as degrees, or as metres east and north, without a projection
-// library.
+// Recognise coordinate reference systems by name, as degrees or as metres east and north, without a projection library.
 //
 // GeoJSON has longitude before latitude and east before north, whatever order the registry gives to the axes of a
-// system [RFC 7946, 3.1.1; GeoJSON 2008, 2.1.1], so an EPSG code says what the two numbers are and not which is which.
-// Degrees on WGS84, ETRS89 and NAD83 are taken as the same: they differ by less than 3 m, all places alike. Metres of a
-// projection are used as they are, as coordinates in a plane: what a projection does to scale (UTM: 0.9996 to 1.001
-// within its zone; polar ones: 0.97 to 1.04 north of 65°) and the angle between its north and the true one
-// (convergence; UTM: up to 3°, polar: any) are not corrected. Mercator is not taken: at 76° its metres are a quarter of
-// a metre long. Codes: EPSG registry.
+// system [RFC 7946, 3.1.1; GeoJSON 2008, 2.1.1], so an EPSG code says what the two numbers are, but not their order.
+// Degrees on WGS84, ETRS89 and NAD83 are treated as the same: they differ by less than 3 m, equally at all places.
+// Metres of a projection are used as plane coordinates, not corrected for its scale (UTM: 0.9996 to 1.001 within its
+// zone; polar: 0.97 to 1.04 north of 65°) nor for the angle between grid north and true north (convergence; UTM: up to
+// 3°, polar: any). Mercator is refused: at 76° its metre is a quarter of a metre on the ground. Codes: EPSG registry.
 #include "field/map_crs.h"
 
 #include <ctype.h>
@@ -22,13 +20,13 @@
 #include "base/elementary.h"
 
 static const double EARTH = 6371e3; // m, mean radius
-#define UPS_LATITUDE 81.1145 // deg, at which 0.994 at the pole has become 1
+#define UPS_LATITUDE 81.1145 // deg, latitude of true scale if the scale at the pole is 0.994
 
 static const struct {
     int first, last;
     bt_map_kind kind;
     bool any_north;
-    double true_lat, offset; // of a polar one
+    double true_lat, offset; // of a polar projection
 } known[] = {
     {4326, 4326, BT_MAP_DEGREES, false, 0, 0}, // WGS 84
     {4979, 4979, BT_MAP_DEGREES, false, 0, 0}, // the same with a height
@@ -57,7 +55,7 @@ static const struct {
     {900913, 900913, BT_MAP_WARPED, false, 0, 0}, // the same, before it had a code
 };
 
-/// Behind the last ':' or '/'.
+/// The part after the last ':' or '/'.
 static const char *last_word(const char *name)
 {
     const char *last = name;
@@ -97,7 +95,7 @@ bt_map_crs bt_map_crs_of(const char *name)
 
 void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *along, double *across)
 {
-    if (!crs->any_north) { // UTM: the cylinder's 0.9996 on the central meridian
+    if (!crs->any_north) { // UTM: scale 0.9996 on the central meridian
         const double from = (east - 500e3) / (0.9996 * EARTH);
         *along = *across = 0.9996 * (1 + from * from / 2);
         return;

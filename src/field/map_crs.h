@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the name of a coordinate reference system says about the numbers of a GeoJSON file.
+// Meaning of the numbers of a GeoJSON file by the name of its coordinate reference system.
 #ifndef BT_MAP_CRS_H
 #define BT_MAP_CRS_H
 
@@ -18,30 +18,30 @@ typedef enum {
 
 typedef struct bt_map_crs {
     bt_map_kind kind;
-    char name[32];   ///< "OGC:CRS84", "EPSG:32633", "local"; of an unknown one as it is given, cut
-    double true_lat; ///< at which a polar one is true to scale, deg; 0: equal areas, or no polar one
-    double offset;   ///< of its pole, m
-    bool any_north;  ///< the grid's north can differ from the true one by any angle: polar projections
+    char name[32];   ///< "OGC:CRS84", "EPSG:32633", "local"; an unknown one as given, truncated
+    double true_lat; ///< latitude of true scale if polar, deg; 0: equal-area, or not polar
+    double offset;   ///< east and north of the pole, m
+    bool any_north;  ///< grid north can differ from true north by any angle: polar projections
 } bt_map_crs;
 
-/// The name this program gives to coordinates that are tied to no place on the earth. OGC has no name for one.
+/// Name in this program for coordinates not tied to any place on the earth. OGC has no name for them.
 #define BT_MAP_LOCAL_NAME "urn:x-bergtow:crs:local-metres-east-north"
 
 /// From "EPSG:32633", "urn:ogc:def:crs:EPSG::32633", "http://www.opengis.net/def/crs/OGC/1.3/CRS84" and the like,
 /// whatever the case of the letters.
 bt_map_crs bt_map_crs_of(const char *name);
 
-/// Metres of the map for a metre on the ground at a place of a projection, along and across the meridian of a polar
-/// one, on a sphere: within a thousandth of those on the ellipsoid.
+/// Scale factor at a place of a projection, metres on the map per metre on the ground, along and across the meridian,
+/// on a sphere: within a thousandth of that on the ellipsoid.
 void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *along, double *across);
 
 // --- places ----------------------------------------------------------------------------------------------------------
 
-// Where x = y = 0 of a case lies on the earth, as far as its map or its keys say it.
+// Where x = y = 0 of a case lies on the earth, if its map or its keys tell.
 
-#define BT_MAP_FARTHEST 100e3 ///< m from the origin: the projection is one of small areas
+#define BT_MAP_FARTHEST 100e3 ///< m from the origin: the projection is for small areas
 
-/// Between these latitudes, deg, there is no sea ice: nearest to the equator is that of the Bohai Sea, at 37° N, and of
+/// Between these latitudes, deg, there is no sea ice: the nearest to the equator is in the Bohai Sea, at 37° N, and off
 /// South Georgia, at 54° S.
 #define BT_MAP_FREE_SOUTH (-53.)
 #define BT_MAP_FREE_NORTH 30.
@@ -49,10 +49,10 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
 typedef struct bt_map_place {
     bt_map_kind kind;     ///< BT_MAP_DEGREES, BT_MAP_PLANE (of a projection), BT_MAP_LOCAL (of no place on the earth)
     double first, second; ///< longitude and latitude, rad; or east and north in the plane of the map, m
-    const char *crs;      ///< of the projection, as long as the outlines are there; NULL of others
+    const char *crs;      ///< of the projection, valid as long as the outlines; otherwise NULL
 } bt_map_place;
 
-/// The map from which the outlines came (NULL or all 0: there is none) goes before ice.origin_lon and ice.origin_lat.
+/// The map of the outlines (NULL or all 0: there is none) takes precedence over ice.origin_lon and ice.origin_lat.
 bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *input);
 
 #endif

@@ -9,7 +9,7 @@
 #include "base/fileio.h"
 #include "base/largest.h"
 
-/// What is left of a text.
+/// The rest of a text.
 typedef struct scan { const char *p, *end; } scan;
 
 static void skip_space(scan *at)
@@ -36,7 +36,7 @@ static json_t *take_value(scan *at)
     return value;
 }
 
-/// Behind the '[' of a list.
+/// Visit the elements of a list, from after its '['.
 static bool take_features(scan *at, bt_feature_visit *visit, void *context, size_t *n)
 {
     if (take(at, ']')) return true;
@@ -49,7 +49,7 @@ static bool take_features(scan *at, bt_feature_visit *visit, void *context, size
     return take(at, ']');
 }
 
-/// The next member of the file into root.
+/// Read the next member of the file into root.
 static bool take_member(scan *at, json_t *root, bt_feature_visit *visit, void *context, size_t *n)
 {
     json_t *key = take_value(at), *value = NULL;
@@ -63,7 +63,7 @@ static bool take_member(scan *at, json_t *root, bt_feature_visit *visit, void *c
     return taken;
 }
 
-/// NULL: it is not a JSON object.
+/// Read the file; NULL if it is not a JSON object.
 static json_t *take_file(scan at, bt_feature_visit *visit, void *context, size_t *n)
 {
     if (!take(&at, '{')) return NULL;
@@ -80,7 +80,7 @@ static json_t *take_file(scan at, bt_feature_visit *visit, void *context, size_t
     return NULL;
 }
 
-/// What a file is that is no JSON, by the bytes at its beginning, or NULL.
+/// Name of another format than JSON, recognised by its first bytes, or NULL.
 static const char *other_format(const char *text, size_t size)
 {
     static const struct { size_t n; const char *bytes, *name; } kinds[] = {
@@ -103,7 +103,7 @@ static const char *other_format(const char *text, size_t size)
     return NULL;
 }
 
-/// What a text cannot be read for before it is parsed, or none.
+/// Refuse a text that is not JSON or too large, before it is parsed.
 static bt_status refuse_text(const char *path, const char *text, size_t size, bt_errors *err)
 {
     const char *other = other_format(text, size);
@@ -112,7 +112,7 @@ static bt_status refuse_text(const char *path, const char *text, size_t size, bt
                        "%s: is %s, not GeoJSON; make GeoJSON of it: bergtow outlines %s -o floes.geojson (a field of "
                        "bergtow belongs to ice.field)",
                        path, other, path);
-    // What a hostile file could make of it is known before: a tree takes far more room than the text.
+    // Limit the tree of a hostile file before parsing it: a tree takes far more room than the text.
     int64_t lists = 0;
     const char *c = text, *end = text + size;
     while ((c = memchr(c, '[', (size_t)(end - c)))) c++, lists++;
@@ -133,7 +133,7 @@ bt_status bt_features_read(const char *path, bt_feature_visit *visit, void *cont
     if (status == BT_OK) {
         json_error_t why;
         *root = take_file((scan){text, text + size}, visit, context, n);
-        if (!*root) *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why); // a list, or the fault
+        if (!*root) *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why); // another value, or the error
         if (!*root)
             status = bt_fail(err, BT_ERR_CASE, "%s:%d: is not JSON: %s; correct the file", path, why.line, why.text);
     }

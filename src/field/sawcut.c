@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Rectangular cells as sawn in an ice basin: long strips along x, cross-cut at random lengths.
 //
-// n floes that share a strip of width b and length L have the cells A_i, so b = Σ A_i / L and lengths A_i / b; their
-// mean aspect L/(n b) falls as n grows, and the strip closes when it has come down to the one asked for. Every cell
-// area is as asked, so strips fill the region exactly. Floes are assigned to strips by size with some noise: for a
+// n floes with cell areas A_i that share a strip of length L make it b = Σ A_i / L wide and are A_i / b long. Their
+// mean aspect L/(n b) falls as n grows, and the strip is closed when it has fallen to the one asked for. Every cell has
+// its target area, so strips fill the region exactly. Floes are assigned to strips by size with some noise: for a
 // narrow size law that is a random order, for a wide one it keeps large floes out of narrow strips, where they would be
-// needles. Strips are then shuffled, and the floes within each. In a periodic direction a strip starts at a random
+// needles. Then strips are shuffled, and the floes within each. In a periodic direction a strip starts at a random
 // place.
 #include <math.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@
 
 static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order in which sizes are assigned
 
-// In a rectangular cell, the largest rectangle with the proportions nearest to the aspect that the floe can have: a
-// floe of the area a becomes √(a aspect) long unless the cell is shorter, or narrower than a over that.
+// Replace a rectangular cell by the largest rectangle in it with the proportions nearest to `aspect` that its floe can
+// have: a floe of area a is √(a aspect) long, unless the cell is shorter, or narrower than a over that length.
 static void shape_piece(double *v, double area, double aspect)
 {
     double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
@@ -43,7 +43,7 @@ static void add_cell(bt_tessellation *cells, const bt_region *region, double x0,
     int n = bt_tessellation_clear(region, 4, v, effort == 0);
     if (n >= 3) n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
     double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_centroid(n, v).area : 0;
-    // Halves waste less water beside an obstacle.
+    // Halves leave less open water beside an obstacle.
     if (left < (effort < 2 ? 0.65 : 0.85) * whole && halved < (effort < 2 ? 2 : 4)) {
         double cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
         bool across = x1 - x0 >= y1 - y0;
@@ -52,7 +52,7 @@ static void add_cell(bt_tessellation *cells, const bt_region *region, double x0,
         return;
     }
     if (n < 3) return;
-    // What an obstacle leaves of a piece must still be a piece.
+    // Drop what an obstacle leaves of a piece if it is too small or too narrow.
     bt_moments moments = bt_shape_extent(n, v);
     if (moments.area < 0.25 * whole || moments.inradius < 0.2 * bt_min(x1 - x0, y1 - y0) / 2) return;
     if ((cells->n & (cells->n - 1)) == 0) { // full at powers of two
@@ -81,8 +81,8 @@ static int by_key(const void *a, const void *b)
     return (p->id > q->id) - (p->id < q->id);
 }
 
-// Strip k holds pieces [first[k], first[k+1]). share: cell area over lx per target area. Returns the number of strips;
-// *last: width of the last strip over the width due to it.
+// Strip k holds pieces [first[k], first[k+1]). share: cell area per target area, over lx. Returns the number of strips;
+// *last: width of the last strip over the width it should have.
 static bt_idx fill_strips(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
 {
     bt_idx n_strips = 0;
@@ -92,7 +92,7 @@ static bt_idx fill_strips(bt_idx n, const piece *p, double share, double aspect,
         width += p[i].target * share;
         bt_idx m = i + 1 - first[n_strips];
         if (m * aspect * width < lx && i + 1 < n) continue;
-        // A last strip less than half as wide as due joins the one before.
+        // A last strip less than half as wide as it should be joins the previous one.
         double part = sqrt(m * aspect * width / lx);
         if (part >= 0.5 || n_strips == 0) {
             n_strips++;
@@ -120,7 +120,7 @@ bt_tessellation bt_tessellation_saw(const bt_region *region, bt_idx n, const dou
     qsort(p, (size_t)n, sizeof *p, by_key);
     double share = lx * ly / wanted;
 
-    // Of thresholds near the aspect asked for, the one whose last strip comes out fullest.
+    // Of thresholds near the aspect asked for, choose the one whose last strip comes out fullest.
     bt_idx *first = bt_alloc((size_t)n + 1, sizeof *first);
     double best = INFINITY, chosen = aspect;
     for (int k = -20; k <= 20; k++) {

@@ -26,13 +26,13 @@
 enum {
     WORK = 64,      // vertices of a cell under construction
     LLOYD = 3,      // moves to the centroid
-    ROUNDS = 24,    // weight updates, the Lloyd moves among them
+    ROUNDS = 24,    // weight updates, including the Lloyd moves
     TRIES = 24,     // candidate places of a seed
 };
-// discs of this part of the cell's radius do not overlap at the start: disorder of the ice
+// discs with this share of the cell's radius do not overlap at the start: sets the disorder of the ice
 static const double SPACING = 0.66;
 static const double STEP = 0.9;     // ω
-static const double SURE = 1 + 1e-12;  // beyond this, squares compare as what they are squares of
+static const double SURE = 1 + 1e-12;  // squares that differ by more compare like their roots
 static const double SHORT_EDGE = 0.07; // shortest edge kept / diameter of equal area
 static const double SLIVER = 0.16;     // least inradius / radius of equal area
 
@@ -45,7 +45,7 @@ typedef struct diagram {
     int nx, ny;       // bins
     double bx, by;    // their sides
     bt_idx *first;    // [nx*ny+1]
-    struct { double x, y, w; bt_idx i; } *member; // [n] the seeds again, those of a bin in a row
+    struct { double x, y, w; bt_idx i; } *member; // [n] the seeds sorted by bin
 } diagram;
 
 static bt_tessellation create(bt_idx n)
@@ -116,10 +116,10 @@ static int cut_by_bin(const diagram *tiling, bt_idx i, int n, double *v, double 
     for (bt_idx k = tiling->first[bin]; k < tiling->first[bin + 1]; k++) {
         const double dx = tiling->member[k].x + sx - px, dy = tiling->member[k].y + sy - py, wj = tiling->member[k].w,
                      d2 = dx * dx + dy * dy, rhs = 0.5 * (d2 + w - wj);
-        if (rhs > 0 && rhs * rhs > SURE * d2 * *r * *r) continue; // most: without a root
+        if (rhs > 0 && rhs * rhs > SURE * d2 * *r * *r) continue; // most end here, without a root
         const bt_idx j = tiling->member[k].i;
         if (j == i || rhs >= sqrt(d2) * *r) continue;
-        if (d2 == 0) { // coincident seeds: the heavier one, then the lower index, has the cell
+        if (d2 == 0) { // coincident seeds: the heavier one, then the lower index, gets the cell
             if (wj > w || (wj == w && j < i)) return 0;
             continue;
         }
@@ -194,7 +194,7 @@ typedef struct discs {
     int32_t n, cap;
 } discs;
 
-// Walk over the bins of the square of half side r about (x, y); (sx, sy) is the period's shift of the bin.
+// Walk over the bins of the square of half side r about (x, y); (sx, sy) is the periodic shift of the bin.
 typedef struct bin_walk {
     const bt_region *region;
     const discs *dd;
@@ -220,7 +220,7 @@ static bool next_bin(bin_walk *walk)
             walk->iy++;
         }
         if (walk->iy > walk->iy1) return false;
-        // turns round the period
+        // periods away from the region
         int tx = (int)floor((double)walk->ix / walk->dd->nx), ty = (int)floor((double)walk->iy / walk->dd->ny);
         if ((tx && !walk->region->periodic_x) || (ty && !walk->region->periodic_y)) continue;
         walk->bin = (size_t)(walk->iy - ty * walk->dd->ny) * (size_t)walk->dd->nx +
@@ -241,7 +241,7 @@ static double crowding(const bt_region *region, const discs *dd, const double *p
     for (int k = 0; k < region->n_obstacles; k++) {
         const bt_obstacle *obstacle = &region->obstacles[k];
         if (bt_hypot(x - obstacle->x, y - obstacle->y) > obstacle->radius + r) continue;
-        double out = -INFINITY; // distance to the obstacle, from below
+        double out = -INFINITY; // lower bound of the distance to the obstacle
         for (int e = 0; e < obstacle->n; e++) {
             const double *a = obstacle->v + 2 * e, *b = obstacle->v + 2 * ((e + 1) % obstacle->n);
             double ex = b[0] - a[0], ey = b[1] - a[1];

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const double NEAR = 1e-9;   // lengths below this part of the extent are rounding (as in bt_shape_fault)
-static const double SLIVER = 1e-9; // a part of less than this part of the area is left out: nothing can lean on it
+static const double SLIVER = 1e-9; // convex parts below this share of the area are dropped: nothing can touch them
 
 static double cross(const double *o, const double *p, const double *q)
 {
@@ -25,8 +25,8 @@ static double extent_of(int n, const double *v)
     return n > 0 ? bt_hypot(x1 - x0, y1 - y0) : 0;
 }
 
-/// Is q between p and r on a straight line, or on one of them? A spike, where the line turns back, is not: it is a
-/// fault.
+/// Is q between p and r on a straight line, or at the same place as p? A spike, where the line turns back, does not
+/// count: it is a fault.
 static bool idle(const double *p, const double *q, const double *r, double tiny)
 {
     const double ax = q[0] - p[0], ay = q[1] - p[1], bx = r[0] - q[0], by = r[1] - q[1];
@@ -38,7 +38,7 @@ static bool idle(const double *p, const double *q, const double *r, double tiny)
 int bt_outline_clean(int n, double *v)
 {
     const double tiny = NEAR * extent_of(n, v);
-    // Each vertex against its neighbours as they stand, until none goes: the vertex before may have gone a moment ago.
+    // Test each vertex against its present neighbours, as the previous one may be gone; repeat until none goes.
     for (bool changed = true; changed && n > 2;) {
         changed = false;
         for (int i = 0; i < n && n > 2; i++) {
@@ -85,7 +85,7 @@ bool bt_outline_crosses(int n, const double *v)
         const double *a = v + 2 * i, *b = v + 2 * ((i + 1) % n);
         for (int j = i + 1; j < n; j++) {
             const double *c = v + 2 * j, *d = v + 2 * ((j + 1) % n);
-            if (j == i + 1 || (i == 0 && j == n - 1)) { // neighbours share a vertex; a spike lies back on itself
+            if (j == i + 1 || (i == 0 && j == n - 1)) { // neighbours share a vertex; a spike folds back on itself
                 const double *p = j == i + 1 ? a : b, *q = j == i + 1 ? b : a, *r = j == i + 1 ? d : c;
                 const bool back = (p[0] - q[0]) * (r[0] - q[0]) + (p[1] - q[1]) * (r[1] - q[1]) > 0;
                 if (back &&
@@ -128,7 +128,7 @@ static bool left_turn(const double *a, const double *b, const double *c)
     return cross(a, b, c) > NEAR * bt_hypot(b[0] - a[0], b[1] - a[1]) * bt_hypot(c[0] - b[0], c[1] - b[1]);
 }
 
-/// Shape of an ear a, b, c: twice the area over the square of the longest side; −1 when it is none.
+/// Shape of an ear a, b, c: twice the area over the square of the longest side; −1 if it is not an ear.
 static double ear_quality(int m, const int *loop, int i, const double *v)
 {
     const int before = loop[i > 0 ? i - 1 : m - 1], here = loop[i], after = loop[i + 1 < m ? i + 1 : 0];
@@ -151,7 +151,7 @@ typedef struct ring { int n, at[BT_MAX_VERTICES]; } ring;
 static int next_of(const ring *loop, int k) { return loop->at[k + 1 < loop->n ? k + 1 : 0]; }
 static int before_of(const ring *loop, int k) { return loop->at[k > 0 ? k - 1 : loop->n - 1]; }
 
-/// Join b to a along an edge that both have, if the result is convex there.
+/// Join b to a along a common edge, if the result is convex there.
 static bool join(ring *a, const ring *b, const double *v)
 {
     for (int i = 0; i < a->n; i++)
@@ -163,7 +163,7 @@ static bool join(ring *a, const ring *b, const double *v)
                       after_q = next_of(a, i1);
             if (!left_turn(v + 2 * before_p, v + 2 * p, v + 2 * after_p)) return false;
             if (!left_turn(v + 2 * before_q, v + 2 * q, v + 2 * after_q)) return false;
-            // a from q round to p, then what b has between p and q.
+            // a from q round to p, then the vertices of b between p and q.
             ring all = {0};
             for (int k = 0; k < a->n; k++) all.at[all.n++] = a->at[(i1 + k) % a->n];
             for (int k = 1; k < b->n - 1; k++) all.at[all.n++] = b->at[(j1 + k) % b->n];
@@ -199,7 +199,7 @@ bool bt_outline_split(int n, const double *v, bt_parts *parts)
             if (join(&part[i], &part[j], v)) {
                 memmove(part + j, part + j + 1, (size_t)(n_parts - j - 1) * sizeof *part);
                 n_parts--;
-                j = i; // the grown part may now join one that was passed over
+                j = i; // the larger part may now join one that was passed over
             }
     const double whole = bt_outline_area2(n, v);
     double kept = 0;
@@ -222,7 +222,7 @@ bool bt_outline_split(int n, const double *v, bt_parts *parts)
 #define WGS84_A 6378137.0               // m
 #define WGS84_E2 6.69437999014131705734e-3 // e² = f (2 − f), 1/f = 298.257223563
 
-/// Place on the ellipsoid, from the centre of the earth, m.
+/// Place on the ellipsoid, relative to the centre of the earth, m.
 static void on_ellipsoid(double lon, double lat, double p[3])
 {
     const double s = bt_sin(lat), normal = WGS84_A / sqrt(1 - WGS84_E2 * s * s);
@@ -239,7 +239,7 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
     const double dx = p[0] - o[0], dy = p[1] - o[1], dz = p[2] - o[2];
     const double e = bt_cos(lon0) * dy - bt_sin(lon0) * dx,
                  n = bt_cos(lat0) * dz - bt_sin(lat0) * (bt_cos(lon0) * dx + bt_sin(lon0) * dy);
-    // √(M N), mean curvature there
+    // √(M N), mean radius of curvature there
     const double s = bt_sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s);
     const double level = bt_hypot(e, n), chord = sqrt(dx * dx + dy * dy + dz * dz);
     const double stretch = level > 0 ? chord * (1 + chord * chord / (24 * radius * radius)) / level : 0;
@@ -247,9 +247,9 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
     *north = n * stretch;
 }
 
-/// The chord c follows from the distance d by Newton's method from d = c (1 + c²/(24 R²)); the point of the ellipsoid
-/// at this chord in this direction lies up·u above the tangent plane of the origin, (x² + y²)/a² + z²/b² = 1 with level
-/// = √(c² − up²) in it: Newton again from the sphere's −c²/(2R).
+/// Newton's method finds the chord c of the distance d = c (1 + c²/(24 R²)). The point of the ellipsoid at this chord
+/// in this direction is `up` above the tangent plane of the origin and √(c² − up²) along it. Newton's method finds `up`
+/// from (x² + y²)/a² + z²/b² = 1, starting with −c²/(2R), that of the sphere.
 void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat)
 {
     double o[3];
@@ -297,7 +297,7 @@ void bt_outline_middle(int64_t n, const double *place, double middle[2])
         sum[2] += bt_sin(lat);
     }
     double lon0 = bt_atan2(sum[1], sum[0]), lat0 = bt_atan2(sum[2], bt_hypot(sum[0], sum[1]));
-    for (int look = 0; look < 4; look++) { // the middle in the projection at the last one, until it stays
+    for (int look = 0; look < 4; look++) { // the middle in the projection about the last one, until it converges
         double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
         for (int64_t i = 0; i < n; i++) {
             double at[2];

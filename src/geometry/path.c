@@ -18,7 +18,7 @@ bool bt_path_make(bt_path *path, double x, double y, int n, const double *points
     *path = (bt_path){.leg = bt_alloc(2 * (size_t)n + 1, sizeof *path->leg),
                       .mark = bt_alloc((size_t)n + 1, sizeof *path->mark),
                       .n_marks = n};
-    double tx = 1, ty = 0, used = 0; // of the leg at hand: tangent, and what the corner behind has taken of it
+    double tx = 1, ty = 0, used = 0; // of the present leg: tangent, and length used by the corner behind
     for (int k = 0; k < n; k++) {
         const double px = points[2 * k], py = points[2 * k + 1], far = bt_hypot(px - x, py - y);
         if (!(far > 0)) {
@@ -32,7 +32,7 @@ bool bt_path_make(bt_path *path, double x, double y, int n, const double *points
             const double nx = points[2 * k + 2] - px, ny = points[2 * k + 3] - py, next = bt_hypot(nx, ny);
             if (next > 0) ox = nx / next, oy = ny / next;
             angle = bt_atan2(tx * oy - ty * ox, tx * ox + ty * oy);
-            // Not tan of half an angle of 180°, which is large but finite.
+            // For 180° tan of half the angle would be large but finite.
             if (radius > 0 && angle != 0)
                 cut = fabs(angle) < BT_PI - 1e-6 ? radius * bt_tan(0.5 * fabs(angle)) : INFINITY;
         }

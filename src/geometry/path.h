@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A path in the plane by its length: straight legs through way-points, corners sharp or rounded by arcs.
+// A path in the plane as a function of its length: straight legs through way-points, corners sharp or rounded by arcs.
 //
 // A corner of angle δ between two legs is rounded by an arc of radius R that touches both at R tan(δ/2) from the
 // way-point. The leg after the last way-point has no end.
@@ -34,8 +34,8 @@ void bt_leg_at(const bt_leg *leg, double way, double at[2], double tangent[2]);
 /// Position and unit tangent after `way` m of it (before the start: on the straight line backwards).
 void bt_path_at(const bt_path *path, double way, double at[2], double tangent[2]);
 
-/// Way of the point of the path near to (x, y), sought from `way` on, forwards and backwards, by going along the
-/// tangent of a leg, or about the centre of an arc.
+/// Way of a point of the path near (x, y), sought forwards and backwards from `way` by moving along the tangent of a
+/// leg or about the centre of an arc.
 double bt_path_near(const bt_path *path, double way, double x, double y);
 
 void bt_path_free(bt_path *path);

@@ -51,11 +51,11 @@ bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx
 // At time t the nearest points of the two, D apart, give a direction n from a to b. As long as n separates them, their
 // distance is at least the least of
 //     n·(d + q − p) + τ n·(V + ω_b k×q − ω_a k×p) − ½ τ² (ω_a² |p| + ω_b² |q|)
-// over the vertices p of a and q of b, τ later: a point that turns leaves its tangent by at most ½ (ωτ)² of its radius.
-// The earliest τ at which one pair of vertices can be as near as `near` is safe; there the nearest points are looked
-// for anew. On a straight way this is Newton's iteration for the passage, and ends after two to five rounds.
+// over the vertices p of a and q of b, τ later: a rotating point leaves its tangent by at most ½ (ωτ)² of its radius.
+// The motion is safe until the earliest τ at which a pair of vertices can be as near as `near`; there the nearest
+// points are found again. For straight motion this is Newton's iteration, and ends after two to five rounds.
 //
-// Rejected: the distance at the end of the step alone (tunnels); samples along the way (a number to choose, slower).
+// Rejected: the distance at the end of the step alone (tunnels); sampling the motion (a number to choose, slower).
 
 #define WITHIN 1.01 // times `near`: near enough
 enum { ROUNDS = 32 }; // after so many they count as meeting
@@ -115,7 +115,7 @@ bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy
 {
     double p[2 * BT_MAX_VERTICES], q[2 * BT_MAX_VERTICES], t = 0;
     for (int round = 0; round < ROUNDS; round++) {
-        // in the frame of a point that moves with a and does not turn
+        // in a frame that moves with a and does not turn
         const double centre[2] = {dx + t * (b->x - a->x), dy + t * (b->y - a->y)};
         turn(a, t, 0, 0, p);
         turn(b, t, centre[0], centre[1], q);
@@ -147,7 +147,7 @@ static box box_of(const bt_welded *outline)
     return bounds;
 }
 
-/// The place on `outline`, moved by (dx, dy), that x goes to. False: `outline` is not within reach.
+/// Move x to its nearest place on `outline`, which is shifted by (dx, dy). False if that is not within reach.
 static bool place_on(const bt_welded *outline, double dx, double dy, double reach, double x[2])
 {
     double best = reach, to[2] = {0};

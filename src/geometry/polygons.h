@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two convex polygons: how far apart they are, do they meet as they move; outlines that lie flush.
+// Two convex polygons: their distance, and whether they meet as they move; outlines that lie flush.
 #ifndef BT_POLYGONS_H
 #define BT_POLYGONS_H
 
@@ -9,7 +9,7 @@
 
 // --- distance and motion ---------------------------------------------------------------------------------------------
 
-// How far two convex polygons are apart. Independent of the contact code, so that it can check it.
+// Distance of two convex polygons. Independent of the contact code, so that tests can use it to check that code.
 
 /// Two convex polygons by separating axes over all edge normals n, D from centroid to centroid, h support functions.
 typedef struct bt_apart {
@@ -36,8 +36,8 @@ typedef struct bt_moving {
 } bt_moving;
 
 /// Does the distance between a and b fall to `near`, m, or below within the time dt, s? (dx, dy): from the point that a
-/// turns about to that of b at the beginning, m. Never false when it does; true, too, for some that pass at little more
-/// than `near` (1 % on a straight way).
+/// turns about to that of b at the beginning, m. Never false if it does; also true for some that pass at little more
+/// than `near` (1 % in straight motion).
 bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy, double near, double dt);
 
 // --- flush outlines --------------------------------------------------------------------------------------------------
@@ -49,9 +49,9 @@ typedef struct bt_welded {
     double v[2 * BT_MAX_VERTICES]; ///< m, anticlockwise, in a common frame
 } bt_welded;
 
-/// Move vertices of `outline[n]` that lie within `reach`, m, of the boundary of an outline before theirs onto it: onto
-/// its nearest vertex if one is that near, otherwise onto its edge. Also across periods, m (0 = none). An outline that
-/// this would make unsound, or no longer convex, stays as it is.
+/// Move vertices of `outline[n]` that lie within `reach`, m, of the boundary of an earlier outline onto it: onto its
+/// nearest vertex if one is that near, otherwise onto its edge. Also across periods, m (0 = none). An outline that
+/// would become unsound by this, or change whether it is convex, stays as it is.
 void bt_weld(int n, bt_welded *outline, double reach, double period_x, double period_y);
 
 #endif

@@ -79,7 +79,7 @@ bt_moments bt_shape_moments(int n, const double *v) { return moments(n, v, true)
 
 bt_moments bt_shape_extent(int n, const double *v) { return moments(n, v, false); }
 
-/// near: neighbouring vertices coincide, over the extent; angle: a corner turns the wrong way, rad.
+/// near: distance / extent up to which neighbouring vertices coincide; angle: largest turn the wrong way, rad.
 static const char *fault_of(int n, const double *v, double near, double angle)
 {
     if (n < 3) return "it has fewer than 3 vertices";

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Shortest paths of bounded curvature between two poses [Dubins 1957, Am. J. Math. 79].
 //
-// In units of the radius, with the end seen from the start, a unit circle to the left or right of each pose. Two
-// circles of the same sense are joined by their outer tangent, whose length is the distance D of the centres; of
-// opposite senses by the inner one, √(D² − 4); or three arcs, the middle one of a circle that touches both, D < 4.
+// In units of the radius, and relative to the start. A unit circle lies to the left or right of each pose. Circles of
+// the same sense are joined by an outer tangent, as long as the distance D of their centres; of opposite sense by an
+// inner one, √(D² − 4) long. Or there are three arcs, the middle one on a circle that touches both; D <= 4.
 #include "bergtow/route.h"
 
 #include "base/elementary.h"
 
 #include <math.h>
 
-/// 0 <= a < 2π; what rounding puts just below 2π is 0.
+/// a modulo 2π, 0 <= a < 2π; 0 for values that rounding puts just below 2π.
 static double turn_of(double a)
 {
     a -= 2 * BT_PI * floor(a / (2 * BT_PI));
@@ -28,19 +28,19 @@ double bt_route_word(const double from[3], const double to[3], double radius, in
     const double dx = (to[0] - from[0]) / radius - w[2] * s1 + w[0] * s0;
     const double dy = (to[1] - from[1]) / radius + w[2] * c1 - w[0] * c0;
     const double far = bt_hypot(dx, dy), way = bt_atan2(dy, dx);
-    double heading, middle = 0; // of the path as it leaves the first circle; length of the middle in radii
+    double heading, middle = 0; // as the path leaves the first circle; length of the middle part
     double last;                // heading as it enters the last circle
     if (w[1] == 0) {
         const double square = w[0] == w[2] ? far * far : far * far - 4;
         if (square < 0) return INFINITY;
         middle = sqrt(square);
         heading = w[0] == w[2] ? way : way + w[0] * bt_atan2(2, middle);
-        if (w[0] == w[2] && far < 1e-12) heading = from[2]; // one and the same circle
+        if (w[0] == w[2] && far < 1e-12) heading = from[2]; // the same circle
         last = heading;
     } else {
         if (far > 4) return INFINITY;
-        // isosceles triangle of the three centres: sides 2, 2, far; the middle one lies to the left of the way from
-        // the first to the last for LRL, to its right for RLR, which makes the middle arc more than half a circle
+        // the three centres form an isosceles triangle with sides 2, 2, far; the middle one lies left of the line from
+        // the first to the last for LRL, right of it for RLR, which makes the middle arc longer than half a circle
         const double cosine = far / 4, angle = bt_atan2(sqrt(bt_max(0, 1 - cosine * cosine)), cosine);
         const double to_middle = way + w[0] * angle; // direction from the first centre to the middle one
         heading = to_middle + w[0] * 0.5 * BT_PI;

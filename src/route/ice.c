@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Areas of polygons in the cells of a raster, and loads; route/ice.h.
 //
-// Area. By Green's theorem the area of a polygon in a cell is a sum over its edges. What an edge piece within a row,
-// of height dy at the mean distance f from the left of its cell, adds to the area on its right is dy (1 − f) in that
-// cell and dy in all cells to the right of it: two numbers, and one running sum along the row at the end for all
-// polygons together. Exact to rounding for any simple polygon. Rejected: clipping polygon by polygon and cell by
-// cell, the same areas at ten times the work.
-// Whole floes. The momentum of an oblique collision falls with the square of the offset. Its inverse Abel transform is
-// a hemisphere over the disc of radius (D + W)/2: one raster, whose integral along a path counts each floe by its
-// offset, whatever the heading. For floes that are not round the ellipse of their second moments is taken, assumed.
-// Rejected: D/W times the area in the swath. It makes too little of a large floe that the berg grazes.
-// Compaction is that of the ice about the berg, not in its swath: floes that are met push others. A way between floes
-// saves none of it, and it makes detours dear in dense ice. In 128 tows along any ways through ice of 40 and 50 % more
-// than half of the work did not depend on the floes near the path. The averages reach one width and one mean floe to
-// all sides, assumed.
+// Area. By Green's theorem the area of a polygon in a cell is a sum over its edges. A piece of an edge within a row, of
+// height dy at the mean distance f from the left side of its cell, adds dy (1 − f) to that cell and dy to all cells to
+// the right of it: two numbers, and one running sum along the row at the end for all polygons together. Exact to
+// rounding for any simple polygon. Rejected: clipping each polygon to each cell, which gives the same areas at ten
+// times the work.
+// Whole floes. The momentum of an oblique collision falls with the square of the offset. The inverse Abel transform of
+// that is a hemisphere over the disc of radius (D + W)/2: the integral of this one raster along a path counts each floe
+// by its offset, whatever the heading. A floe that is not round is replaced by the ellipse of its second moments,
+// assumed. Rejected: D/W times the area in the swath, which underestimates a large floe that the berg grazes.
+// Compaction depends on the ice around the berg, not in its swath: floes that are met push others. A path between floes
+// avoids none of it, and it makes detours expensive in dense ice. In 128 tows along arbitrary paths through ice of 40
+// and 50 % more than half of the work did not depend on the floes near the path. The averages reach one width and one
+// mean floe to each side, assumed.
 #include "route/ice.h"
 
 #include "base/elementary.h"
@@ -22,10 +22,10 @@
 #include <math.h>
 #include <stdlib.h>
 
-/// Ice packed so densely that the front would run away counts as this many times f1; assumed.
+/// Limit of the factor on f1 in ice so dense that the front would run away; assumed.
 #define MOST_COMPACTION 10.0
 
-/// A piece of an edge within one row, 0 <= x <= nx.
+/// Add a piece of an edge within one row, 0 <= x <= nx.
 static void add_piece(double *row, int nx, double xa, double xb, double dy)
 {
     const double low = bt_min(xa, xb), high = bt_max(xa, xb);
@@ -45,8 +45,7 @@ static void add_piece(double *row, int nx, double xa, double xb, double dy)
     }
 }
 
-/// The same for any x: what lies to the left of the raster is moved to its left side, which leaves the same on its
-/// right.
+/// The same for any x: parts to the left of the raster are moved to its left side, which keeps the area on their right.
 static void add_row(double *row, int nx, double xa, double ya, double xb, double yb, double weight)
 {
     const double side[2] = {0, nx};
@@ -68,7 +67,7 @@ static void add_row(double *row, int nx, double xa, double ya, double xb, double
 
 void bt_route_ice_add(double *sums, int nx, int ny, int64_t n, const double *v, double weight)
 {
-    if (bt_outline_area2((int)n, v) > 0) weight = -weight; // anticlockwise: what is on the right of a fall is inside
+    if (bt_outline_area2((int)n, v) > 0) weight = -weight; // anticlockwise: the inside is right of a falling edge
     for (int64_t e = 0; e < n; e++) {
         const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0);
         const double low = bt_max(bt_min(p[1], q[1]), 0), high = bt_min(bt_max(p[1], q[1]), ny);
@@ -92,7 +91,7 @@ void bt_route_ice_sum(double *sums, int nx, int ny)
     }
 }
 
-/// Averages over squares of 2 half + 1 cells of what `sums` holds, of the part that is known; to `mean`.
+/// Average `sums`, where known, over squares of 2 half + 1 cells; result in `mean`.
 static void average(const double *sums, const double *known, int nx, int ny, int half, float *mean)
 {
     const int64_t wide = nx + 1;
@@ -132,8 +131,8 @@ static double weight_of(int field, const bt_route_task *task, int64_t floe)
     }
 }
 
-/// Adds to sums [ny][nx + 2], kg/m, what a floe adds to BT_ICE_FLOES: n points v [n][2] in cells, of `mass` kg/m²; w:
-/// width of the berg in cells.
+/// Add the share of a floe in BT_ICE_FLOES to sums [ny][nx + 2], kg/m. The floe has n points v [n][2], in cells, and
+/// `mass` kg/m²; w: width of the berg in cells.
 static void add_floe(const bt_route_ice *ice, double w, double mass, int64_t n, const double *v, double *sums)
 {
     double area = 0, mx = 0, my = 0, xx = 0, xy = 0, yy = 0; // about the first point
@@ -169,7 +168,7 @@ static void into_cells(const bt_route_ice *ice, int64_t n, const double *v, doub
     for (int64_t k = 0; k < n; k++) bt_route_ice_place(ice, v[2 * k], v[2 * k + 1], out + 2 * k);
 }
 
-/// Mean diameter of the floes by area, m.
+/// Area-weighted mean diameter of the floes, m.
 static double mean_size(const bt_route_task *task)
 {
     double area = 0, sum = 0;
@@ -204,7 +203,7 @@ void bt_route_ice_make(bt_route_ice *ice, const bt_route_task *task)
         ice->field[f] = bt_alloc(cells, sizeof(float));
         ice->mean[f] = bt_alloc(cells, sizeof(float));
         for (int j = 0; j < ny; j++)
-            for (int i = 0; i < nx; i++) { // rounding leaves 1e-13 where there is none
+            for (int i = 0; i < nx; i++) { // rounding leaves 1e-13 where there is no ice
                 const double x = sums[(int64_t)j * (nx + 2) + i];
                 ice->field[f][(int64_t)j * nx + i] = x > 1e-9 ? (float)x : 0;
             }

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
 // A lattice of poses, its moves, and A* over them; route/lattice.h.
 //
-// Poses. Places are whole multiples of the spacing; headings are those of vectors of small whole numbers, 16 or 32
-// nearly even ones, so that a straight move ends on a place.
-// Moves from a heading u0: straight on; and turns to u1 on an arc of radius R by one or two headings, of 2 R by one, as
+// Poses. Places are integer multiples of the spacing; headings are those of vectors of small integers, 16 or 32 nearly
+// evenly spaced, so that a straight move ends on a place.
+// Moves from a heading u0: straight ahead; or a turn to u1, by one or two headings on radius R, by one on 2 R:
 //     straight a − T, arc, straight b − T,   T = R tan(δ/2),   a u0 + b u1 = whole multiples of the spacing, a, b >= T
-// of which the shortest is taken: a move is a corner of a path through way-points, and the path that is found is one.
-// With R = 0 the shortest is a turn on the spot.
-// Cost. Slices of the swath, as long as the distance q <= W/4 of their places, are added up first, at every place for
-// each heading; the load of a move is the sum of such slices along it, the nearest in place and heading, the same list
-// everywhere. What is found is priced again by its own swath (swath.c). Rejected: a list of all cells under a move,
-// without the error of half of q and of half a step of headings, but thirty times as long.
-// Order. Costs are rounded up to whole multiples of 1e-5 of the least cost of a spacing, and the bound (least cost of a
-// metre times the distance to the goal, straight or by the squares that the berg's centre may be in, whichever is
-// longer) down: sums do not depend on their order, and of equal costs the lower index goes first. A goal that no chain
-// of squares leads to is given up at once.
+// of which the shortest is taken. So a turn is a corner of a path through way-points, and the path found is such a
+// path. With R = 0 the shortest is a turn on the spot.
+// Cost. Slices of the swath are summed first: at points q <= W/4 apart, each slice q long, for each heading. The load
+// of a move is the sum of the slices along it, nearest in place and heading; their list is the same everywhere. The
+// path found is priced again by its own swath (swath.c). Rejected: a list of all cells under a move, which avoids
+// errors of half of q and half a step of heading, but is thirty times as long.
+// Order. Costs are rounded up to integer multiples of 1e-5 of the least cost of a spacing, so sums do not depend on
+// their order, and of equal costs the lower index goes first. The bound is rounded down: the least cost of a metre
+// times the distance to the goal, straight or by squares that the centre of the berg may enter, whichever is longer. A
+// goal that no chain of squares reaches is given up at once.
 #include "route/lattice.h"
 
 #include "base/elementary.h"
@@ -24,20 +24,20 @@
 #include <stdlib.h>
 
 enum { MOST_HEADINGS = 32, MOST_MOVES = 7 };
-#define UNITS 1e5 ///< of cost in the least cost of a spacing
-#define THERE 0.75 ///< spacings from the goal
+#define UNITS 1e5 ///< units of cost in the least cost of a spacing
+#define THERE 0.75 ///< largest distance of a goal node from the goal, spacings
 #define UNREACHED INT32_MAX
 
 typedef struct move {
     int dx, dy, heading;     ///< places; heading after it
     double length, turned;   ///< m; rad
-    double corner;           ///< a, m; the corner of a turn is so far ahead
+    double corner;           ///< a, m: distance to the corner of a turn
     int n_legs;
     bt_leg leg[3];           ///< in the frame of the lattice, from the origin
     double mid[2];           ///< the place halfway, m
     double water[BT_ROUTE_SPEEDS]; ///< mean water drag, N
     int n_slices;
-    int64_t *slice;          ///< [n_slices] from that of heading 0 at the node
+    int64_t *slice;          ///< [n_slices] index relative to heading 0 at the node
     double *along;           ///< [n_slices] m
 } move;
 
@@ -50,8 +50,8 @@ struct bt_lattice {
     double unit[MOST_HEADINGS][2];
     move of[MOST_HEADINGS][MOST_MOVES];
     int n_moves[MOST_HEADINGS];
-    double per_step;         ///< least length of a move over the steps that it is made of, m (steps_of)
-    int fine, pad, wide, high; ///< q = h/fine; places of slices beside the lattice; of slices along x and y
+    double per_step;         ///< least length of a move / its steps, m (steps_of)
+    int fine, pad, wide, high; ///< q = h/fine; slices beside the lattice; slices along x and y
     float *across;           ///< [high][wide][n_headings/2][n_speeds] mean load of a slice, N: one cache line a place
 };
 
@@ -90,7 +90,7 @@ static void add_leg(move *step, double length, double turn)
     step->length += length;
 }
 
-/// A turn from heading k to k + by on an arc of this radius.
+/// Make the turn from heading k to k + by on an arc of this radius.
 static void make_turn(const bt_lattice *lattice, int k, int by, double radius, move *step)
 {
     const int to = (k + by + lattice->n_headings) % lattice->n_headings;
@@ -142,7 +142,7 @@ static void make_slices(bt_lattice *lattice)
         bt_alloc((size_t)lattice->wide * (size_t)lattice->high * (size_t)(lattice->n_headings / 2) * (size_t)n_speeds,
                                sizeof *lattice->across);
     double(*to)[2] = bt_alloc((size_t)n, sizeof *to); // points of a slice, in cells
-    const int middle = n_across % 2 ? 1 : 2; // of each row of points, beside the path
+    const int middle = n_across % 2 ? 1 : 2; // points nearest to the path in each row
     for (int k = 0; k < lattice->n_headings / 2; k++) {
         const double *u = lattice->unit[k];
         for (int b = 0; b < n; b++) {
@@ -179,7 +179,7 @@ static int nearest_heading(const bt_lattice *lattice, const double t[2])
     return best % (lattice->n_headings / 2);
 }
 
-/// Slices of a move, and what else follows from its legs.
+/// Set the slices of a move, its middle and its water drag.
 static void make_mask(const bt_lattice *lattice, move *step)
 {
     const bt_planner *planner = lattice->p;
@@ -217,12 +217,12 @@ static void make_mask(const bt_lattice *lattice, move *step)
     }
 }
 
-/// A move cut into steps, each from the square about a place to one of the eight squares about that one: how many. Few,
-/// not the fewest.
+/// Number of steps into which a move is cut, each from the square around a place to one of the eight squares around
+/// that. Few, not always the fewest.
 static int steps_of(const bt_lattice *lattice, const move *step)
 {
     enum { FINE = 32 };
-    int steps = 0, x0 = 0, y0 = 0, x1 = 0, y1 = 0; // squares: of the last step, and the last one beside it
+    int steps = 0, x0 = 0, y0 = 0, x1 = 0, y1 = 0; // squares: of the last step, and the latest beside it
     for (int g = 0; g < step->n_legs; g++) {
         const int n = (int)ceil(step->leg[g].length / lattice->h * FINE);
         for (int a = 1; a <= n; a++) {
@@ -296,7 +296,7 @@ double bt_lattice_spacing(const bt_lattice *lattice)
     return lattice->h;
 }
 
-// --- the open list: a heap of four children each, for the sake of the cache -----------------------------------------
+// --- the open list: a 4-ary heap, for the sake of the cache ---------------------------------------------------------
 
 typedef struct entry {
     int64_t bound;
@@ -346,8 +346,8 @@ typedef struct search {
     double goal[4];       ///< in the frame of the lattice, m
     int64_t *cost;        ///< [states]
     int32_t *from;
-    float *time;          ///< s; NULL = nothing moves
-    int32_t *steps;       ///< [places] to the goal round what is kept out of, at least; NULL = not known
+    float *time;          ///< s; NULL = no drift
+    int32_t *steps;       ///< [places] least number to the goal around no-go polygons; NULL = unknown
     uint8_t *by, *done;
     heap open;
 } search;
@@ -361,12 +361,11 @@ static double to_goal(const search *state, int i, int j)
     return bt_hypot(x - f * ex, y - f * ey);
 }
 
-/// Steps from square to square, of those that the berg's centre may be in, from each place to the nearest at the goal:
-/// breadth first from there. No move makes more of them than its length / per_step, and from place to place of a move
-/// their number falls by no more than it makes: the bound that follows is admissible and consistent. Where polygons
-/// move in the frame of the ice there is none; nor where a hull smaller than a square may leave the squares of the
-/// lattice.
-/// Of states that are looked at it saves a tenth to a quarter in mazes, and all where no chain leads to the goal.
+/// Count the steps from each place to the goal, breadth first from there, through neighbouring squares that the centre
+/// of the berg may enter. A move makes at most length / per_step steps, and along it the count falls by at most that
+/// number, so the bound that follows is admissible and consistent. There is none if polygons move in the frame of the
+/// ice, or if a hull smaller than a square may leave the squares of the lattice. It saves a tenth to a quarter of the
+/// states visited in mazes, and all of them if no chain leads to the goal.
 static void count_steps(search *state)
 {
     const bt_lattice *lattice = state->l;
@@ -375,7 +374,7 @@ static void count_steps(search *state)
     const int32_t n = (int32_t)(lattice->nx * lattice->ny);
     int32_t *queue = bt_alloc((size_t)n, sizeof *queue), head = 0, tail = 0;
     state->steps = bt_alloc((size_t)n, sizeof *state->steps);
-    // of the middle of a square of which a corner may be free
+    // distance of the middle of a square that may have a free corner
     const double least = planner->no_go.need - 0.708 * lattice->h;
     for (int32_t k = 0; k < n; k++) {
         const int i = lattice->i0 + k % lattice->nx, j = lattice->j0 + k / lattice->nx;
@@ -401,7 +400,7 @@ static void count_steps(search *state)
     free(queue);
 }
 
-/// Of the cost from a place to the goal, in units; −1: no way leads there.
+/// Lower bound of the cost from a place to the goal, in units; −1: no way leads there.
 static int64_t bound_of(const search *state, int i, int j)
 {
     const bt_lattice *lattice = state->l;
@@ -426,7 +425,7 @@ static double least_cost(const bt_planner *planner, int objective)
             bt_sincos(2 * BT_PI * k / DIRECTIONS, &sine, &cosine);
             least = bt_min(least, bt_swath_water(planner, cosine, sine, task->speed[s]));
         }
-    return 0.999 * bt_max(1e-3, task->weight[0]) * least; // between the directions it is less by 3e-4 at most
+    return 0.999 * bt_max(1e-3, task->weight[0]) * least; // between the directions it is lower by 3e-4 at most
 }
 
 static bool is_goal(const search *state, int i, int j, int k)
@@ -513,7 +512,7 @@ static void look(search *state, int32_t from, int i, int j, int k)
         if (state->done[to]) continue;
         const int64_t so_far = state->cost[from];
         const bool peak = state->objective == BT_ROUTE_PEAK;
-        // what it costs at least
+        // least cost
         if (state->cost[to] <= so_far + (peak ? 0 : (int64_t)(step->length * state->least / state->unit))) continue;
         const int64_t bound = bound_of(state, x, y);
         if (bound < 0) continue;

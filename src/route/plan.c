@@ -9,18 +9,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_STATES 1.5e6 ///< of a lattice whose spacing is chosen
-#define MOST_CELLS 3e6  ///< times speeds, of a raster whose cells are chosen
-#define REPELS 1.3      ///< factor of the cost near routes that have been found; then its square, and so on
+#define MOST_STATES 1.5e6 ///< of a lattice with the spacing chosen here
+#define MOST_CELLS 3e6  ///< times speeds, of a raster with the cells chosen here
+#define REPELS 1.3      ///< factor of the cost near routes already found; then its square, and so on
 enum { TRIES = 4, ARRIVALS = 40, ROUNDS = 4, SWEEPS = 12 };
 
-// --- a way made cheaper ----------------------------------------------------------------------------------------------
+// --- shortening ------------------------------------------------------------------------------------------------------
 
 // Line-of-sight shortening and a compass search over the corners of a path.
 //
-// Each step is taken when the cost of the whole path, its swath and its constraints, falls. Rejected: a spline by a
-// solver of nonlinear programmes, for the cost of ice has no gradient that leads anywhere at the size of floes; and
-// shortening by sight alone, which cuts through the ice that the search went round.
+// A step is accepted if the cost of the whole path, with its swath and constraints, falls. Rejected: a spline from a
+// nonlinear programming solver, because the cost of ice has no useful gradient at the scale of floes; and shortening by
+// line of sight alone, which cuts through the ice that the search avoided.
 
 typedef struct {
     int n, cap;
@@ -28,8 +28,8 @@ typedef struct {
     bt_path_cost cost;
 } bt_way;
 
-/// Legs of a way from the start of the task, with corners of its radius; false where they have no room. The path is
-/// the caller's to free.
+/// Make the legs of a way from the start of the task, with corners of its radius; false if they do not fit. The caller
+/// frees the path.
 static bool way_path(const bt_planner *planner, const bt_way *way, bt_path *path)
 {
     char why[200];
@@ -57,7 +57,7 @@ static void way_copy(bt_way *to, const bt_way *from)
     to->cost = from->cost;
 }
 
-/// The nearest place of the goal, of the task at the time t, to (x, y), in the frame of the ice.
+/// The point of the goal nearest to (x, y) at the time t, in the frame of the ice.
 static void way_goal(const bt_planner *planner, double t, double x, double y, double goal[2])
 {
     const double *g = planner->task.goal, *u = planner->task.drift;
@@ -69,7 +69,7 @@ static void way_goal(const bt_planner *planner, double t, double x, double y, do
     goal[0] += f * ex, goal[1] += f * ey;
 }
 
-/// The end of a way put where the goal is at the time of arrival.
+/// Put the end of a way where the goal is at the time of arrival.
 static void end_at_goal(const bt_planner *planner, bt_way *way)
 {
     enum { STEPS = 40 };
@@ -83,7 +83,7 @@ static void end_at_goal(const bt_planner *planner, bt_way *way)
     }
 }
 
-/// Takes `tried` when it is better, or has fewer corners and is not worse.
+/// Accept `tried` if it is better, or has fewer corners and is no worse.
 static bool take(const bt_planner *planner, bt_way *way, bt_way *tried)
 {
     way_price(planner, tried);
@@ -93,7 +93,7 @@ static bool take(const bt_planner *planner, bt_way *way, bt_way *tried)
     return better;
 }
 
-/// Way-points before this one stay.
+/// First free way-point; one before it is tied to the given heading at the start.
 static int first_free(const bt_planner *planner)
 {
     return isnan(planner->task.start_heading) ? 0 : 1;
@@ -113,7 +113,7 @@ static bool leave_out(const bt_planner *planner, bt_way *way, bt_way *tried)
     return any;
 }
 
-/// Steps of the way-point k, to eight sides; the first stays on a given heading, and the end on the goal's line.
+/// Try steps of way-point k in eight directions; the first stays on a given heading, and the end on the goal's line.
 static bool move_one(const bt_planner *planner, bt_way *way, bt_way *tried, int k, double step)
 {
     const double *g = planner->task.goal, ex = g[2] - g[0], ey = g[3] - g[1], line = bt_hypot(ex, ey);
@@ -132,7 +132,7 @@ static bool move_one(const bt_planner *planner, bt_way *way, bt_way *tried, int 
             at[0] += along * planner->ice.ax - aside * planner->ice.ay, at[1] += along * planner->ice.ay +
                 aside * planner->ice.ax;
         }
-        if (take(planner, way, tried)) any = true, side = -1; // once more in the same sense
+        if (take(planner, way, tried)) any = true, side = -1; // start again with the first direction
     }
     return any;
 }
@@ -150,7 +150,7 @@ static bool move_all(const bt_planner *planner, bt_way *way, bt_way *tried)
     return any;
 }
 
-/// A corner in the middle of a long leg, where it finds a better place than on it.
+/// Insert a corner in the middle of a long leg, if it finds a better place off the leg.
 static bool put_in(const bt_planner *planner, bt_way *way, bt_way *tried)
 {
     bool any = false;
@@ -175,8 +175,8 @@ static bool put_in(const bt_planner *planner, bt_way *way, bt_way *tried)
     return any;
 }
 
-/// Lower the cost of a way until no step does: corners left out, moved and put in. Its end stays at the goal, which is
-/// where it is when the berg arrives.
+/// Lower the cost of a way by removing, moving and inserting corners, until no step helps. Its end stays where the goal
+/// is at the time of arrival.
 static void way_shorten(const bt_planner *planner, bt_way *way)
 {
     bt_way tried = {0};
@@ -193,7 +193,7 @@ static void way_shorten(const bt_planner *planner, bt_way *way)
 
 // --- routes ----------------------------------------------------------------------------------------------------------
 
-/// A route of legs, and the way-points that make them.
+/// Store a route of legs, and the way-points that make them.
 static void keep(const bt_planner *planner, bt_route *route, int n, const bt_leg *leg, int64_t n_corners,
                  double (*corner)[2])
 {
@@ -214,12 +214,12 @@ static void keep(const bt_planner *planner, bt_route *route, int n, const bt_leg
 static void keep_way(const bt_planner *planner, bt_route *route, const bt_way *way)
 {
     bt_path path;
-    if (!way_path(planner, way, &path)) return; // not those that the planner makes
+    if (!way_path(planner, way, &path)) return; // never for a way of the planner
     keep(planner, route, path.n - 1, path.leg, way->n, way->point);
     bt_path_free(&path);
 }
 
-/// Way-points whose corners are the arcs of legs; arcs longer than a right angle are those of several.
+/// Way-points whose corners are the arcs of legs; an arc longer than a right angle is that of several.
 static int64_t corners_of(int n, const bt_leg *leg, double (**corner)[2])
 {
     int64_t made = 0, cap = 2;
@@ -281,10 +281,10 @@ static void repel(bt_planner *planner, const bt_route *route)
     }
 }
 
-// --- what a search finds made into a route ---------------------------------------------------------------------------
+// --- from the result of a search to a route --------------------------------------------------------------------------
 
-/// Legs to a node of what was found and a Dubins path from there to the goal, with the heading that is asked for or
-/// any: the cheapest of all nodes. The goal is where it is at the time of arrival. False when none is allowed.
+/// Follow the result of a search to one of its nodes, then a Dubins path to the goal, with the given heading or any;
+/// take the cheapest of all. The goal is where it is at the time of arrival. False if none is allowed.
 static bool with_tail(const bt_planner *planner, const bt_lattice_way *way, double arrival, int tries, bt_route *route)
 {
     const bt_route_task *task = &planner->task;
@@ -337,7 +337,7 @@ static bool with_tail(const bt_planner *planner, const bt_lattice_way *way, doub
     return allowed;
 }
 
-/// What was found, shortened; the straight line made cheaper, where that is better and direct is set.
+/// Shorten the result of a search; if `direct` is set, also shorten the straight line, and take that if better.
 static bool into_route(const bt_planner *planner, const bt_lattice_way *way, bool direct, bt_route *route)
 {
     const bt_route_task *task = &planner->task;
@@ -346,12 +346,12 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
     bt_way w = {0}, straight = {0};
     w.point = bt_alloc((size_t)(w.cap = way->n_points + 16), sizeof *w.point);
     const double *last = task->start;
-    for (int k = 0; k < way->n_points; k++) { // no two on one place
+    for (int k = 0; k < way->n_points; k++) { // skip coincident points
         if (!(bt_hypot(way->point[k][0] - last[0], way->point[k][1] - last[1]) > 1e-9 * task->width)) continue;
         w.point[w.n][0] = way->point[k][0], w.point[w.n][1] = way->point[k][1];
         last = w.point[w.n++];
     }
-    if (w.n == 0) { // the search has ended where it began, less than a spacing from the goal
+    if (w.n == 0) { // the search ended where it began, less than a spacing from the goal
         w.point[0][0] = task->start[0], w.point[0][1] = task->start[1];
         w.n = 1;
     }
@@ -412,7 +412,7 @@ static bool straight_line(const bt_planner *planner, bt_route *route)
     return there;
 }
 
-/// Least force over the speeds on a berg in a square of W about a place, N.
+/// Least force, over the speeds, on a berg in a square of side W around a place, N.
 static double force_at(const bt_planner *planner, const double at[2])
 {
     const double w = planner->task.width;
@@ -427,7 +427,7 @@ static double force_at(const bt_planner *planner, const double at[2])
     return least;
 }
 
-/// What is wrong with the start (end 0) or the goal (end 1) at this time.
+/// Fault of the start (end 0) or the goal (end 1) at this time.
 static int fault_of_end(const bt_planner *planner, int end, const double at[2], double time, double *force)
 {
     const double *u = planner->task.drift, x = at[0] + u[0] * time, y = at[1] + u[1] * time,
@@ -462,15 +462,15 @@ static void end(bt_planner *planner)
     free(planner->kept);
 }
 
-/// The frame: along the heading at the start where that is given, or else towards the goal, of which a point is on the
-/// lattice; and spacing and cells.
+/// Make the lattice: x along the heading at the start if given, otherwise towards the goal, one point of which is then
+/// a place; choose spacing and cells if not given.
 static bt_lattice *lattice_of(bt_planner *planner)
 {
     const bt_route_task *task = &planner->task;
     const double area = (task->extent[2] - task->extent[0]) * (task->extent[3] - task->extent[1]);
     double goal[2], ax = 1, ay = 0, h = task->spacing, cell = task->cell;
     double x = 0, y = 0, far = 0;
-    for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice when the fastest speed has led there
+    for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice on arrival at the fastest speed
         way_goal(planner, far / task->speed[0], task->start[0], task->start[1], goal);
         x = goal[0] - task->start[0], y = goal[1] - task->start[1], far = bt_hypot(x, y);
     }
@@ -521,7 +521,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
             }
             const int objective = t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective;
             got = got && bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
-            if (!got && !isnan(t->goal_heading)) { // a node of that heading may lie where no move ends: the tail turns
+            if (!got && !isnan(t->goal_heading)) { // no move may end at a node with that heading: the tail turns
                 const double heading = t->goal_heading;
                 planner.task.goal_heading = NAN;
                 got = bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
@@ -555,7 +555,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     }
     if (!plan->status && !found_any) plan->status = BT_ROUTE_NONE;
     else if (!plan->status && plan->n < 1 + t->routes) plan->status = BT_ROUTE_FEWER;
-    for (int a = 2; a < plan->n; a++) // the planned ones by cost, and of equal ones the first found first
+    for (int a = 2; a < plan->n; a++) // sort the planned ones by cost, of equal ones the first found first
         for (int b = a; b > 1 && plan->route[b].cost < plan->route[b - 1].cost; b--) {
             const bt_route swap = plan->route[b];
             plan->route[b] = plan->route[b - 1], plan->route[b - 1] = swap;

@@ -11,14 +11,14 @@
 
 // --- distances to no-go polygons, by buckets of their edges ----------------------------------------------------------
 
-#define FINE 1e-3 ///< of what the hull needs
+#define FINE 1e-3 ///< finest length / no_go.need
 
 static int clamped(double x, int n)
 {
     return x < 0 ? 0 : x >= n ? n - 1 : (int)x;
 }
 
-/// Marks the buckets within `far` of edge k: counts them in first[b + 1], or lists the edge at first[b].
+/// For each bucket b within `far` of edge k: count the edge in first[b + 1], or list it at next[b].
 static void spread(bt_no_go *no_go, int64_t k, int64_t *next)
 {
     const double *p = no_go->edge[2 * k], *q = no_go->edge[2 * k + 1], s = 1 / no_go->size;
@@ -94,7 +94,7 @@ bool bt_no_go_inside(const bt_no_go *no_go, double x, double y)
 {
     const bt_route_task *task = no_go->task;
     int64_t k = 0;
-    for (int64_t i = 0; i < task->n_no_go; i++) { // each polygon by itself: two that overlap leave no free water
+    for (int64_t i = 0; i < task->n_no_go; i++) { // each polygon by itself: overlaps of two are not free
         bool inside = false;
         for (int64_t m = task->no_go_first[i]; m < task->no_go_first[i + 1]; m++, k++) {
             const double *p = no_go->edge[2 * k], *q = no_go->edge[2 * k + 1];
@@ -128,7 +128,7 @@ static int faults_of(const bt_no_go *no_go, const bt_leg *leg, double s0, double
     int found = 0, open = 0;
     if (asked & BT_ROUTE_OUTSIDE) {
         double d = bt_no_go_margin(no_go, at[0], at[1]);
-        if (leg->turn == 0) { // the extent is convex: a straight leg has both ends in it, or is not in it
+        if (leg->turn == 0) { // the extent is convex: a straight leg lies in it if both ends do
             for (int end = 0; end < 2; end++) {
                 bt_leg_at(leg, end ? s1 : s0, at, tangent);
                 d = bt_min(d, bt_no_go_margin(no_go, at[0], at[1]));
@@ -158,7 +158,7 @@ int bt_no_go_faults(const bt_no_go *no_go, const bt_leg *leg, double length, dou
 
 // --- loads and areas along a path ------------------------------------------------------------------------------------
 
-enum { ACROSS = 64, CELLS = 4 * (1 + ACROSS) }; // points of a slice, at most; cells about them
+enum { ACROSS = 64, CELLS = 4 * (1 + ACROSS) }; // most points of a slice; cells around them
 
 double bt_swath_water(const bt_planner *planner, double tx, double ty, double v)
 {
@@ -166,10 +166,10 @@ double bt_swath_water(const bt_planner *planner, double tx, double ty, double v)
     return bt_max(d * bt_hypot(x, y) * (x * tx + y * ty), 1e-3 * d * v * v);
 }
 
-/// A slice of the swath, ds long, whose middle is s m along a leg: cells, and the areas that they stand for, m²; the
-/// first *middle of them are those about its centre, and stand for lengths of the path, m. Between the middles of cells
-/// it is linear: the edge of the swath may lie anywhere in a cell. On the inner side of a turn sharper than W/2 a slice
-/// ends at its centre. Returns the number of cells.
+/// A slice of the swath, ds long, with its middle s m along a leg: its cells and the areas they represent, m². The
+/// first *middle cells surround its centre, and represent lengths of the path, m. Values are linear between the centres
+/// of cells, as the edge of the swath may lie anywhere in a cell. Inside a turn of radius below W/2 a slice ends at the
+/// centre of the turn. Returns the number of cells.
 static int slice(const bt_planner *planner, const bt_leg *leg, double s, double ds, int64_t cell[CELLS],
                  double area[CELLS], int *middle)
 {
@@ -238,7 +238,7 @@ bt_stretch_cost bt_swath_choose(const bt_planner *planner, double length, const 
     return best;
 }
 
-/// Stretches of a leg: none longer than 2 W.
+/// Number of stretches of a leg, each at most 2 W long.
 static int64_t parts_of(const bt_planner *planner, const bt_leg *leg)
 {
     return leg->length > 0 ? (int64_t)ceil(leg->length / (2 * planner->task.width) - 1e-9) : 0;
@@ -260,7 +260,7 @@ static bool is_near(const bt_planner *planner, double x, double y)
            planner->near[(int64_t)(int)at[1] * ice->nx + (int)at[0]];
 }
 
-/// The stretches of a leg that begins at the time t.
+/// Cost of a leg that begins at the time t; out, or NULL, takes its stretches.
 static bt_path_cost leg_cost(const bt_planner *planner, const bt_leg *leg, double t, bt_route_stretch *out)
 {
     bt_path_cost cost = {0};
@@ -294,8 +294,8 @@ static bt_path_cost leg_cost(const bt_planner *planner, const bt_leg *leg, doubl
     return cost;
 }
 
-/// What a leg costs, kept: a step of the shortening leaves most legs as they are. Where no-go polygons move in the
-/// frame of the ice nothing is kept.
+/// Cached cost of a leg: a step of the shortening leaves most legs unchanged. If no-go polygons move in the frame of
+/// the ice, nothing is cached.
 typedef struct bt_kept_leg {
     double x, y, tx, ty, length, turn, penalty;
     bt_path_cost cost;
@@ -360,9 +360,9 @@ bool bt_swath_better(const bt_path_cost *a, const bt_path_cost *b)
     return a->second < b->second * (1 - 1e-9);
 }
 
-/// Area of a polygon of n points within the convex one of m, anticlockwise, by cutting it at each of its edges
-/// [Sutherland & Hodgman 1974]. Of a polygon that is not convex it leaves seams, whose areas cancel. v, w: [n + m]
-/// points to work on.
+/// Area of a polygon of n points within a convex, anticlockwise one of m points, by clipping at each edge of the latter
+/// [Sutherland & Hodgman 1974]. Clipping a polygon that is not convex leaves seams, whose areas cancel. w: two work
+/// arrays of 2^m n points.
 static double shared_area(int64_t n, const double *v, int m, const double *by, double *w[2])
 {
     int now = 0;
@@ -388,14 +388,14 @@ static double shared_area(int64_t n, const double *v, int m, const double *by, d
         n = kept;
         now = 1 - now;
     }
-    double twice = 0; // about the first point: coordinates are large beside floes
+    double twice = 0; // about the first point: coordinates are large compared with floes
     const double *o = w[now];
     for (int64_t k = 1; k + 1 < n; k++)
         twice += (o[2 * k] - o[0]) * (o[2 * k + 3] - o[1]) - (o[2 * k + 1] - o[1]) * (o[2 * k + 2] - o[0]);
     return 0.5 * fabs(twice);
 }
 
-/// Ice in the swath: floes clipped to the slices between the ends of stretches, arcs in slices of 3°.
+/// Ice in the swath: clip the floes to the stretches, arcs in slices of at most 3°.
 static void clip_floes(const bt_planner *planner, bt_route *route)
 {
     const bt_route_task *task = &planner->task;
@@ -404,7 +404,7 @@ static void clip_floes(const bt_planner *planner, bt_route *route)
         const int64_t n = task->floe_first[i + 1] - task->floe_first[i];
         most = n > most ? n : most;
     }
-    // cutting a polygon that is not convex by one line at most doubles its points
+    // clipping a polygon that is not convex by one line at most doubles its points
     double *w[2] = {bt_alloc((size_t)(16 * most + 64), 2 * sizeof(double)),
                     bt_alloc((size_t)(16 * most + 64), 2 * sizeof(double))};
     double *box = bt_alloc((size_t)task->n_floes + 1, 4 * sizeof *box);

@@ -57,7 +57,7 @@ static const double COMPACT = 0.1;   // of the sum of the second moments: if bot
 /// Quantities of a floe's outline that do not depend on loads.
 typedef struct form {
     double area, polar, radius, inradius;
-    double xx, xy, yy;               ///< second moments, m4
+    double xx, xy, yy;               ///< second moments, m⁴
 } form;
 
 static form form_of(const bt_split_floe *floe)

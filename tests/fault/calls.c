@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Preloaded into the program by tests: the n-th call of the system on files of one folder fails, or each is logged.
+// Preloaded into the program by tests: the n-th system call on files of one folder fails, or each is logged.
 //
 //     BT_CALLS_UNDER=FOLDER   only calls on paths that begin so, or on descriptors of such files, are counted
-//     BT_CALLS_LOG=FILE       a line for each: name, path, second path or bytes, result
-//     BT_CALLS=NAME,NAME      which calls are counted for the fault, e.g. write,pwrite64 (all: every one known here)
+//     BT_CALLS_LOG=FILE       one line per call: name, path, second path or bytes, result
+//     BT_CALLS=NAME,NAME      the calls counted for the fault, e.g. write,pwrite64 (all: every one known here)
 //     BT_CALLS_AT=N           the N-th of them, from 1, meets the fault
 //     BT_CALLS_ON=1           and so does every later one, as on a disk that stays full
 //     BT_CALLS_WITH=FAULT     an errno as a number, or "short": half of the bytes are written
 //     BT_CALLS_SIGNAL=NUMBER  the process gets this signal before that call, which is then made
-//     BT_CALLS_IN=first|job   of a call of `ensemble` only the process that was started, or only those it starts; what
-//                             the others call is logged in FILE.other
+//     BT_CALLS_IN=first|job   with `ensemble`: only in the process that was started, or only in those it starts; calls
+//                             of the others are logged in FILE.other
 //
-// Calls of the system, not functions of the C library: stdio calls write within the library, where a preloaded function
-// of that name is not seen. A filter of seccomp turns each into SIGSYS, and the handler makes the call itself from
-// bt_raw, which the filter lets through by its address. Rejected: strace, whose injection cannot write short, is not
-// on every machine, and costs ten times as much; functions alone, for the reason above.
+// System calls, not functions of the C library: stdio writes from within the library, where a preloaded function of
+// that name is not seen. A seccomp filter turns each call into SIGSYS, and the handler makes the call itself from
+// bt_raw, which the filter recognises by address. Rejected: strace, whose injection has no short writes, which is not
+// on every machine, and which costs ten times as much; functions alone, for the reason above.
 //
-// A filter outlives exec and its handler does not, so that what a filtered process starts would die while it is loaded.
-// So posix_spawn asks a process that was forked before the filter was set, and that makes the new one a child of the
-// first (CLONE_PARENT). It counts as a call, "posix_spawn", whatever the path.
+// A filter survives exec but its handler does not, so a process started by a filtered one would die while loading. So
+// posix_spawn asks a process forked before the filter was set, which makes the new process a child of the first one
+// (CLONE_PARENT). This counts as a call, "posix_spawn", whatever the path.
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -102,7 +102,7 @@ static struct {
     char counted[N_CALLS], spawns;
 } how = {.log = -1};
 static atomic_long count;
-static int spawner = -1; // socket of the process that starts others
+static int spawner = -1; // socket to the process that starts others
 
 /// The path of an argument, "" where there is none.
 static void path_of(int kind, const long *a, char out[MOST])
@@ -121,7 +121,7 @@ static void path_of(int kind, const long *a, char out[MOST])
 
 static long make(int number, const long *a) { return bt_raw(number, a[0], a[1], a[2], a[3], a[4], a[5]); }
 
-/// The call as the fault leaves it. A descriptor is gone after any close, whatever that returns.
+/// Make the call with the fault. A descriptor is gone after any close, whatever that returns.
 static long fail(int k, const long *a)
 {
     if (how.signal) {
@@ -139,7 +139,7 @@ static long fail(int k, const long *a)
     return -how.error;
 }
 
-/// Does the next call meet the fault? counted: it is one of those that are asked for.
+/// Does the next call meet the fault? counted: it is one of the selected calls.
 static int meets(int counted)
 {
     const long n = counted ? atomic_fetch_add(&count, 1) + 1 : 0;
@@ -183,7 +183,7 @@ static void on_call(int number, siginfo_t *info, void *context)
     errno = before;
 }
 
-/// Each call of the table from elsewhere than bt_raw becomes SIGSYS.
+/// Turn each call of the table into SIGSYS, unless made from bt_raw.
 static void filter(void)
 {
     enum { AHEAD = 3 };
@@ -218,7 +218,7 @@ static const char *given(const char *name)
 
 enum { ROOM = 1 << 16, WORDS = 2000 };
 
-/// Words, and an empty one, which is none of a command nor of an environment.
+/// Words, ended by an empty one, which occurs in no command or environment.
 static char *packed(char *at, const char *end, char *const *words)
 {
     for (; *words && at + strlen(*words) + 2 < end; words++) at = stpcpy(at, *words) + 1;
@@ -287,7 +287,7 @@ int posix_spawn(pid_t *pid, const char *path, const posix_spawn_file_actions_t *
 
 __attribute__((constructor)) static void begin(void)
 {
-    // the filter outlives a second start of the program, and its handler does not
+    // the filter survives the second start of the program, and its handler does not
     if (!*given("BERGTOW_STARTED") || !*given("BT_CALLS_UNDER")) return;
     snprintf(how.under, sizeof how.under, "%s", given("BT_CALLS_UNDER"));
     how.n_under = strlen(how.under);

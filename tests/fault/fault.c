@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Preloaded into the program by tests: calls of the system that fail where a test says so.
+// Preloaded into the program by tests: system calls that fail where a test asks for it.
 //
-//     BT_FAULT=NAME     to open or rename a file of this name, without its folder, fails as on a full disk
-//     BT_FAULT_HANGUP=1 a handler of SIGHUP, as UCX has, from the moment the libraries are loaded
+//     BT_FAULT=NAME     opening or renaming a file of this name, without its folder, fails as on a full disk
+//     BT_FAULT_HANGUP=1 a handler of SIGHUP, like that of UCX, is set as soon as the libraries are loaded
 //     BT_FAULT_SIGNAL=1 SIGUSR1 arrives before the constructors of the libraries are done, and at the second start
 #include <dlfcn.h>
 #include <errno.h>

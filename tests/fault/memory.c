@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Preloaded into the program by tests: the n-th time that the program itself asks for memory there is none.
+// Preloaded into the program by tests: the n-th memory request of the program itself fails.
 //
 //     BT_MEMORY_AT=N      the N-th request, from 1, is refused
-//     BT_MEMORY_LOG=FILE  how many there were, at the end
-//     BT_CALLS_IN         as in calls.c: which process is meant
+//     BT_MEMORY_LOG=FILE  receives the number of requests at the end
+//     BT_CALLS_IN         as in calls.c: selects the process
 //
-// Counted are requests from the program's own code, seen by the address they return to. Those of the libraries are
-// theirs: what MPI does without memory is nothing that the program could mend.
+// Only requests from the program's own code count, recognised by their return address. Requests of libraries do not:
+// the program could not mend what MPI does without memory.
 #include <fcntl.h>
 #include <dlfcn.h>
 #include <errno.h>
@@ -24,7 +24,7 @@ void *__libc_calloc(size_t n, size_t size);
 void *__libc_realloc(void *p, size_t size);
 void *__libc_memalign(size_t alignment, size_t size);
 
-static uintptr_t from, to; // the program's code, 0 as long as nothing is counted
+static uintptr_t from, to; // the program's code; 0 while nothing is counted
 static atomic_long count;
 static long refused;
 

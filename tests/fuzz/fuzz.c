@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the harnesses share.
+// Shared by the harnesses.
 #include "fuzz.h"
 
 #include <stdio.h>

@@ -20,13 +20,13 @@ void bt_fuzz_study(const uint8_t *data, size_t n);    ///< study file and its me
 void bt_fuzz_table(const uint8_t *data, size_t n);    ///< CSV table
 void bt_fuzz_outlines(const uint8_t *data, size_t n); ///< GeoJSON; the first byte chooses how it is read
 void bt_fuzz_field(const uint8_t *data, size_t n);    ///< numbers of an HDF5 field file
-/// arrays of a checkpoint, behind the checksum: taken up, three steps
+/// arrays of a checkpoint, past the checksum: resumed, three steps
 void bt_fuzz_checkpoint(const uint8_t *data, size_t n);
 
 /// A case file with overrides: field, world, three steps, everything finite.
 void bt_fuzz_begin_run(const uint8_t *text, size_t n, const char *const *set, int n_set);
 
-/// An input as a file without a place on disk: its path, and a descriptor to close.
+/// An input as a file in memory: its path, and a descriptor to close.
 typedef struct {
     int fd;
     char path[32];
@@ -34,8 +34,8 @@ typedef struct {
 bt_fuzz_file bt_fuzz_open(const uint8_t *data, size_t n);
 void bt_fuzz_close(bt_fuzz_file *f);
 
-/// Abort unless a status and its messages go together: none with BT_OK, at least one otherwise, each a line of
-/// printable text. Clears err.
+/// Abort unless a status and its messages agree: none with BT_OK, at least one otherwise, each a line of printable
+/// text. Clears err.
 void bt_fuzz_reported(bt_status status, bt_errors *err);
 
 /// Abort with the text unless good.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the programs of this folder that run on several ranks make their worlds of: squares of 0.8 m.
+// Worlds for the programs of this folder that run on several ranks: squares of 0.8 m.
 #ifndef BERGTOW_TESTS_SQUARES_H
 #define BERGTOW_TESTS_SQUARES_H
 
