@@ -21,7 +21,7 @@ void bt_on_out_of_memory(void (*report)(const char *message, void *user), void *
 
 void bt_leave_by(void (*by)(int code)) { leave = by; }
 
-// Not by exit: HDF5 closes its files there, and may itself have called what asks for memory.
+// Not exit(): it makes HDF5 close its files, and HDF5 itself may be what asked for the memory.
 static _Noreturn void out_of_memory(size_t n, size_t size)
 {
     char text[160];
@@ -137,8 +137,8 @@ void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
         err->note = bt_realloc(err->note, err->cap, sizeof *err->note);
     }
     char *text = text_of(fmt, args);
-    // Texts of an input stand in messages: what would steer a terminal, or make two lines of one, is shown as a
-    // question mark.
+    // Messages quote texts of an input: control characters, which could steer a terminal or split a line, become
+    // question marks.
     for (char *s = text; *s; s++)
         if ((unsigned char)*s < 0x20 || *s == 0x7F) *s = '?';
     err->note[err->n] = (bt_note){0};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// checksums of files: writing and checking; the format is in checksum.h.
+// Checksums of files: writing and checking; the format is in checksum.h.
 #include "base/checksum.h"
 
 #include <errno.h>
@@ -20,7 +20,7 @@ static const unsigned char hdf5_magic[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1
 static bool read_at(int fd, void *to, size_t bytes, off_t at)
 {
     const ssize_t n = bt_file_get(fd, at, to, bytes);
-    if (n >= 0 && (size_t)n < bytes) errno = EIO; // it has become shorter meanwhile
+    if (n >= 0 && (size_t)n < bytes) errno = EIO; // the file has become shorter in the meantime
     return n == (ssize_t)bytes;
 }
 
@@ -29,7 +29,7 @@ static void print_digest(XXH128_hash_t h, char out[BT_CHECKSUM_DIGEST])
     snprintf(out, BT_CHECKSUM_DIGEST, "%016" PRIx64 "%016" PRIx64, (uint64_t)h.high64, (uint64_t)h.low64);
 }
 
-/// Digest of the first bytes.
+/// Digest of the first `size` bytes.
 static bool digest(int fd, off_t size, char out[BT_CHECKSUM_DIGEST])
 {
     enum { PIECE = 1 << 20 };
@@ -46,7 +46,7 @@ static bool digest(int fd, off_t size, char out[BT_CHECKSUM_DIGEST])
     return good;
 }
 
-/// The checksum that the first bytes ask for.
+/// Form the checksum of the first `size` bytes.
 static bool make(int fd, off_t size, const char *kind, char block[BT_CHECKSUM_BYTES])
 {
     char text[BT_CHECKSUM_DIGEST];
@@ -64,7 +64,7 @@ void bt_checksum_digest_text(const void *bytes, size_t n, char out[BT_CHECKSUM_D
 bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST], int64_t *bytes, bt_errors *err)
 {
     struct stat st;
-    // a pipe must not keep us waiting
+    // non-blocking: to open a pipe must not wait for its other end
     const int fd = bt_file_descriptor(path, O_RDONLY | O_NONBLOCK);
     int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : 0;
     const bool gone = reason == ENOENT || reason == ENXIO, odd = !reason && !S_ISREG(st.st_mode);
@@ -109,8 +109,8 @@ static bool read_ends(int fd, ends *e)
 static bool is_seal(const char *block) { return !strncmp(block, MAGIC, sizeof MAGIC - 1); }
 static bool is_hdf5(const ends *e) { return !memcmp(e->front, hdf5_magic, sizeof hdf5_magic); }
 
-/// Where HDF5's part of a file ends, by its superblock [HDF5 File Format Specification, II.A: addresses of 8 bytes,
-/// least significant first]; −1 where that does not say.
+/// End of HDF5's part of a file, from its superblock [HDF5 File Format Specification, II.A: addresses of 8 bytes, least
+/// significant byte first]; −1 if the superblock does not give it.
 static off_t end_of_hdf5(const ends *e)
 {
     static const struct { int size_of_address, end; } place[] = {{13, 40}, {13, 44}, {9, 28}, {9, 28}};
@@ -122,7 +122,7 @@ static off_t end_of_hdf5(const ends *e)
     return end < (uint64_t)1 << 62 ? (off_t)end : -1;
 }
 
-/// Why a file is not as it should be, in words.
+/// Report what is wrong with a file.
 static bt_status refuse(const char *path, const char *kind, const ends *e, bt_errors *err)
 {
     const char *seal = is_seal(e->back) ? e->back : NULL;
@@ -173,7 +173,7 @@ bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_e
     return reason ? bt_file_fail(path, "read the file", reason, err) : status;
 }
 
-/// The ends of a regular file; false where it is none, or cannot be read.
+/// Read the ends of a regular file; false if it is not one or cannot be read.
 static bool ends_of(const char *path, ends *e)
 {
     struct stat st;

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The ranks of the program: start, end, agreement, and rows in the order of global ids.
 //
-// Reduction. MPI's own sums of doubles depend on how the ranks are combined, and MPI knows no 128-bit integers. So
-// every number travels as an item of 32 bytes {kind, two words, bad} with one operation for all kinds: items are
-// combined one by one, so that MPI may cut the message anywhere, and sums, maxima and ors of one moment share one
-// message.
+// Reduction. MPI's own sums of doubles depend on how the ranks are combined, and MPI has no 128-bit integers. So every
+// number travels as an item of 32 bytes {kind, two words, bad}, with one operation for all kinds. It combines item by
+// item, so that MPI may cut the message anywhere, and sums, maxima and ors of one moment share a message.
 #include "bergtow/comm.h"
 #include "base/inside.h"
 
@@ -21,7 +20,7 @@
 const bt_comm bt_comm_alone = ALONE;
 static bt_comm world = ALONE;
 static bool running; // between start and end, with MPI
-static bool foreign; // the program has started MPI, and will end it
+static bool foreign; // the calling program has started MPI, and will end it
 static MPI_Datatype item_type;
 static MPI_Op item_op;
 
@@ -42,7 +41,7 @@ static uint64_t as_word(double x)
     return u;
 }
 
-// The larger of two; NaN above all, +0 above −0: the same bits in any order of combination.
+// The larger of two; NaN above all, +0 above −0, so that any order of combination gives the same bits.
 static double larger(double a, double b)
 {
     if (isnan(a) || isnan(b)) return (double)NAN;
@@ -80,7 +79,7 @@ const char *bt_comm_library(char text[MPI_MAX_LIBRARY_VERSION_STRING])
     // "Intel(R) MPI Library 2021.9 for ..."
     text[strcspn(text, ",\n")] = 0;
     char *end = text;
-    for (const char *p = text; *p; p++) // one blank for several
+    for (const char *p = text; *p; p++) // one blank for any white space
         if (!isspace((unsigned char)*p)) *end++ = *p;
         else if (end > text && end[-1] != ' ') *end++ = ' ';
     *end = 0;
@@ -106,7 +105,7 @@ static void on_leaving(int code, void *unused)
     else bt_comm_abort(code);
 }
 static void watch_exits(void) { on_exit(on_leaving, NULL); }
-#else // no other C library tells the code: a rank that leaves without bt_comm_end counts as one that has failed
+#else // other C libraries do not give the code: a rank that exits without bt_comm_end counts as failed
 static void on_leaving(void)
 {
     if (running) bt_comm_abort(BT_ERR_NUMERIC);
@@ -141,7 +140,7 @@ void bt_comm_split_end(bt_comm *part)
 
 static bool start_mpi(int *argc, char ***argv)
 {
-    // Threads that MPI starts leave signals to the main thread: METIS must be able to hold SIGTERM back
+    // Threads that MPI starts must leave signals to the main thread, so that METIS can hold SIGTERM back
     // (partition/cut.h).
     sigset_t block, before;
     sigemptyset(&block);
@@ -155,7 +154,7 @@ static bool start_mpi(int *argc, char ***argv)
     return started;
 }
 
-/// *wanted: is MPI to be started? As BERGTOW_MPI says, otherwise if a launcher has started this process.
+/// *wanted: is MPI to be started? BERGTOW_MPI decides, or else whether a launcher has started this process.
 static bool wants_mpi(const bt_launcher *by, bool *wanted)
 {
     const char *said = getenv("BERGTOW_MPI");
@@ -175,7 +174,7 @@ static bool wants_division(bool *divides)
     return false;
 }
 
-/// The launcher of one MPI starts programs of another as if each were alone, and they would all do the same work.
+/// Does MPI know all processes? Started by another MPI's launcher, each is alone, and all would do the same work.
 static bool knows_all(const bt_launcher *by)
 {
     int size;
@@ -186,7 +185,7 @@ static bool knows_all(const bt_launcher *by)
         fprintf(stderr, "bergtow: %d processes were started, but each is alone: this program was built with %s; start "
                 "it with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work apart)\n",
                 by->size, bt_comm_library(mpi));
-    else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // the launcher ends all when one has left so
+    else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // else the launcher ends rank 0 in mid-message
     MPI_Finalize();
     return false;
 }
@@ -207,7 +206,7 @@ bt_status bt_comm_start(int *argc, char ***argv)
     running = true;
     foreign = begun != 0;
     world.mpi = MPI_COMM_WORLD;
-    if (foreign) MPI_Comm_dup(MPI_COMM_WORLD, &world.mpi); // messages and error handler are apart from the program's
+    if (foreign) MPI_Comm_dup(MPI_COMM_WORLD, &world.mpi); // messages and error handler of our own
     MPI_Comm_rank(world.mpi, &world.rank);
     MPI_Comm_size(world.mpi, &world.size);
     MPI_Errhandler handler;
@@ -226,7 +225,7 @@ bt_status bt_comm_start(int *argc, char ***argv)
 int bt_comm_end(int code)
 {
     if (!running) return code;
-    // Only now: a launcher that sees one rank leave with an error ends the others, in the middle of their message.
+    // Wait for all: a launcher that sees one rank exit with an error ends the others, in the middle of their messages.
     fflush(NULL);
     bt_comm_rest(&world);
     code = (int)bt_comm_agree(&world, (bt_status)code);
@@ -304,7 +303,7 @@ void bt_comm_errors(const bt_comm *comm, bt_errors *err)
 void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes)
 {
     if (comm->size == 1) return;
-    const size_t most = (size_t)1 << 30; // MPI counts are of 31 bits
+    const size_t most = (size_t)1 << 30; // MPI counts have 31 bits
     for (size_t at = 0; at < bytes; at += most)
         MPI_Bcast((char *)data + at, (int)(bytes - at < most ? bytes - at : most), MPI_BYTE, 0, comm->mpi);
 }
@@ -320,8 +319,8 @@ bool bt_comm_any(const bt_comm *comm, bool value)
 void bt_comm_rest(const bt_comm *comm)
 {
     if (comm->size == 1) return;
-    // Blocking MPI calls poll, with the whole core. Looked for every 10 ms at last, and often at first: most waits are
-    // short.
+    // Blocking MPI calls poll, and occupy the core. Test often at first, since most waits are short, and at last every
+    // 10 ms.
     MPI_Request all;
     int there = 0;
     MPI_Ibarrier(comm->mpi, &all);
@@ -378,7 +377,7 @@ static int rank_of(const int64_t *first, int size, bt_gid gid)
     return low;
 }
 
-// "1, 2, 3, ..." of the ids of a block whose count is wrong.
+// Report the ids of a block that are missing, or are held more than once, as "1, 2, 3, ...".
 static void name_ids(const unsigned char *count, int64_t from, int64_t n, bool missing, bt_errors *err)
 {
     enum { SHOWN = 5 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Elementary functions whose bits are the same on every machine (elementary.h): reduction of the argument in two parts,
+// Elementary functions whose bits are the same on every machine (elementary.h): the argument is reduced in two parts,
 // then the Taylor series, which on so short an interval needs one or two terms more than the best polynomial.
 #include "base/elementary.h"
 
@@ -12,7 +12,7 @@ static const double half_pi[3] = {0x1.921fb544p+0, 0x1.0b4611a6p-34, 0x1.3198a2e
 // ln 2 = ln2[0] + [1]: 32 bits, and the rest
 static const double ln2[2] = {0x1.62e42feep-1, 0x1.a39ef35793c76p-33};
 
-/// a + b = its rounded sum and this rest, for |a| >= |b|.
+/// Rounding error of the sum a + b, |a| >= |b|: a + b = sum + this, exactly.
 static double rest_of_sum(double sum, double a, double b) { return (a - sum) + b; }
 
 void bt_sincos(double x, double *sine, double *cosine)
@@ -21,7 +21,7 @@ void bt_sincos(double x, double *sine, double *cosine)
         *sine = *cosine = NAN;
         return;
     }
-    // Beyond, an argument has lost what the reduction by a rounded 2 pi adds.
+    // Beyond this, reduction by a rounded 2 pi adds less error than the rounding of x itself.
     if (fabs(x) > 0x1p20) x = remainder(x, 2 * BT_PI);
     const double n = nearbyint(x / half_pi[0]);
     const double first = x - n * half_pi[0], second = n * half_pi[1];
@@ -116,7 +116,7 @@ double bt_exp(double x)
     return ldexp(1 + (r + (terms + rest * (1 + r))), (int)k);
 }
 
-/// log(1 + f) + k ln 2 for 1 + f within a root of 2 of 1; rest: a little more in the argument, relative to it.
+/// log(1 + f) + k ln 2 for 1 + f within a factor √2 of 1; rest: a small addition to the argument, relative to it.
 /// With s = f / (2 + f), log(1 + f) = 2 (s + s³/3 + s⁵/5 + ...) = f - f²/2 + s (f²/2 + 2 s²/3 + 2 s⁴/5 + ...).
 static double log_near(double f, double rest, int k)
 {
@@ -160,7 +160,7 @@ double bt_asinh(double x)
 {
     const double a = fabs(x);
     if (a > 0x1p28) return copysign(bt_log(a) + (ln2[0] + ln2[1]), x);
-    // log(a + sqrt(a² + 1)) without the difference from 1
+    // log(a + sqrt(a² + 1)) without cancellation near 1
     return copysign(bt_log1p(a + a * a / (1 + sqrt(a * a + 1))), x);
 }
 
@@ -173,7 +173,7 @@ double bt_pow(double x, double y)
         return y < 0 ? 1 / power : power;
     }
     if (x == 0) return y > 0 ? 0 : INFINITY;
-    return bt_exp(y * bt_log(x)); // of a negative number NaN
+    return bt_exp(y * bt_log(x)); // NaN of a negative number
 }
 
 double bt_erfc(double x)

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Elementary functions whose bits are the same on every machine.
 //
-// Those of a C library are chosen by the processor, with or without fused multiply-add, and differ between libraries:
-// with them the same program gave other floes on another machine, and a run that was resumed there was neither of the
-// two. These use nothing but + - * / and sqrt of doubles, which IEEE 754 rounds in one way only, and operations that
-// are exact (frexp, ldexp, remainder); the compiler may not contract or reorder them (-ffp-contract=off, no -ffast-
-// math). A test holds that the program imports no other function of libm.
+// A C library chooses its functions by the processor, with or without fused multiply-add, and libraries differ: with
+// them the same program made other floes on another machine, and a run resumed there matched the run of neither
+// machine. The functions here use nothing but + - * / and sqrt of doubles, which IEEE 754 rounds in one way only, and
+// operations that are exact (frexp, ldexp, remainder); the compiler may not contract or reorder them
+// (-ffp-contract=off, no -ffast-math). A test checks that the program imports no other function of libm.
 //
 // Errors in units in the last place, against long double: sin, cos, exp, log and log1p below 1, hypot below 1.3, atan2,
-// asinh and tan below 2.2, pow below 2 + 2 |y ln x|, erfc below 60. Rejected: correctly rounded
-// functions (CORE-MATH), which promise the same and more, at several thousand lines that are not ours.
+// asinh and tan below 2.2, pow below 2 + 2 |y ln x|, erfc below 60. Rejected: correctly rounded functions (CORE-MATH),
+// which promise the same and more, in several thousand lines of foreign code.
 #ifndef BT_ELEMENTARY_H
 #define BT_ELEMENTARY_H
 

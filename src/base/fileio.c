@@ -101,13 +101,13 @@ char *bt_file_join(const char *dir, const char *name)
     return bt_text_of("%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
 }
 
-/// A descriptor that this process was given, as the shell's pipes are: opening it does not block.
+/// Is this a descriptor that this process was given, such as a pipe of the shell? Opening it does not block.
 static bool is_own_descriptor(const char *path)
 {
     return !strcmp(path, "/dev/stdin") || !strncmp(path, "/dev/fd/", 8) || !strncmp(path, "/proc/self/fd/", 14);
 }
 
-/// "a folder", ..., or NULL for a regular file.
+/// Kind of a file in words, "a folder", ...; NULL for a regular file.
 static const char *kind_of(mode_t mode)
 {
     if (S_ISREG(mode)) return NULL;
@@ -125,11 +125,11 @@ bt_status bt_file_may_take(const char *path, bt_errors *err)
                    path, kind);
 }
 
-/// text: as bt_file_read_to and bt_file_read word it; streams: pipes that this process was given are accepted.
+/// text: word the errors as bt_file_read does; streams: accept pipes that this process was given.
 static int open_input(const char *path, const char *what, bool text, bool streams, bt_errors *err)
 {
-    // Looked at before it is opened, since to open some devices does something to them, and after, since the name may
-    // mean another file by then.
+    // Check the kind before opening, since opening some devices has side effects; and again afterwards, since the name
+    // may mean another file by then.
     struct stat st;
     const char *kind = NULL;
     const bool taken = streams && is_own_descriptor(path);
@@ -183,7 +183,7 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
     }
     const int broken = got < 0 ? errno : 0;
     close(fd);
-    // A mark of the byte order, as spreadsheets put it before UTF-8, is none of the text.
+    // A byte order mark, which spreadsheets put before UTF-8, is not part of the text.
     if (n >= 3 && !memcmp(*text, "\xef\xbb\xbf", 3)) memmove(*text, *text + 3, n -= 3);
     (*text)[n] = 0;
     *size = n;
@@ -215,8 +215,8 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
         return BT_ERR_IO;
     }
 
-    // A link of the temporary name must not lead the text elsewhere; nor does one of the right name,
-    // which the rename replaces.
+    // A link under the temporary name must not lead the text elsewhere. One under the final name does not: the rename
+    // replaces it.
     unlink(temporary);
     const int fd = bt_file_descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
     int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, strlen(text));
@@ -231,17 +231,17 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     return status;
 }
 
-/// Bring the names in the folder of a path to the disk; errno of a failure, or 0.
+/// Sync the folder of a path, and so the names in it, to disk. Returns errno of a failure, or 0.
 static int sync_folder_of(const char *path)
 {
     char *folder = bt_file_folder(path);
     const int fd = bt_file_descriptor(folder, O_RDONLY | O_DIRECTORY);
     free(folder);
-    // a folder that may be written to but not read: the system will bring the name to the disk in its own time
+    // a folder that may be written but not read: the system brings the name to disk in its own time
     if (fd < 0) return 0;
     const int reason = bt_file_sync(fd);
     bt_file_close(fd);
-    return reason == EINVAL || reason == EROFS ? 0 : reason; // some file systems have no such call
+    return reason == EINVAL || reason == EROFS ? 0 : reason; // some file systems do not support this
 }
 
 bt_status bt_file_make_dir(const char *path, bt_errors *err)
@@ -255,7 +255,7 @@ bt_status bt_file_make_dir(const char *path, bt_errors *err)
         if (mkdir(part, 0777) == 0) {
             reason = sync_folder_of(part);
         } else if (errno != EEXIST) {
-            // On a read-only or foreign parent mkdir may refuse before it sees that the folder is there.
+            // On a read-only or foreign parent, mkdir may refuse before it sees that the folder exists.
             const int refused = errno;
             struct stat st;
             if (stat(part, &st) != 0 || !S_ISDIR(st.st_mode)) reason = refused;
@@ -276,7 +276,7 @@ bt_status bt_file_remove(const char *path, bt_errors *err)
     return bt_file_fail(path, "replace the file of an earlier run", errno, err);
 }
 
-/// Bytes from one open file to another; errno of a failure, or 0.
+/// Copy all bytes from one open file to another. Returns errno of a failure, or 0.
 static int copy_bytes(int from, int to)
 {
     enum { PIECE = 1 << 20 };
@@ -343,7 +343,7 @@ bool bt_file_begins(const char *path, const char *text)
 
 // One process at a time in a result folder.
 
-/// Is the open file still the one of that name? Its last holder may have removed it between the opening and the lock.
+/// Does the name still mean the open file? Its last holder may have removed it between opening and locking.
 static bool still_there(int fd, const char *path)
 {
     struct stat here, named;
@@ -374,7 +374,7 @@ int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *
             bt_file_fail(path, "make the file", errno, err);
             break;
         }
-        // a file system without locks has to do without
+        // on a file system without locks, go without one
         if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno != ENOLCK && errno != EOPNOTSUPP && errno != ENOSYS) {
             if (busy) *busy = errno == EWOULDBLOCK;
             tell_holder(fd, dir, err);
@@ -389,7 +389,7 @@ int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *
         char host[128] = "unknown host", who[200];
         gethostname(host, sizeof host - 1);
         const int n = snprintf(who, sizeof who, "process %ld on %s\n", (long)getpid(), host);
-        // who it is helps the next one; the lock holds without
+        // the text only informs the next process; the lock holds without it
         if (ftruncate(fd, 0) != 0 || pwrite(fd, who, (size_t)n, 0) != n) errno = 0;
     }
     free(path);
@@ -400,7 +400,7 @@ void bt_lock_drop(const char *dir, int lock)
 {
     if (lock < 0) return;
     char *path = bt_file_join(dir, "run.lock");
-    unlink(path); // while it is held
+    unlink(path); // while the lock is held
     close(lock);
     free(path);
 }

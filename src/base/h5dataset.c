@@ -17,16 +17,16 @@
 
 // --- units and axes --------------------------------------------------------------------------------------------------
 
-// What a dataset holds, for programs that do not know this one.
+// Description of datasets for programs that do not know bergtow.
 
 enum { MOST_AXES = 3, PATH = 200 };
 
-/// The name by which netCDF knows a dimension without a coordinate.
+/// The name that netCDF gives a dimension without a coordinate.
 static const char no_variable[] = "This is a netCDF dimension but not a netCDF variable. %10" PRIu64;
 
 static bool there(const bt_h5 *h5, const char *path) { return H5Lexists(h5->file, path, H5P_DEFAULT) > 0; }
 
-/// A dimension without a coordinate: no value is ever written, and no storage taken.
+/// Make a dimension without a coordinate: no value is ever written, and no storage allocated.
 static hid_t make_dimension(bt_h5 *h5, const char *path, hsize_t length, bool grows)
 {
     const hsize_t most = grows ? H5S_UNLIMITED : length;
@@ -43,7 +43,7 @@ static hid_t make_dimension(bt_h5 *h5, const char *path, hsize_t length, bool gr
     return d;
 }
 
-/// The scale of an axis of a dataset: beside it, in the root group, or new there.
+/// The scale of an axis of a dataset: beside the dataset, else in the root group, else made there.
 static hid_t scale_of(bt_h5 *h5, const char *dataset, const char *axis, hsize_t length, bool grows)
 {
     char path[PATH];
@@ -69,7 +69,7 @@ void bt_h5_axes(bt_h5 *h5, const char *dataset, const char *axes)
         snprintf(axis, sizeof axis, "%.*s", (int)n, word);
         word += n + (word[n] == ' ');
         const hid_t scale = scale_of(h5, dataset, axis, now[k], most[k] == H5S_UNLIMITED);
-        // a coordinate is its own axis, and has none
+        // a coordinate is a scale itself, and takes none
         if (scale >= 0 && H5DSis_scale(d) <= 0) bt_h5_check(h5, H5DSattach_scale(d, scale, (unsigned)k) >= 0);
         if (scale >= 0) H5Dclose(scale);
     }
@@ -120,24 +120,24 @@ void bt_h5_describe_file(bt_h5 *h5, const char *title)
 
 // --- slabs -----------------------------------------------------------------------------------------------------------
 
-// A dataset whose rows are written by all ranks, each its own.
+// A dataset to which each rank writes its own rows.
 //
-// On one rank rows go through HDF5, in chunks of at most 256 kB, shuffled and deflated. On several, HDF5 has the file
-// open on rank 0 alone: it lays the datasets out (space allocated when a dataset is made or grows, no fill values),
-// says where the rows lie, and every rank writes its rows there with pwrite. Such rows are not compressed.
+// On one rank, rows go through HDF5, in chunks of at most 256 kB, shuffled and deflated. On several, only rank 0 has
+// the file open in HDF5: it lays out the datasets (space allocated when a dataset is made or grows, no fill values) and
+// tells the others where the rows lie; every rank then writes its rows there with pwrite, without compression.
 //
-// Rejected: HDF5's own parallel driver. It must keep one copy of all metadata a rank, and each change of it is
-// collective. A write that fails on one rank (full disk, quota) leaves the others waiting inside the library or inside
-// MPI-IO, and a file that cannot be closed crashes in MPI_Finalize; the reason, a number from the system, is lost on
-// the way. Here errors are plain errno values on the rank that met them. What deflate gains on poses and vertices, a
-// quarter to a third, is the price.
+// Rejected: HDF5's own parallel driver. It keeps a copy of all metadata on each rank, and each change to them is
+// collective. A write that fails on one rank (full disk, quota) leaves the others waiting inside the library or MPI-IO,
+// a file that cannot be closed crashes in MPI_Finalize, and the system's error number is lost on the way. Here errors
+// are plain errno values on the rank where they occur. The price is compression, which would save a quarter to a third
+// of poses and vertices.
 
-#define SMALL 8192 // bytes; the index of a chunked dataset takes 2 kB
+#define SMALL 8192 // bytes, not packed up to here: the index of a chunked dataset takes 2 kB
 
 static bt_slab describe(bt_h5 *h5, hid_t type, int64_t n, int width)
 {
     const size_t row = H5Tget_size(type) * (size_t)(width ? width : 1);
-    // Pieces of equal length, as the last one is stored whole too.
+    // Pieces of equal length, since HDF5 stores the last one whole, too.
     const int64_t most = (int64_t)(BT_SLAB_BYTES / row), pieces = n > 0 ? (n + most - 1) / most : 1;
     return (bt_slab){.h = h5,
                      .dataset = -1,
@@ -237,7 +237,7 @@ void bt_slab_close(bt_slab *slab)
     slab->address = NULL;
 }
 
-// Writes end where pieces do: so each chunk is deflated once.
+// Rows up to the end of the piece or of the buffer: writes end where pieces do, so that each chunk is deflated once.
 static int64_t room_from(const bt_slab *slab, int64_t at)
 {
     const int64_t buffer = (int64_t)(BT_SLAB_BYTES / slab->row_bytes), left = slab->piece - at % slab->piece;

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
-// An HDF5 file driver that keeps the system's first error, never fails a write, and leaves the file whole after each.
+// An HDF5 file driver: it keeps the system's first error, lets no write fail, and leaves the file whole after each.
 //
-// When a write fails (full disk, quota, file size limit) HDF5 1.10 cannot close the file any more: H5Fclose frees what
+// After a failed write (full disk, quota, file size limit) HDF5 1.10 cannot close the file: H5Fclose frees memory that
 // the file's identifier still points to, and the library's exit handler then crashes, in MPI_Finalize too. So this
-// driver tells HDF5 that the write was done, keeps errno for the caller, and from then on writes nothing: the library
+// driver tells HDF5 that the write succeeded, keeps errno for the caller, and writes nothing from then on. The library
 // stays sound, the reason is a number instead of a text in an error stack, and the file on disk stays as the last
 // complete flush left it.
 //
-// Metadata (headers, indices) wait in memory until HDF5 ends a flush; data go to the file at once. HDF5 writes them in
-// any order, and what a file under way announces may then not be there yet: a reader at that moment, or a kill, found
-// rows of zeros. At the end of a flush come, each run of bytes in one call: the superblock, which must know the length
-// of the file; what is new; old nodes of indices from the lowest address to the highest (a root stays where it was
-// made, and must know the new half of a node before that node gives it up); at last the rest from the highest to the
-// lowest (headers lead to all others). So after each write a dataset has the length of this flush or of the last, and
-// all of its rows. What may not be there in one piece is a packed chunk to which rows are added, for it moves: those
-// here are of one row (h5util.h).
+// Metadata (headers, indices) wait in memory until HDF5 ends a flush; data go to the file at once. HDF5 writes metadata
+// in any order, and headers may then announce rows that are not yet in the file: a reader at that moment, or a kill,
+// finds rows of zeros. This driver writes them at the end of a flush, each run of bytes in one call: first the
+// superblock, which must know the length of the file; then new bytes; then old nodes of indices, from the lowest
+// address to the highest (a root stays where it was made, and must know the new half of a node before that node gives
+// it up); last the other old bytes, from the highest address to the lowest (headers lead to all others). After each
+// write, a dataset thus has the length of this flush or of the last one, and all of its rows. The exception is a packed
+// chunk to which rows are added, since it moves: packed chunks here have one row (h5util.h).
 //
-// It takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own POSIX
-// driver does, and that one reads the files.
+// The driver takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own
+// POSIX driver does, and that driver can read the files.
 #include "base/h5util.h"
 
 #include <errno.h>
@@ -37,19 +37,19 @@ typedef struct driver_info { int *errnum; } driver_info;
 
 enum { PAGE = 4096, WORD = 64 };
 
-/// Metadata that wait, of one page of the file: other bytes of it are data, which other ranks may be writing.
+/// Waiting metadata in one page of the file. The other bytes of the page are data, which other ranks may be writing.
 typedef struct page {
     haddr_t at;                  ///< a multiple of PAGE
-    uint64_t waits[PAGE / WORD], index[PAGE / WORD]; ///< a bit a byte: it waits, and is of an index
+    uint64_t waits[PAGE / WORD], index[PAGE / WORD]; ///< one bit per byte: it waits; it is part of an index
     char byte[PAGE];
 } page;
 
 typedef struct driver_file {
-    H5FD_t pub; ///< first, as HDF5 asks
+    H5FD_t pub; ///< first, as HDF5 requires
     int fd;
     bool writes;
-    haddr_t eoa, eof; ///< end of the allocated addresses, end of the file with all that waits
-    page **pages;     ///< [n_pages] by address
+    haddr_t eoa, eof; ///< end of the allocated addresses; end of the file, waiting bytes included
+    page **pages;     ///< [n_pages] in order of address
     size_t n_pages, cap_pages;
     haddr_t super, super_end; ///< the superblock
     haddr_t flushed;  ///< end of the file at the last flush
@@ -84,11 +84,11 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
     file->device = st.st_dev;
     file->inode = st.st_ino;
     file->errnum = info->errnum;
-    *file->errnum = 0; // HDF5 first tries whether the file is there
+    *file->errnum = 0; // clear the error of HDF5's test whether the file exists
     return &file->pub;
 }
 
-/// Data to the file, unless it has failed before.
+/// Write data to the file, unless an operation on it has failed before.
 static void put(driver_file *file, haddr_t address, size_t size, const char *p)
 {
     if (!*file->errnum) *file->errnum = bt_file_put(file->fd, (off_t)address, p, size);
@@ -96,7 +96,7 @@ static void put(driver_file *file, haddr_t address, size_t size, const char *p)
 
 static bool bit_of(const uint64_t *bits, size_t i) { return bits[i / WORD] >> i % WORD & 1; }
 
-/// The first place from i on whose bit is `set`; PAGE where there is none. By words: a page is looked at many times.
+/// The first place from i on whose bit is `set`; PAGE if there is none. By words, since pages are searched often.
 static size_t first_place(const uint64_t *bits, size_t i, bool set)
 {
     while (i < PAGE) {
@@ -118,14 +118,14 @@ static void set_bits(uint64_t *bits, size_t from, size_t to, bool set)
     }
 }
 
-/// What of a page lies between two addresses: places from *from to the one returned.
+/// The part of a page between two addresses: from place *from up to the place returned.
 static size_t part_of(const page *waiting, haddr_t address, haddr_t end, size_t *from)
 {
     *from = address > waiting->at ? (size_t)(address - waiting->at) : 0;
     return waiting->at + PAGE < end ? PAGE : (size_t)(end - waiting->at);
 }
 
-/// The first page that ends beyond an address.
+/// Index of the first page that ends beyond an address.
 static size_t page_from(const driver_file *file, haddr_t address)
 {
     size_t low = 0, high = file->n_pages;
@@ -137,7 +137,7 @@ static size_t page_from(const driver_file *file, haddr_t address)
     return low;
 }
 
-/// The page at an address, made if it is not there; NULL without memory.
+/// The page that contains an address, made if necessary; NULL if out of memory.
 static page *page_at(driver_file *file, haddr_t address)
 {
     const size_t k = page_from(file, address);
@@ -176,7 +176,7 @@ static void keep_waiting(driver_file *file, bool index, haddr_t address, size_t 
     }
 }
 
-/// What waits from address to end is over: other data have taken its place, or the file ends before it.
+/// Drop bytes that wait between address and end: other data have replaced them, or the file ends before them.
 static void forget(driver_file *file, haddr_t address, haddr_t end)
 {
     for (size_t k = page_from(file, address); k < file->n_pages && file->pages[k]->at < end; k++) {
@@ -186,7 +186,7 @@ static void forget(driver_file *file, haddr_t address, haddr_t end)
     }
 }
 
-/// Bytes that wait, over those that were read from the file.
+/// Copy waiting bytes over those read from the file.
 static void overlay(const driver_file *file, haddr_t address, size_t size, char *p)
 {
     for (size_t k = page_from(file, address); k < file->n_pages && file->pages[k]->at < address + size; k++) {
@@ -201,7 +201,7 @@ static void overlay(const driver_file *file, haddr_t address, size_t size, char 
     }
 }
 
-/// Write what waits from address to end, which all does, at once.
+/// Write the bytes from address to end, all of which wait, in one call.
 static void put_run(driver_file *file, haddr_t address, haddr_t end)
 {
     const size_t size = (size_t)(end - address);
@@ -215,8 +215,8 @@ static void put_run(driver_file *file, haddr_t address, haddr_t end)
     free(whole);
 }
 
-/// The superblock says how long the file is: it comes when the file has that length, and before what leads beyond the
-/// old one.
+/// The superblock states the length of the file: it is written when the file has that length, and before anything that
+/// leads beyond the old length.
 static void put_superblock(driver_file *file)
 {
     const size_t k = page_from(file, file->super);
@@ -229,13 +229,13 @@ static void put_superblock(driver_file *file)
     forget(file, file->super, file->super_end);
 }
 
-/// Bytes without a gap, all of an old index or none, all old or all new.
+/// Bytes without a gap: all in an old index or none, all old or all new.
 typedef struct run {
     haddr_t begin, end;
     bool index;
 } run;
 
-/// Where the bytes of a page that wait from i on end, or change between index and none, or old and new.
+/// End of the run of waiting bytes from place i: at a gap, or where an index begins or ends, or old bytes end.
 static size_t end_of_run(const driver_file *file, const page *waiting, size_t i)
 {
     const size_t gap = first_place(waiting->waits, i, false),
@@ -245,7 +245,7 @@ static size_t end_of_run(const driver_file *file, const page *waiting, size_t i)
            ? (size_t)(file->flushed - waiting->at) : end;
 }
 
-/// All that waits, by address. NULL without memory, or when nothing waits.
+/// All waiting bytes as runs, in order of address. NULL if out of memory, or if nothing waits.
 static run *runs_of(driver_file *file, size_t *n)
 {
     run *all = NULL;
@@ -274,7 +274,7 @@ static run *runs_of(driver_file *file, size_t *n)
     return all;
 }
 
-/// Write all that waits, in the order that leaves the file whole after each write.
+/// Write all waiting bytes, in the order that keeps the file whole after each write.
 static void put_waiting(driver_file *file)
 {
     put_superblock(file);
@@ -355,7 +355,7 @@ static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t
         if (!*f->errnum) *f->errnum = errno;
         return -1;
     }
-    memset((char *)buffer + n, 0, size - (size_t)n); // beyond the end: zeros, as HDF5 defines it
+    memset((char *)buffer + n, 0, size - (size_t)n); // beyond the end: zeros, as HDF5 defines
     overlay(f, address, size, buffer);
     return 0;
 }
@@ -390,7 +390,7 @@ static herr_t driver_truncate(H5FD_t *file, hid_t transfer, hbool_t closing)
 static const H5FD_class_t driver = {
 #if H5_VERSION_GE(1, 13, 0)
     .version = H5FD_CLASS_VERSION,
-    .value = (H5FD_class_value_t)600, // of the range for drivers that are not registered with the HDF Group
+    .value = (H5FD_class_value_t)600, // from the range for drivers not registered with the HDF Group
 #endif
     .name = "bergtow",
     .maxaddr = MAX_ADDRESS,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading back what this program wrote: a file protected by a checksum, with one way to fail.
+// Reading back a file of this program, protected by a checksum, with one way to fail.
 #include "base/h5read.h"
 
 #include <stdio.h>
@@ -11,7 +11,7 @@
 
 typedef struct { const char *path; bt_errors *err; } whole;
 
-/// 0: goes on; 1: refused and reported; −1: HDF5 fails.
+/// Returns 0 to continue, 1 if the object is refused and reported, −1 if HDF5 fails.
 static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, void *data)
 {
     const whole *w = data;
@@ -29,7 +29,7 @@ static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, voi
     if (o < 0) return -1;
     const char *kind = NULL;
     if (H5Iget_type(o) == H5I_DATASET) {
-        // The space is not asked for: that opens the sources of a virtual dataset.
+        // The dataspace is not queried: that opens the sources of a virtual dataset.
         const hid_t plan = H5Dget_create_plist(o);
         if (plan >= 0 && H5Pget_layout(plan) == H5D_VIRTUAL) kind = "a virtual dataset";
         else if (plan < 0 || H5Pget_external_count(plan) != 0) kind = "a dataset with external storage";
@@ -73,7 +73,7 @@ static void fail(bt_h5_reader *reader, const char *name)
 
 hid_t bt_h5_open_file(const char *path, int *errnum)
 {
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // HDF5 prints nothing: one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     const hid_t file = bt_h5driver_select(access, errnum) < 0 ? -1 : H5Fopen(path, H5F_ACC_RDONLY, access);
     H5Pclose(access);
@@ -130,7 +130,7 @@ void bt_h5_read(bt_h5_reader *reader, const char *name, hid_t mem, int64_t first
     const hid_t d = H5Dopen2(reader->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
     const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
     bool good = rank >= 1 && first >= 0 && n > 0 && (hsize_t)first <= size[0] && (hsize_t)n <= size[0] - (hsize_t)first;
-    // By division: the product of what a file claims may not fit.
+    // Divide: the product of the claimed sizes may overflow.
     hsize_t left = (hsize_t)width;
     bool empty = false;
     for (int k = 1; k < rank; k++) {
@@ -153,9 +153,9 @@ void bt_h5_read(bt_h5_reader *reader, const char *name, hid_t mem, int64_t first
     if (!good) fail(reader, name);
 }
 
-enum { LONGEST_TEXT = 1 << 28 }; // far beyond any case: what a file claims is not asked of the memory
+enum { LONGEST_TEXT = 1 << 28 }; // far longer than any case: a claimed length must not exhaust the memory
 
-/// Room for one text of a type with a length of its own; NULL where it is none.
+/// Room for a single text of fixed length; NULL for anything else.
 static char *room_for(hid_t type, hid_t space)
 {
     const bool one = type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
@@ -163,7 +163,7 @@ static char *room_for(hid_t type, hid_t space)
     return one ? bt_alloc(H5Tget_size(type) + 1, 1) : NULL;
 }
 
-/// The end of a reading: a text that has not been read is none.
+/// Return the text if it was read; otherwise free it and return NULL.
 static char *read_or_not(char *text, bool read)
 {
     if (read) return text;

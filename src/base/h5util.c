@@ -15,18 +15,18 @@
 
 // --- chunks ----------------------------------------------------------------------------------------------------------
 
-// A chunk of numbers, shuffled and deflated as HDF5's own filters would read it back.
+// A chunk of numbers, shuffled and deflated so that HDF5's own filters can read it.
 //
-// Shuffled, the bytes of one rank of all numbers lie together, one plane for each rank. Planes differ: the low bytes of
-// coordinates are noise, which deflate searches in vain for most of its time; signs and exponents repeat. One stream of
-// zlib may change its way within: so each plane is stored, or coded by the frequencies of its bytes alone, or searched
-// for repeats, by what a sample of it says. A stream is a stream: every reader of HDF5 takes it.
+// Shuffling puts byte k of all numbers together, as one plane for each k. Planes differ: the low bytes of coordinates
+// are noise, which deflate searches in vain for most of its time; signs and exponents repeat. A zlib stream may change
+// its method midway: so each plane is stored, or coded by the frequencies of its bytes alone, or searched for repeats,
+// depending on a sample of it. Every reader of HDF5 accepts such a stream.
 //
-// Two frames of 90,000 floes: 7.75 MB in place of 7.81 MB, at 0.4 of the time. Level 1 for the search: half a per cent
+// Two frames of 90,000 floes: 7.75 MB instead of 7.81 MB, in 0.4 of the time. The search uses level 1: half a per cent
 // more bytes than level 4 (tows of 700 and 30,000 floes), at three quarters of the work.
 
 enum { LEVEL = 1, SAMPLE = 2048, PIECES = 4 };
-static const double GAIN = 0.03; // below this a plane is stored: what a sample's own table of codes may hide
+static const double GAIN = 0.03; // a plane that gains less is stored; a sample's own table of codes may hide as much
 
 struct bt_deflater {
     z_stream whole, trial;
@@ -57,7 +57,7 @@ static bt_deflater *create(void)
     return NULL;
 }
 
-/// Bytes that a sample takes one way.
+/// Bytes of a sample compressed by method w; n if zlib fails.
 static size_t tried(z_stream *z, way w, const unsigned char *sample, size_t n)
 {
     unsigned char out[2 * SAMPLE];
@@ -79,7 +79,7 @@ static way way_of(z_stream *trial, const unsigned char *plane, size_t n)
     return bytes < repeats ? BY_BYTES : BY_REPEATS;
 }
 
-/// Bytes k, k + size, ... of the numbers, and zeros behind them.
+/// Gather every size-th byte from `numbers` on, n in all, and fill the plane up to `room` bytes with zeros.
 static void take_plane(unsigned char *plane, const unsigned char *numbers, size_t n, size_t room, size_t size)
 {
     for (size_t i = 0; i < n; i++) plane[i] = numbers[i * size];
@@ -91,7 +91,7 @@ const void *bt_deflate(bt_deflater **of, const void *numbers, size_t n, size_t r
     if (!*of && !(*of = create())) return NULL;
     bt_deflater *deflater = *of;
     z_stream *z = &deflater->whole;
-    // a change of the way ends a block, which takes some bytes
+    // a change of method ends a block, which takes some bytes
     const size_t most = deflateBound(z, (unsigned long)(room * size)) + 64 * (size + 1);
     if (room > deflater->cap_plane) deflater->plane = bt_realloc(deflater->plane, deflater->cap_plane = room, 1);
     if (most > deflater->cap_out) deflater->out = bt_realloc(deflater->out, deflater->cap_out = most, 1);
@@ -148,13 +148,13 @@ bt_status bt_h5_create(bt_h5 *h5, const char *path, bt_errors *err)
 {
     begin(h5, path, err);
     if ((h5->status = bt_file_may_take(path, err)) != BT_OK) return bt_h5_close(h5);
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // HDF5 prints nothing: one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     bool set = bt_h5driver_select(access, h5->errnum) >= 0;
     // Metadata stay in memory between flushes, so that a reader, or an interrupted run, finds the state of the last
-    // flush. The cache has room for far more than changes between two flushes, so what leaves it is old and unchanged;
-    // and a bound, since a flush looks at all of it: without one 3,000 frames of 142 floes took 7 s to write and 10,000
-    // took 89 s, with it 2 s and 8 s.
+    // flush. The cache has room for far more than changes between two flushes, so that only old, unchanged entries
+    // leave it. It is limited because a flush looks at all of it: without a limit, 3,000 frames of 142 floes took 7 s
+    // to write and 10,000 took 89 s; with it, 2 s and 8 s.
     const size_t room = (size_t)1 << 21;
     H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
     set = set && H5Pget_mdc_config(access, &cache) >= 0;
@@ -165,7 +165,7 @@ bt_status bt_h5_create(bt_h5 *h5, const char *path, bt_errors *err)
     cache.flash_incr_mode = H5C_flash_incr__off;
     cache.decr_mode = H5C_decr__off;
     set = set && H5Pset_mdc_config(access, &cache) >= 0;
-    // A link under this name is replaced, as a rename would, and not followed.
+    // A link of this name is replaced, as by a rename, and not followed.
     struct stat st;
     if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) unlink(path);
     if (set) h5->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
@@ -199,7 +199,7 @@ bt_status bt_h5_create_shared(bt_h5 *h5, const bt_comm *comm, const char *path, 
 void bt_h5_give_up(bt_h5 *h5, bt_status status)
 {
     if (h5->status == BT_OK) h5->status = status;
-    if (h5->errnum && !*h5->errnum) *h5->errnum = EIO; // the driver is silent from here on
+    if (h5->errnum && !*h5->errnum) *h5->errnum = EIO; // the driver writes nothing from here on
 }
 
 void bt_h5_flush(bt_h5 *h5)
@@ -241,7 +241,7 @@ void bt_h5_group(bt_h5 *h5, const char *name)
     bt_h5_check(h5, g >= 0 && H5Gclose(g) >= 0);
 }
 
-/// Creation properties under which two runs of one case give the same file contents.
+/// Creation properties without time stamps, so that two runs of one case give the same file contents.
 static hid_t quiet_creation(void)
 {
     const hid_t p = H5Pcreate(H5P_DATASET_CREATE);
@@ -249,20 +249,20 @@ static hid_t quiet_creation(void)
     return p;
 }
 
-/// As the chunks of bt_h5_write_chunk are read.
+/// Set the filters that read the chunks of bt_h5_write_chunk.
 static void set_filters(hid_t create)
 {
     H5Pset_shuffle(create);
     H5Pset_deflate(create, 1);
 }
 
-/// Takes over (closes) the creation properties and the space.
+/// Takes over `create` and `space`, and closes them.
 static void write_in_space(bt_h5 *h5, const char *name, hid_t create, hid_t type, hid_t space, const void *data)
 {
     const hid_t d = H5Dcreate2(h5->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
     const bool filled = data && H5Sget_simple_extent_npoints(space) > 0;
     bt_h5_check(h5, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
-    if (d >= 0) bt_h5_check(h5, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
+    if (d >= 0) bt_h5_check(h5, H5Dclose(d) >= 0); // the data of a small dataset reach the file only here
     H5Sclose(space);
     H5Pclose(create);
 }
@@ -273,7 +273,7 @@ void bt_h5_write(bt_h5 *h5, const char *name, hid_t mem, hsize_t n, hsize_t widt
     write_in_space(h5, name, quiet_creation(), mem, H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL), data);
 }
 
-/// Creation properties of a dataset into which other ranks write: room at once, and none of it filled.
+/// Creation properties of a dataset. Other ranks write into a shared file: space is allocated at once, and not filled.
 static hid_t layout(const bt_h5 *h5, int rank, const hsize_t *chunk, bool packed)
 {
     const hid_t p = quiet_creation();
@@ -286,7 +286,7 @@ static hid_t layout(const bt_h5 *h5, int rank, const hsize_t *chunk, bool packed
     return p;
 }
 
-/// How a dataset is open. A packed chunk is written whole, once: HDF5 would keep those of each dataset, to 1 MB.
+/// Access properties. A packed chunk is written whole, and once: without a cache, which would take 1 MB a dataset.
 static hid_t opened(bool packed)
 {
     if (!packed) return H5P_DEFAULT;
@@ -295,7 +295,7 @@ static hid_t opened(bool packed)
     return p;
 }
 
-/// most: NULL = as now; chunk: NULL = contiguous.
+/// most: largest size, NULL = the size now; chunk: NULL = contiguous.
 static hid_t create_dataset(bt_h5 *h5, const char *name, hid_t type, int rank, const hsize_t *now, const hsize_t *most,
                             const hsize_t *chunk, bool packed)
 {
@@ -352,7 +352,7 @@ static void attr(bt_h5 *h5, const char *object, const char *name, hid_t type, co
     H5Sclose(space);
 }
 
-// Variable length: a fixed-length attribute can be neither empty nor longer than 64 kB.
+// Variable length, since a fixed-length attribute can be neither empty nor longer than 64 kB.
 void bt_h5_attr_text(bt_h5 *h5, const char *object, const char *name, const char *text)
 {
     const hid_t type = text_type(H5T_VARIABLE);
@@ -384,7 +384,7 @@ hid_t bt_h5_growing(bt_h5 *h5, const char *name, hid_t type, int rank, const hsi
     hsize_t now[3] = {0}, most[3] = {H5S_UNLIMITED}, piece[3] = {chunk[0]};
     for (int k = 1; k < rank; k++) {
         now[k] = dims[k - 1];
-        // A chunk is neither empty nor larger than a fixed dimension: an empty dimension gets room for one.
+        // A chunk must be neither empty nor larger than a fixed dimension: an empty dimension gets room for one.
         most[k] = now[k] ? now[k] : 1;
         piece[k] = k == 1 ? chunk[1] : most[k];
     }
@@ -408,7 +408,7 @@ void bt_h5_extend(bt_h5 *h5, hid_t dataset, hsize_t length)
     bt_h5_check(h5, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
 }
 
-/// A block of a dataset, from start, of the given size.
+/// Write a block of a dataset, of the given size, from start on.
 static void write_block(bt_h5 *h5, hid_t dataset, hid_t mem, int rank, const hsize_t *start, const hsize_t *size,
                         const void *data)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all of the program uses of src/base/base.c and others have no use for.
+// Parts of src/base/base.c for the program itself, which users of the library do not need.
 #ifndef BT_INSIDE_H
 #define BT_INSIDE_H
 
@@ -11,21 +11,21 @@
 #define BT_MANY(n, few) ((n) > (few))
 #endif
 
-/// Numbers of this thread are written and read with a decimal point from here on, whatever the locale of the program
-/// that uses the library. Returns what bt_point_end takes to restore it; such pairs may lie within each other.
+/// From here on this thread writes and reads numbers with a decimal point, whatever the locale of the program that uses
+/// the library. Returns the argument for bt_point_end, which restores the locale; such pairs may be nested.
 void *bt_point_begin(void);
 void bt_point_end(void *before);
 
-/// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
+/// Set the function that ends the program at once, with a code: _Exit, or one that ends the other ranks, too.
 void bt_leave_by(void (*by)(int code));
 
-/// Room in a list for one entry more than n: cap entries, twice as many each time, `first` to begin with.
+/// Make room for one more entry in a list of n entries with room for cap; the room begins with `first` and doubles.
 #define BT_MAKE_ROOM(list, n, cap, first)                                                                              \
     do {                                                                                                               \
         if ((n) == (cap)) (list) = bt_realloc(list, (size_t)((cap) = (cap) ? 2 * (cap) : (first)), sizeof *(list));    \
     } while (0)
 
-// Order of doubles for qsort.
+// Ascending order of doubles, for qsort.
 
 static inline int bt_ascending(const void *a, const void *b)
 {
@@ -33,10 +33,10 @@ static inline int bt_ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Functions in which the time goes, for the processor that there is. Their bits do not depend on it.
+// Functions that take most of the time, compiled for the processor in use, on which no bit of their results depends.
 
-// One copy of a function for each instruction set that the program is built for, chosen when it starts: by the dynamic
-// linker of glibc (ifunc), which other C libraries have nothing of.
+// BT_FOR_EACH_CPU makes a copy of a function for each instruction set; at start the dynamic linker of glibc chooses
+// among them (ifunc), which other C libraries lack.
 #if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&    \
     !defined(__clang__) && defined(__GLIBC__)
 #define BT_FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))

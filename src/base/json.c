@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // JSON text (RFC 8259) built in memory: always valid, whatever the numbers and strings.
 //
-// Why not jansson, which reads JSON here (ensembles, maps): it writes 60 as 60.0 and 0.1 as 0.10000000000000001, each
-// number of a curve in a line of its own, refuses a string that is not UTF-8 (a title is whatever the case holds), and
-// has no number for NaN. What would be left of this file to work around that is no shorter than it.
+// Why not jansson, which reads JSON here (ensembles, maps): it writes 60 as 60.0 and 0.1 as 0.10000000000000001, puts
+// each number of a curve on a line of its own, refuses a string that is not UTF-8 (a title is whatever the case holds),
+// and cannot write NaN. Working around all this would take as much code as this file.
 #include "base/json.h"
 
 #include <inttypes.h>
@@ -150,7 +150,7 @@ void bt_json_free(bt_json *json)
 
 // Writing JSON from a table of keys.
 
-/// Is `key` inside the object of this name?
+/// Does `key` belong to the object of this name?
 static bool inside(const char *key, const char *object, size_t n) { return !strncmp(key, object, n) && key[n] == '.'; }
 
 static const char *last_part(const char *key)
@@ -185,7 +185,7 @@ void bt_json_keys_write(bt_json *json, const bt_json_key *keys, int n, const str
                         const void *const *source)
 {
     enum { DEEPEST = 4 };
-    size_t open[DEEPEST]; // lengths of the names of the objects that are open
+    size_t open[DEEPEST]; // lengths of the names of the open objects
     int depth = 0;
     for (int i = 0; i < n; i++) {
         const bt_json_key *key = &keys[i];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What one input may ask for at most: every limit of size, in one place.
+// The most that one input may ask for: every limit of size, in one place.
 //
 // A case of twenty lines can ask for more memory, disk or time than any machine has, and a damaged or hostile file for
-// more than that. Whatever grows with a number of an input is held against a limit here before it is begun, and refused
+// even more. Whatever grows with a number in an input is checked against a limit here before it begins, and refused
 // with key, value, limit and remedy. The limits are choices, far above what is simulated today and below what would
 // exhaust a large machine. `bergtow --list-keys` prints them.
 #ifndef BT_LARGEST_H
@@ -16,7 +16,7 @@ enum {
     BT_MOST_TEXT_BYTES = 16 << 20,     ///< a case or study file
     BT_MOST_TABLE_BYTES = 64 << 20,    ///< a CSV table
     BT_MOST_OUTLINE_BYTES = 1 << 30,   ///< a GeoJSON file
-    BT_MOST_BASES = 16,                ///< files that a case is based on, one on the other
+    BT_MOST_BASES = 16,                ///< files that a case is based on, each on the next
     BT_TREE_DEPTH = 16,                ///< nesting of a case or study
     BT_TREE_NODES = 2000000,           ///< values of one file
     BT_TREE_MAP = 256,                 ///< entries of one map
@@ -27,23 +27,23 @@ enum {
     BT_MOST_COMPLAINTS = 200,          ///< errors of one case that are reported
     BT_MOST_THREADS = 1024,            ///< of a rank
     BT_MOST_FLOES = 20000000,          ///< about 40 GB; also keeps bt_idx far from its limit
-    BT_MOST_STEPS = 100000000,         ///< the summary keeps 192 bytes of each
+    BT_MOST_STEPS = 100000000,         ///< the summary keeps 200 bytes of each
     BT_MOST_FRAMES = 1000000,
     BT_MOST_ROWS = 2000000,            ///< of a CSV table
     BT_MOST_RING = 10000,              ///< vertices of one outline before it is simplified or refused
-    /// `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes where the file is not taken apart
-    /// (map_features.h)
+    /// characters `[` in a GeoJSON file, about one a vertex; each takes some 200 bytes if the file has to be parsed as
+    /// a whole (map_features.h)
     BT_MOST_LISTS = 40000000,
 };
 
-// What is less is no ice, but a slip of units; and products of smaller numbers leave the range of a double.
-static const double BT_LEAST_CONCENTRATION = 1e-6; ///< of ice that is there at all
+// Smaller values are a slip of units, not ice; and products of smaller numbers leave the range of a double.
+static const double BT_LEAST_CONCENTRATION = 1e-6; ///< unless there is no ice
 static const double BT_LEAST_SIZE = 1e-3;          ///< mean diameter of the floes, m
 static const double BT_LEAST_THICKNESS = 1e-6;     ///< m
 static const double BT_MOST_RESULT_BYTES = 20e12;  ///< series and frames
 static const double BT_MOST_CORE_SECONDS = 3e9;    ///< estimated work of a run: 100 years of a core
 
-/// A line for each limit.
+/// Print a line for each limit.
 void bt_largest_print(FILE *out);
 
 #endif

@@ -24,7 +24,7 @@ size_t bt_utf8_length(const unsigned char *s)
                                                     : 0;
     for (size_t i = 1; i < n; i++)
         if ((s[i] & 0xc0) != 0x80) return 0;
-    if (s[0] == 0xe0 && s[1] < 0xa0) return 0; // longer than needed
+    if (s[0] == 0xe0 && s[1] < 0xa0) return 0; // overlong
     if (s[0] == 0xed && s[1] > 0x9f) return 0; // surrogates
     if (s[0] == 0xf0 && s[1] < 0x90) return 0;
     if (s[0] == 0xf4 && s[1] > 0x8f) return 0; // beyond U+10FFFF
@@ -55,7 +55,7 @@ static int min3(int a, int b, int c)
 int bt_suggest_distance(const char *a, const char *b, int enough)
 {
     size_t na = strlen(a), nb = strlen(b);
-    // Each byte more is an edit at least.
+    // Each byte of difference in length takes at least one edit.
     if (na > LONGEST || nb > LONGEST || (na > nb ? na - nb : nb - na) >= (size_t)enough) return LONGEST + 1;
     // d[i][j]: distance between the first i bytes of a and the first j of b
     int d[LONGEST + 1][LONGEST + 1];

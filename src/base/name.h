@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Names: of what a program adds (laws, shapes, quantities), and lists of names.
+// Names of things that a program adds (laws, shapes, quantities), and lists of names.
 #ifndef BT_NAME_H
 #define BT_NAME_H
 
 #include "bergtow/base.h"
 
-enum { BT_LONGEST_KEY = 64 };   ///< bytes of a name of a key with its end
-enum { BT_MOST_LAW_NAME = 40 }; ///< characters: the names of its series append a word to it, and 48 fit
+enum { BT_LONGEST_KEY = 64 };   ///< bytes of the longest name of a key, with the 0 at its end
+enum { BT_MOST_LAW_NAME = 40 }; ///< characters: names of its series append a word to it, and may have 48
 
-/// Lower-case letters, digits and _, beginning with no digit, at most `most` of them.
+/// Is s a name: 1 to `most` lower-case letters, digits and _, not beginning with a digit?
 bool bt_is_name(const char *s, int most);
 
-/// Can a law have `more` series, one of them of this name? Set by what keeps the series (output/quantity.c),
-/// which stands above the laws; NULL where nobody keeps any. Otherwise: why not, into err.
+/// May a law add `more` series, one of them with this name? If not, err says why. Set by output/quantity.c, which keeps
+/// the series and stands above the laws; NULL if nobody keeps any.
 extern bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
 
-/// The next of names with blanks between them, such as those of keys, cut to its room; false after the last.
+/// Take the next of several names separated by blanks, such as those of keys, cut to the room; false after the last.
 bool bt_next_name(const char **names, char name[BT_LONGEST_KEY]);
 
-/// Bytes of the valid UTF-8 sequence at s (RFC 3629), which ends with a 0; 0 when there is none.
+/// Bytes of the valid UTF-8 sequence at s (RFC 3629), a zero-terminated text; 0 if there is none.
 size_t bt_utf8_length(const unsigned char *s);
 
 // --- the closest word ------------------------------------------------------------------------------------------------

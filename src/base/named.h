@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Things known by the names of two bodies and their parts, sorted: runs by insertion, merged. qsort_r, which calls a
-// function for each comparison, took three times as long for the lists of a cell.
+// Sorting things named by two bodies and their parts: runs by insertion, then merged. qsort_r, which calls a function
+// for each comparison, took three times as long for the lists of a cell.
 #ifndef BT_NAMED_H
 #define BT_NAMED_H
 
@@ -10,7 +10,7 @@
 
 typedef struct bt_named {
     int64_t a, b;      ///< names of the bodies
-    uint32_t part, at; ///< which parts of them; where the thing is
+    uint32_t part, at; ///< parts of the bodies; place of the thing
 } bt_named;
 
 static inline bool bt_named_before(const bt_named *x, const bt_named *y)
@@ -19,7 +19,7 @@ static inline bool bt_named_before(const bt_named *x, const bt_named *y)
     return x->b != y->b ? x->b < y->b : x->part < y->part;
 }
 
-/// Sort v [n]; room [n].
+/// Sort v [n], with room [n] for the merges.
 static inline void bt_named_sort(bt_named *v, bt_named *room, size_t n)
 {
     enum { RUN = 8 };

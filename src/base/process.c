@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What started this process, and the cores that it may use.
+// The launcher of this process, and the cores that it may use.
 #include "base/process.h"
 
 #include <omp.h>
@@ -11,17 +11,17 @@
 
 // --- the launcher ----------------------------------------------------------------------------------------------------
 
-// What started this process, as its environment tells: a launcher of parallel programs, or not.
+// Was this process started by a launcher of parallel programs? The environment tells.
 //
-// MPI itself gives no answer before MPI_Init, and MPI_Init without a launcher takes half a second with Open MPI 4.1,
-// for nothing, at each call of the program. What a launcher sets is fixed by its process management interface: PMI 1
-// and 2 (Hydra of MPICH and Intel MPI, srun --mpi=pmi2, Cray), PMIx (PRRTE, srun --mpi=pmix), or its own names.
-// BERGTOW_MPI=yes helps where none of them is there.
+// MPI itself gives no answer before MPI_Init, and MPI_Init without a launcher wastes half a second at each call of the
+// program (Open MPI 4.1). The process management interface of a launcher fixes the variables that it sets: PMI 1 and 2
+// (Hydra of MPICH and Intel MPI, srun --mpi=pmi2, Cray), PMIx (PRRTE, srun --mpi=pmix), or its own names.
+// BERGTOW_MPI=yes helps where none of them is set.
 
-// In this order, for a launcher may itself have been started by another: mpirun within a job starts its servers with
-// srun, whose variables are then those of the servers.
+// In this order, since a launcher may itself have been started by another: mpirun within a job starts its servers with
+// srun, whose variables then describe the servers.
 static const struct {
-    const char *rank, *size; ///< size: NULL where the launcher does not say it
+    const char *rank, *size; ///< size: NULL if the launcher does not give it
 } kinds[] = {
     {"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"}, // Open MPI
     {"PMI_RANK", "PMI_SIZE"},                         // MPICH, Intel MPI, srun --mpi=pmi2
@@ -36,7 +36,7 @@ static const struct {
 };
 enum { N_KINDS = sizeof kinds / sizeof *kinds };
 
-/// The whole number of a variable, −1 where there is none.
+/// The value of a variable as a whole number; −1 if it has none.
 static int number(const char *name)
 {
     const char *text = name ? getenv(name) : NULL;
@@ -72,12 +72,12 @@ void bt_launcher_forget(void)
 
 double bt_launcher_began(void)
 {
-    enum { BEFORE = 19 }; // fields of proc_pid_stat(5) behind the name, before starttime
+    enum { BEFORE = 19 }; // fields of proc_pid_stat(5) between the name and starttime
     char text[1024] = "";
     FILE *f = fopen("/proc/self/stat", "r");
     if (f && !fgets(text, sizeof text, f)) *text = '\0';
     if (f) fclose(f);
-    const char *p = strrchr(text, ')'); // a name may hold anything
+    const char *p = strrchr(text, ')'); // a name may contain anything
     for (int k = 0; p && k <= BEFORE; k++) p = strchr(p + 1, ' ');
     const double now = bt_clock(), ticks = p ? strtod(p, NULL) : 0;
     struct timespec since_boot;
@@ -89,16 +89,16 @@ double bt_launcher_began(void)
 
 // --- the cores -------------------------------------------------------------------------------------------------------
 
-// The cores that this process may use, and its part of those that several ranks share.
+// The cores that this process may use, and its share of those that several ranks use.
 //
-// A launcher binds each rank to cores of its own (mpirun --map-by slot:PE=4, srun -c 4 with task affinity), or gives
-// all ranks of a node the same ones (mpirun --bind-to none, a container, a job's cgroup). The number of cores of the
-// machine says nothing of either: a job may have a few of them.
+// A launcher binds each rank to its own cores (mpirun --map-by slot:PE=4, srun -c 4 with task affinity), or gives all
+// ranks of a node the same cores (mpirun --bind-to none, a container, a job's cgroup). The number of cores of the
+// machine tells neither: a job may have only a few of them.
 
 bool bt_cores_given(cpu_set_t *cores)
 {
-    // With OMP_PROC_BIND the runtime has bound this thread to one of the places by now. Without it libgomp knows no
-    // places, while clang's libomp has one: the cores as they were when it started.
+    // With OMP_PROC_BIND the runtime has already bound this thread to one of the places. Without it libgomp has no
+    // places, while clang's libomp has one: the cores that it was given at its start.
     const int n_places = omp_get_proc_bind() == omp_proc_bind_false ? 0 : omp_get_num_places();
     if (n_places == 0) return sched_getaffinity(0, sizeof *cores, cores) == 0;
     CPU_ZERO(cores);
@@ -112,7 +112,7 @@ bool bt_cores_given(cpu_set_t *cores)
     return CPU_COUNT(cores) > 0;
 }
 
-/// Of n sets, those of the ranks of a node: how much of the cores of set `mine` is for its rank.
+/// Cores for the rank of sets[mine], of the n sets of a node's ranks: a core given to k ranks counts as 1/k for each.
 static double share_of(const cpu_set_t *sets, int n, int mine)
 {
     double share = 0;
@@ -125,7 +125,7 @@ static double share_of(const cpu_set_t *sets, int n, int mine)
     return share;
 }
 
-/// No more than Slurm has promised a task; without affinity or cgroups nothing else keeps to it.
+/// Limit n to the cores that Slurm has promised a task, at least 1: without affinity or cgroups nothing else does.
 static int within_task(int n)
 {
     const char *text = getenv("SLURM_CPUS_PER_TASK");
@@ -136,7 +136,7 @@ static int within_task(int n)
 int bt_cores_share(const bt_comm *comm)
 {
     cpu_set_t given;
-    if (!bt_cores_given(&given)) { // more cores than a set holds
+    if (!bt_cores_given(&given)) { // more cores than a cpu_set_t holds
         CPU_ZERO(&given);
         for (int k = 0; k < omp_get_num_procs() && k < CPU_SETSIZE; k++) CPU_SET(k, &given);
     }

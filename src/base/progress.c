@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How far a run is: one line rewritten on a terminal, plain lines elsewhere. On stderr, since stdout is for results.
+// Progress of a run: one line rewritten on a terminal, plain lines elsewhere. On stderr, since stdout is for results.
 #include "base/progress.h"
 
 #include <math.h>

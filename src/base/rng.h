@@ -11,7 +11,7 @@
 #include "bergtow/base.h"
 #include "base/elementary.h"
 
-/// What a stream is for. Numbers are part of the result: append, never reorder.
+/// Purpose of a stream. These numbers are part of the result: append, never reorder.
 typedef enum {
     BT_RNG_SIZE = 1,   ///< floe diameters
     BT_RNG_PLACE,      ///< seeds of the tessellation
@@ -20,7 +20,7 @@ typedef enum {
     BT_RNG_SHAKE,      ///< velocities of the shake
     BT_RNG_THICKNESS,
     BT_RNG_MEMBER,     ///< seeds of the members of a study
-    BT_RNG_HYPERCUBE,  ///< strata of a Latin hypercube, and places in them
+    BT_RNG_HYPERCUBE,  ///< strata of a Latin hypercube, and positions in them
     BT_RNG_SPLIT,      ///< strength of floes
 } bt_rng_purpose;
 
@@ -52,7 +52,7 @@ static inline uint64_t bt_rng_bits(bt_rng *rng)
 /// Uniform in [0, 1), 53 bits.
 static inline double bt_rng_uniform(bt_rng *rng) { return (double)(bt_rng_bits(rng) >> 11) * 0x1p-53; }
 
-/// Standard normal by Box and Muller (1958); the sine twin is thrown away so that a draw costs two numbers always.
+/// Standard normal by Box and Muller (1958); the sine twin is discarded, so that a draw always costs two numbers.
 static inline double bt_rng_normal(bt_rng *rng)
 {
     double u = 1 - bt_rng_uniform(rng), v = bt_rng_uniform(rng); // u in (0, 1]

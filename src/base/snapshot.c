@@ -181,7 +181,7 @@ static bool sound(bt_row_check check, double x)
     case BT_ROW_NOT_NEGATIVE: return isfinite(x) && x >= 0;
     case BT_ROW_SHARE: return x >= 0 && x <= 1;
     case BT_ROW_COUNT: return x >= 0 && x <= 1e15; // more than any run can count, and far from overflow
-    case BT_ROW_FAR: return fabs(x) <= 1e9;        // cells, periods: as labels of cells are limited (cells.c)
+    case BT_ROW_FAR: return fabs(x) <= 1e9;        // cells, periods: the limit of the labels of cells (cells.c)
     case BT_ROW_YES_OR_NO: return x == 0 || x == 1;
     default: return true;
     }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A snapshot as an HDF5 file: a dataset for each array, /group/name. What lies in the root group are dimensions: they
-// hold no number, and are passed over when the file is read.
+// A snapshot as an HDF5 file: a dataset for each array, /group/name. Datasets in the root group are dimensions: they
+// hold no numbers, and reading skips them.
 //
-// Written to the name it is given, not to a temporary one: that is the caller's part (output/checkpoint.h).
+// The file is written under the given name, not a temporary one: that is up to the caller (output/checkpoint.h).
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +26,7 @@ static hid_t memory_type(bt_item_type type)
     }
 }
 
-/// Make the group of item k where it is the first of it.
+/// Make the group of item k if the item is the first in it.
 static void enter(bt_h5 *h5, const bt_snapshot *snap, int k)
 {
     const size_t length = strcspn(snap->item[k].name, "/") + 1;
@@ -43,10 +43,10 @@ struct bt_snapshot_file {
     bt_item_meaning *meaning;
     hid_t dataset; ///< of the array added last, −1 = none
     bool ended;    ///< closed in HDF5
-    bt_status status; ///< of the whole, then
+    bt_status status; ///< of all calls, once ended
 };
 
-/// By its row, or by what the file was begun with.
+/// From the row of the array, or from the function given to bt_snapshot_create.
 static const char *meaning_of(const struct bt_snapshot_file *file, const bt_item *item, const char **units,
                               const char **axes)
 {
@@ -55,7 +55,7 @@ static const char *meaning_of(const struct bt_snapshot_file *file, const bt_item
     return item->meaning;
 }
 
-/// Some rows, or all at once, which takes HDF5 a third of the calls.
+/// Write some rows, or all at once, which takes a third of the HDF5 calls.
 static void put_rows(bt_snapshot *snap, int64_t n, const void *rows)
 {
     struct bt_snapshot_file *file = snap->file;
@@ -75,13 +75,13 @@ static void put_rows(bt_snapshot *snap, int64_t n, const void *rows)
     }
 }
 
-/// The last of the first n arrays has all its rows.
+/// Complete the last of the first n arrays: all its rows are written.
 static void end_array(bt_snapshot *snap, int n)
 {
     struct bt_snapshot_file *file = snap->file;
     if (n == 0) return;
     const bt_item *item = &snap->item[n - 1];
-    if (file->dataset >= 0) bt_h5_check(&file->h, H5Dclose(file->dataset) >= 0); // small data go to the file only now
+    if (file->dataset >= 0) bt_h5_check(&file->h, H5Dclose(file->dataset) >= 0); // small data reach the file only here
     file->dataset = -1;
     const char *units, *axes, *text = meaning_of(file, item, &units, &axes);
     if (!text) return;
@@ -104,7 +104,7 @@ void bt_snapshot_end(bt_snapshot *snap, bt_errors *err)
     file->ended = true;
     file->h.err = err;
     end_array(snap, snap->n);
-    // The axes last: a coordinate such as /history/time may follow what it belongs to.
+    // The axes last: a coordinate such as /history/time may come after the arrays that use it.
     for (int k = 0; k < snap->n; k++) {
         char name[160];
         const char *units, *axes;
@@ -154,7 +154,7 @@ void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *me
 
 enum { MOST_COLUMNS = 1000 };
 
-/// Type and shape of a dataset; false for what this program does not write.
+/// Type and shape of a dataset; false for a dataset that this program does not write.
 static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
 {
     hsize_t size[2] = {1, 1};
@@ -164,7 +164,7 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
     *n = (int64_t)size[0];
     *width = (int)size[1];
     const size_t bytes = H5Tget_size(t);
-    // What it claims to be must be there: nothing this program writes is stored in another way than whole.
+    // All that the dataset claims to hold must be stored: this program writes no dataset in part or compressed.
     const hsize_t stored = H5Dget_storage_size(d), numbers = bytes > 0 ? stored / bytes : 0;
     good = good && size[1] >= 1 && size[1] <= MOST_COLUMNS &&
            (size[0] == 0 ? stored == 0
@@ -190,16 +190,16 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
     return good;
 }
 
-/// A text that ends where its array does, and nowhere before.
+/// Does the text end where its array does, and nowhere before?
 static bool is_text(const char *text, int64_t n) { return memchr(text, 0, (size_t)n) == text + n - 1; }
 
-/// Names stand in messages: only what this program writes.
+/// Names appear in messages: accept only those that this program writes.
 static bool is_name(const char *name) { return name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_/")] == 0; }
 
 static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *data)
 {
     bt_snapshot *snap = data;
-    (void)info; // links have been refused: bt_h5_open
+    (void)info; // bt_h5_open has refused links
     const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
     herr_t result = o < 0 ? -1 : 0;
     if (o >= 0 && H5Iget_type(o) == H5I_DATASET) {

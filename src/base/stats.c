@@ -3,31 +3,30 @@
 //
 // Interval of the mean: the cosine estimator with equal weights [Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ.
 // Stat. 36].
-//     Λ_j = √(2/n) Σ_i (x_i − m) cos(π j (i + ½)/n),   j = 1..ν      how much of the slowest waves the series holds
+//     Λ_j = √(2/n) Σ_i (x_i − m) cos(π j (i + ½)/n),   j = 1..ν      amplitudes of the slowest waves in the series
 //     S_ν = (1/ν) Σ_{j≤ν} Λ_j²,   var(m) = max(S_FEW, S_WAVES) / n,   interval m ± FACTOR √var(m)
 // The Λ_j are nearly independent, each with the variance of the spectrum near frequency zero, which is n var(m): S_ν
-// alone would take Student's t with ν degrees of freedom, 4.30 for 2 and 3.18 for 3. FACTOR is that of 3.
-// Why so few waves: what floes do about a body is slow. In dense ice the spectrum falls towards zero: ice that has been
-// pushed away in one jam is missing in the next, forces 1 to 3 body lengths apart are negatively correlated, and
-// whatever looks at shorter times (autocorrelations up to Sokal's window, batch means, an autoregression, six waves of
-// a window of 40 min) gives 1.3 to 1.9 times the scatter of fields at 65 %. In open ice it rises: floes stay on the bow
-// for ten minutes, and three waves see only three quarters of the scatter at 20 %. Hence the larger of both. Measured
-// coverage (tests/long/test_intervals.py), chosen on 80 fields a concentration and tried on 80 others: full scale, a
-// window of 40 min, 90 % at 20 %, 95 % at 50 %, 96 % at 65 %, 94 % at 80 % (all 160: 91, 98, 96, 95 %). The larger of
-// two and six waves with 2.78: 89, 98, 99, 97 % of the 160.
+// alone would take Student's t with ν degrees of freedom, 4.30 for 2 and 3.18 for 3. FACTOR is that for 3.
+// Why so few waves: the motion of floes about a body is slow. In dense ice the spectrum falls towards zero: ice pushed
+// away in one jam is missing in the next, so that forces 1 to 3 body lengths apart are negatively correlated. Methods
+// that look at shorter times (autocorrelations up to Sokal's window, batch means, an autoregression, six waves of a
+// window of 40 min) then give 1.3 to 1.9 times the scatter between fields at 65 %. In open ice the spectrum rises:
+// floes stay on the bow for ten minutes, and three waves see only three quarters of the scatter at 20 %. Hence the
+// larger of both. Measured coverage (tests/long/test_intervals.py), chosen on 80 fields for each concentration and
+// tested on 80 others, at full scale with a window of 40 min: 90 % at 20 %, 95 % at 50 %, 96 % at 65 %, 94 % at 80 %
+// (all 160: 91, 98, 96, 95 %). The larger of two and six waves with 2.78: 89, 98, 99, 97 % of the 160.
 //
-// Correlation time: B batches (at most BATCHES), and a first-order autoregression through their deviations d_k,
+// Correlation time: B batches (at most BATCHES), and a first-order autoregression of their deviations d_k,
 //     φ = Σ d_k d_{k+1} / Σ d_k²,   v = Σ d_k² / (B − p − 1) · (1 + φ)/(1 − φ),   2τ = v (n/B) / sd²
-// with p parameters fitted. It counts the independent samples of the short correlation and is far less noisy than ν
-// squares.
+// with p parameters fitted. It counts independent samples by the short correlation, with far less noise than ν squares.
 //
-// Trend: least squares on the same batches against the time u from −½ to ½. Of its deviations from the line, the larger
-// of v and the mean square of Λ_2..Λ_7 (slow waves that the short correlation does not know) gives
+// Trend: least squares on the same batches against the time u from −½ to ½. From the deviations from the line follow v
+// as above and the mean square of Λ_2..Λ_7 (slow waves, which the short correlation misses); the larger of them gives
 //     se(change)² = v / Σ u_k²,                        interval change ± TREND_FACTOR se
-// A drift must be fitted before the correlation is, which it would otherwise enter as slow noise. The factor is set by
-// measurement: 4 to 5 % false alarms on white and AR(1) series of 50 to 2,600 independent samples, and a drift that
-// parts the means of the two halves by three standard errors of their difference is seen in 89 to 92 %, 90 % in the
-// mean (tests/unit/test_stats.c).
+// The drift must be fitted before the correlation: otherwise it would count as slow noise. The factor is set by
+// measurement: 4 to 5 % false alarms on white and AR(1) series of 50 to 2,600 independent samples; a drift that
+// separates the means of the two halves by three standard errors of their difference is detected in 89 to 92 %, 90 % on
+// average (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
 #include "base/inside.h"
 #include "base/elementary.h"
@@ -44,7 +43,7 @@
 #define BATCH 5
 #define FINE 384
 
-/// Mean in two passes: the second takes the rounding of the first out.
+/// Mean in two passes: the second removes the rounding error of the first.
 static double mean_of(const double *x, int64_t n)
 {
     double sum = 0, rest = 0;
@@ -54,7 +53,7 @@ static double mean_of(const double *x, int64_t n)
     return m + rest / (double)n;
 }
 
-/// Means of at most `most` batches of x[n], less centre; returns how many.
+/// Means of at most `most` batches of x[n], minus centre; returns how many.
 static int batches_of(const double *x, int64_t n, double centre, int most, double *z)
 {
     const int count = n < most ? (int)n : most;
@@ -73,7 +72,7 @@ static double variance_of_batches(const double *d, int count, int p)
     double squares = 0, products = 0;
     for (int k = 0; k < count; k++) squares += d[k] * d[k];
     for (int k = 0; k + 1 < count; k++) products += d[k] * d[k + 1];
-    const bool many = squares > 0 && count >= BT_TREND_LEAST; // fewer batches tell nothing of their correlation
+    const bool many = squares > 0 && count >= BT_TREND_LEAST; // fewer batches do not show their correlation
     const double phi = many ? products / squares : 0;
     return squares / (count - p - many) * (1 + phi) / (1 - phi);
 }
@@ -114,8 +113,7 @@ bt_mean bt_stats_mean(const double *x, int64_t n)
         const int count = batches_of(x, n, mean.mean, BATCHES, z), most = count - 1;
         const double few = slow_variance(z, count, n, 1, most < FEW ? most : FEW),
                      more = slow_variance(z, count, n, 1, most < WAVES ? most : WAVES);
-        // One sample more or less at the end always moves the mean by about sd/n, also that of a series that
-        // alternates.
+        // One sample more or less at the end always moves the mean by about sd/n, even if the series alternates.
         mean.se = sqrt(bt_max(bt_max(few, more) / (double)n, mean.sd * mean.sd / ((double)n * (double)n)));
         mean.low = mean.mean - FACTOR * mean.se;
         mean.high = mean.mean + FACTOR * mean.se;
@@ -170,9 +168,9 @@ int64_t bt_stats_last_start(int64_t n, int64_t first)
     return first + (n - first) / 2 / step * step;
 }
 
-/// Are the first of y[count] larger (or, not `larger`, smaller) than the rest? Rank sums (Wilcoxon), equal values with
-/// their mean rank; the variance is that of the ranks in the two parts, with the correlation of neighbours where that
-/// is positive.
+/// Are the first values of y[count] larger (if not `larger`: smaller) than the rest? Rank sums (Wilcoxon); equal values
+/// have their mean rank. The variance is that of the ranks within the two parts, with the correlation of neighbours if
+/// that is positive.
 static bool ranks_differ(const double *y, int count, int first, bool larger, double accept)
 {
     double d[FINE], mean[2] = {0}, squares = 0;
@@ -194,11 +192,12 @@ static double rms_about(const double *x, int64_t n, double centre)
     return sqrt(sum / (double)n);
 }
 
-/// What does not matter counts as nothing: else the ranks of a series that settles for ever are a drift.
+/// Differences within the limit count as 0: otherwise the ranks of a series that never quite settles show a drift.
 static double beyond(double x, double limit) { return fabs(x) > limit ? x : 0; }
 
-/// Is what x[n] has before `start` another state than the rest, in its level or in how far it swings, and does that
-/// matter (stats.h)? In coarse batches a slow change is no long correlation, in fine ones a short swing has many.
+/// Are the samples before `start` in another state than the rest, by level or by amplitude, and does that matter
+/// (stats.h)? In coarse batches a slow change is not taken for a long correlation; in fine ones a short swing has many
+/// batches.
 static bool is_transient(const double *x, int64_t n, int64_t start, double material)
 {
     static const struct { int batches; double accept; } look[] = {{BATCHES, 3.2}, {FINE, 4}};
@@ -221,20 +220,20 @@ static bool is_transient(const double *x, int64_t n, int64_t start, double mater
     return false;
 }
 
-// MSER(d) = Σ_{j>=d} ((Y_j − mean_d)² + f²) / (k − d)² over k batch means Y_j: the squared standard error that the
-// batches from d on would have if they were independent, with a noise f on top below which nothing need be cut: else
-// the minimum of a series without noise that settles is always at the end. Its size, half of `material` times the mean
-// of the second half, is the standard deviation of two levels as far apart as `material`. Backwards recursion (Welford)
-// over d, so one pass. The minimum is searched in the first half of what follows `first` only: near the end few batches
+// MSER(d) = Σ_{j>=d} ((Y_j − mean_d)² + f²) / (k − d)² over k batch means Y_j: the squared standard error of the
+// batches from d on if they were independent, with an added noise f below which nothing need be cut. Without f, the
+// minimum for a settling series without noise is always at the end. f is half of `material` times the mean of the
+// second half: the standard deviation of two levels that differ by `material`. A backward recursion over d (Welford)
+// takes one pass. The minimum is sought only in the first half of the samples after `first`: near the end, few batches
 // agree by chance.
 //
-// Of a steady series with rare large values (floes met one by one) the minimum lies just after the last large one in
-// its first half, by choice of the data: the mean of the rest is then low, by a third in 2 % ice. So the start is taken
-// only where a second test, which large values cannot decide, finds another state before it: the ranks of batches, or
-// of their distances from the median (a body that swings on its line). A test on the values with their own variances
-// halves the error at best. So it is −2.2, −2.5, −1.8 and −1.0 % in 200 fields each of 2, 5, 10 and 20 % ice, while of
-// the excess of 23 % with which tows in 95 % ice begin 7 % are left, as by MSER alone. Where a start leaves few floes,
-// from which most of that arises, it is not taken (output/steady.c).
+// In a steady series with rare large values (floes met one by one) the minimum lies just after the last large one in
+// the first half, since the data choose it: the mean of the rest is then low, by a third in 2 % ice. So the start is
+// accepted only if a second test, which large values cannot decide, finds another state before it: on the ranks of the
+// batches, or of their distances from the median (a body that swings on its line). A test on the values with their own
+// variances halves the error at best. With the rank test the error is −2.2, −2.5, −1.8 and −1.0 % in 200 fields each of
+// 2, 5, 10 and 20 % ice, while of the excess of 23 % with which tows in 95 % ice begin 7 % are left, as by MSER alone.
+// A start that leaves few floes, the cause of most of that error, is not accepted (output/steady.c).
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material)
 {
     if (first < 0) first = 0;

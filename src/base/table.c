@@ -41,7 +41,7 @@ static bool is_header(char *line)
     return true;
 }
 
-/// One row of numbers; says what is wrong with it, or NULL.
+/// Read one row of numbers. Returns what is wrong with it, or NULL.
 static const char *read_row(char *line, double row[3], char why[BT_WHY])
 {
     for (int i = 0; i < 3; i++) {
@@ -55,7 +55,7 @@ static const char *read_row(char *line, double row[3], char why[BT_WHY])
     return NULL;
 }
 
-/// The line at *rest, which then stands behind it, terminated; its length, or NULL after the last.
+/// Take the line at *rest, terminate it, and move *rest behind it; n: its length. NULL after the last line.
 static char *next_line(char **rest, const char *end, size_t *n)
 {
     char *line = *rest;
@@ -133,7 +133,7 @@ bool bt_table_row_sound(const bt_table *table, int64_t i)
 void bt_table_at(const bt_table *table, double time, double v[2])
 {
     const double *row = table->row;
-    int64_t low = 0, high = table->n - 1; // row[low] <= time < row[high], once the ends are done with
+    int64_t low = 0, high = table->n - 1; // row[low] <= time < row[high], unless time is at an end
     const int64_t end = !(time > row[0]) ? 0 : time >= row[3 * high] ? high : -1;
     if (end >= 0) {
         memcpy(v, row + 3 * end + 1, 2 * sizeof *v);

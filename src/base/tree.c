@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// YAML events of libyaml to a tree. The recursion is bounded by BT_TREE_DEPTH, the memory by BT_TREE_NODES.
+// A tree from the YAML events of libyaml. BT_TREE_DEPTH bounds the recursion, BT_TREE_NODES the memory.
 #include "base/tree.h"
 
 #include <stdbool.h>
@@ -12,12 +12,12 @@
 
 // --- slips -----------------------------------------------------------------------------------------------------------
 
-// What a syntax error of YAML comes from. libyaml names the place at which no reading is left, which often is the line
-// after the slip: a word without its colon is a text that goes on in the next line, until a colon there has no place.
+// Causes of YAML syntax errors. libyaml names the place where the text can no longer be read, often the line after the
+// slip: a word without its colon is a text that continues on the next line, until a colon there is out of place.
 
 typedef struct {
     const char *begin;
-    size_t n;     // without what ends the line
+    size_t n;     // without the line end and blanks before it
     size_t blank; // blanks and tabs at its beginning
 } text_line;
 
@@ -38,7 +38,7 @@ static text_line line_of(const bt_syntax *syntax, int number)
 
 static bool says_nothing(const text_line *line) { return line->blank == line->n || line->begin[line->blank] == '#'; }
 
-/// Place of the first colon from i on that ends a key, n = none.
+/// Position of the first colon from i on that ends a key; n if there is none.
 static size_t key_end(const text_line *line, size_t i)
 {
     for (; i < line->n; i++)
@@ -66,7 +66,7 @@ static int colon_missing(const text_line *line, int number, char *why)
     const size_t n = line->n - line->blank;
     size_t word = 0;
     while (word < n && !strchr(" \t:", text[word])) word++;
-    if (!n || strchr("-[]{},\"'#", *text)) return 0; // no key begins so
+    if (!n || strchr("-[]{},\"'#", *text)) return 0; // no key begins with these
     with_colon(text, n, right);
     if (word < n && text[word] == ':')
         snprintf(why, BT_SYNTAX_WHY, "a blank is missing after the colon; write %s", right);
@@ -74,7 +74,7 @@ static int colon_missing(const text_line *line, int number, char *why)
     return number;
 }
 
-/// A colon where none can be: the lines before lack one, this one has two, or it is indented below a value.
+/// Explain a misplaced colon: the lines before lack one, this line has two, or it is indented below a value.
 static int colon_out_of_place(const bt_syntax *syntax, char *why)
 {
     const text_line here = line_of(syntax, syntax->line);
@@ -103,7 +103,7 @@ static int colon_out_of_place(const bt_syntax *syntax, char *why)
     return syntax->line;
 }
 
-/// The slip behind the error: its line, with the remedy in why; 0 where it is none of those that are known.
+/// Find the slip behind the error. Returns its line, with the remedy in why; 0 if it is none of the known slips.
 static int syntax_explain(const bt_syntax *syntax, char why[BT_SYNTAX_WHY])
 {
     const text_line here = line_of(syntax, syntax->line);
@@ -335,7 +335,7 @@ bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *
         bt_errors_add(err, "%s: libyaml could not start; free some memory", name);
         return NULL;
     }
-    // Without this libyaml takes two leading bytes of a binary file for UTF-16.
+    // Without this, libyaml takes two leading bytes of a binary file for a mark of UTF-16.
     yaml_parser_set_encoding(&yaml.yaml, YAML_UTF8_ENCODING);
     yaml_parser_set_input_string(&yaml.yaml, (const unsigned char *)text, n);
     bt_node *root = read_document(&yaml);

@@ -9,15 +9,15 @@
 
 // --- slips -----------------------------------------------------------------------------------------------------------
 
-// What a syntax error of YAML comes from, in the words of who wrote the file.
+// Causes of YAML syntax errors, in terms of the text that was typed.
 
-/// An error as libyaml tells of it; lines count from 1.
+/// An error as libyaml reports it; lines count from 1.
 typedef struct bt_syntax {
     const char *text; ///< the whole input, n bytes
     size_t n;
     const char *problem;
     int line;  ///< of the problem
-    int begun; ///< line in which what could not be ended began, 0 = none
+    int begun; ///< line where the unfinished construct began, 0 = none
 } bt_syntax;
 
 enum { BT_SYNTAX_WHY = 240 };
@@ -35,9 +35,9 @@ typedef struct bt_node {
     int *key_line;         ///< [n] of a map
 } bt_node;
 
-/// Parse a text of n bytes into a tree; NULL with one message in err, prefixed by name and line, when the text is not
-/// YAML of the plain kind: anchors, aliases, tags, several documents, keys that are not scalars and too deep nesting
-/// are refused. Duplicate keys are reported and the first one is kept. An empty text gives an empty map.
+/// Parse a text of n bytes into a tree. Returns NULL, with one message in err that begins with name and line, if the
+/// text is not plain YAML: anchors, aliases, tags, several documents, keys that are not scalars and too deep nesting
+/// are refused. Duplicate keys are reported, and the first one is kept. An empty text gives an empty map.
 bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *err);
 void bt_tree_free(bt_node *node);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Numbers with units: one table of units, a strict reader and a writer that keeps every bit.
 //
-// value_SI = number · up / down. Two factors and not one, because 30 mm as 30/1000 is the double nearest to 0.03 and
-// as 30·0.001 it may not be: a case in millimetres then gives the same bits as the same case in metres.
+// value_SI = number · up / down. Two factors instead of one: 30 mm as 30/1000 is the double nearest to 0.03, and
+// 30·0.001 may not be. So a case in millimetres gives the same bits as the same case in metres.
 #include "base/units.h"
 
 #include "base/inside.h"
@@ -42,14 +42,14 @@ static const bt_unit_entry units[] = {
 };
 enum { N_UNITS = sizeof units / sizeof *units };
 
-// Units written out as words: read, and neither listed nor written.
+// Units written out as words are read, but neither listed nor written.
 static const struct {
     const char *word, *symbol;
 } words[] = {{"foot", "ft"},   {"feet", "ft"},  {"knot", "kn"},    {"knots", "kn"}, {"second", "s"}, {"seconds", "s"},
              {"minute", "min"}, {"minutes", "min"}, {"hour", "h"}, {"hours", "h"},  {"day", "d"},    {"days", "d"},
              {"tonne-force", "tf"}, {"tonnes-force", "tf"}};
 
-// froude: g and the densities are kept, so time ~ L^1/2 and mass ~ L^3, and a kind of the dimensions mass^a length^b
+// froude: with g and the densities kept, time ~ L^1/2 and mass ~ L^3, so that a kind of dimension mass^a length^b
 // time^c has the exponent 3 a + b + c/2.
 static const struct {
     const char *noun, *symbol, *bare;

@@ -27,32 +27,32 @@ typedef enum {
 /// Longest message of bt_units_parse and bt_value_read.
 #define BT_WHY 320
 
-/// Read the whole text as a number with an optional unit of this kind, in SI (angles in radians). Refused: a unit of
-/// another kind, text after the number that is not a unit, hexadecimal, NaN, infinity, overflow. On refusal why says
-/// the reason and the remedy.
+/// Read the whole text as a number with an optional unit of this kind; value: in SI (angles in radians). Refused: a
+/// unit of another kind, text after the number that is not a unit, hexadecimal, NaN, infinity, overflow. On refusal
+/// `why` gives the reason and the remedy.
 bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_WHY]);
 
-/// Shortest decimal form, at most 17 digits, that reads back to the same bits, with the unit: "0.1 s", "nan" as "none".
-/// Independent of the locale. Returns the length.
+/// Shortest decimal form, at most 17 digits, that reads back to the same bits, with the unit, as in "0.1 s"; NaN gives
+/// "none". Independent of the locale. Returns the length.
 int bt_units_format(double value, bt_unit kind, char *out, size_t size);
 
-/// A unit that is read: value in SI = number · up / down.
+/// A unit that can be read: value in SI = number · up / down.
 typedef struct bt_unit_entry {
     const char *symbol;
     bt_unit kind;
     double up, down;
 } bt_unit_entry;
-/// The k-th of them; false when there are fewer.
+/// The k-th unit; false if there are fewer.
 bool bt_units_entry(int k, bt_unit_entry *out);
 
-/// Exponent a of the length ratio L under which a quantity of this kind scales as L^a at the same Froude number, with
+/// Exponent a with which a quantity of this kind scales, as L^a, by the length ratio L at the same Froude number, with
 /// densities and gravity kept.
 double bt_units_froude(bt_unit kind);
 
-const char *bt_units_symbol(bt_unit kind); ///< SI symbol, "" for plain numbers; what the formatted value carries
+const char *bt_units_symbol(bt_unit kind); ///< SI symbol of a formatted value, "" for plain numbers
 const char *bt_units_bare(bt_unit kind);   ///< unit of a number written without one, "-" for plain numbers
 
-/// A force with a prefix that keeps three digits before the point; returns out.
+/// A force in N, kN or MN, with at most three digits before the point below 1 GN; returns out.
 const char *bt_force_text(char out[32], double newton);
 
 #endif

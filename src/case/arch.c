@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Width of the domain against body, floes and arches, and what bounds their load; the rules are in arch.h.
+// Is the domain wide enough for body, floes and arches, and what bounds their load? The rules are in arch.h.
 #include "case/arch.h"
 #include "case/warning.h"
 
@@ -9,31 +9,31 @@
 #include "base/elementary.h"
 #include "case/case_tow.h"
 
-/// Body widths that ice from this concentration on needs.
+/// Body widths needed by ice of at least this concentration.
 static const struct { double concentration, widths; } asked[] = {{0.45, 10}, {0.7, 30}, {0.85, BT_ARCH_LOCKING}};
 
-/// δ of arch.h, from this concentration on.
+/// δ of arch.h for ice of at least this concentration.
 static const struct { double concentration, slack; } locked[] = {{0.9, 0.0095}, {0.95, 0.003}};
 
-/// A disc is a polygon of its area, and 0.08 % wider than its length: thirty of its lengths are thirty widths.
+/// A disc is a polygon of equal area, 0.08 % wider than its length: thirty of its lengths count as thirty widths.
 static const double OUTLINE = 1e-3;
 
-/// Ice as made misses the concentration asked for in the last digits, and what is printed as 90 % has the rule of 90 %.
+/// Ice as made misses the key's concentration in the last digits; what prints as 90 % follows the rule for 90 %.
 static bool reaches(double concentration, double limit) { return concentration >= limit - 0.005; }
 
-/// A pair of boundaries of the domain that may stand beside a tow, what lies between them, and its key.
+/// A pair of boundaries of the domain that may lie beside a tow, the extent between them, and its key.
 typedef struct pair {
     bt_bound kind;
     double extent, ice; ///< of the domain, and of the region of the ice, m
     const char *key, *region, *open;
 } pair;
 
-/// Body widths, and those that are needed, between one pair for a tow in the direction `course`.
+/// Body widths between one pair of boundaries for a tow in the direction `course`, and body widths needed.
 static bt_arch beside_tow(const bt_case *input, const pair *p, double course, double concentration, double floe_size)
 {
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(input, v);
-    // at a set speed a body keeps its yaw; on a line it follows its course
+    // at a set speed a body keeps its yaw; on a line it turns with its course
     const double ahead = (input->tow.mode == BT_TOW_SPEED ? course : input->tow.direction) - input->body.yaw,
                  across = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : NAN;
     const bool open = p->kind == BT_BOUND_OPEN;
@@ -61,7 +61,7 @@ static bt_arch beside_tow(const bt_case *input, const pair *p, double course, do
     return arch;
 }
 
-/// Is a the narrower domain for its ice? Of two that nothing is asked of, the one with fewer body widths.
+/// Is a the narrower domain for its ice? If neither needs a width, the domain with fewer body widths is.
 static bool narrower(const bt_arch *a, const bt_arch *b)
 {
     if (a->needed > 0 && b->needed > 0) return a->bodies / a->needed < b->bodies / b->needed;
@@ -71,7 +71,7 @@ static bool narrower(const bt_arch *a, const bt_arch *b)
 
 bt_arch bt_arch_of(const bt_case *input, double concentration, double floe_size)
 {
-    // along x: beside a tow along y
+    // the sides lie beside a tow along x, the ends beside a tow along y
     const pair pairs[2] =
         {{input->domain.sides, input->domain.width, input->ice.y_max - input->ice.y_min, "domain.width",
                             "ice.y_min, ice.y_max", "open sides"},
@@ -80,7 +80,7 @@ bt_arch bt_arch_of(const bt_case *input, double concentration, double floe_size)
                             "ice.x_min, ice.x_max", "open ends"}};
     const int legs = input->tow.n_waypoints > 0 ? input->tow.n_waypoints : 1;
     const double way = input->tow.mode == BT_TOW_NONE ? 0 : bt_case_tow_distance(input, input->run.duration);
-    double begins = 0; // way at which the leg begins, m: straight from the body on, corners not rounded
+    double begins = 0; // way to the start of the leg, m: on straight legs from the body, corners not rounded
     bt_arch worst = {.key = NULL};
     for (int leg = 0; leg < legs && (leg == 0 || begins < way); leg++) {
         const double *q = input->tow.waypoints + 2 * leg;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Case files with a base: "base: other.yml" reads that file first, and what stands beside it replaces keys of it one by
-// one. The list of floes is replaced as a whole. Rejected: YAML's own merge key `<<` with anchors, which stays within a
-// file and merges maps of the first level alone.
+// Case files with a base: "base: other.yml" reads that file first; the keys beside it replace keys of the base one by
+// one, and the list of floes as a whole. Rejected: YAML's own merge key `<<` with anchors, which stays within one file
+// and merges only maps of the first level.
 #include "case/case_base.h"
 
 #include <limits.h>
@@ -30,7 +30,7 @@ static const bt_node *entry(const bt_node *root, const char *key, int *line)
     return NULL;
 }
 
-/// Is this word of the first level of a case alone: a section, a key with a dot, floes?
+/// Does this word of the first level occur in cases only: a section, a key with a dot, floes?
 static bool is_of_cases(const char *word)
 {
     char section[64] = "";
@@ -39,8 +39,8 @@ static bool is_of_cases(const char *word)
     return !strcmp(word, "floes") || (strcmp(word, "report") && bt_schema_is_section(section));
 }
 
-/// Does the file hold a study? A study and a case with a base both have the key `base`: it is a study if it has any
-/// other key of studies, or none of cases (`report` is of both).
+/// Is the file a study? Studies and cases with a base both have the key `base`: the file is a study if it has any other
+/// key of studies, or none of cases (`report` belongs to both).
 static bool case_is_study(const bt_node *root)
 {
     if (!bt_tree_has(root, "base")) return false;

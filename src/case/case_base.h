@@ -13,29 +13,29 @@ typedef struct bt_case_file {
     bt_node *root; ///< a map
 } bt_case_file;
 
-/// The case's own file, then its base, then the base of that.
+/// The case's own file, then its base, then the base of that, and so on.
 typedef struct bt_case_files {
     bt_case_file *file;
     int n;
 } bt_case_files;
 
-/// Take over path and text of the case's own file, of size bytes, and read those that it is based on; every text is
-/// parsed. alone: a base is refused, and no file read. After an error, too, bt_case_files_free. Errors: BT_ERR_CASE,
-/// BT_ERR_IO (a base cannot be read).
+/// Parse the text of the case's own file, of size bytes, and read and parse the files that it is based on; path and
+/// text are copied. alone: a base is refused, and no file is read. Call bt_case_files_free also after an error. Errors:
+/// BT_ERR_CASE; BT_ERR_IO if a base cannot be read.
 bt_status bt_case_files_read(bt_case_files *files, const char *path, const char *text, size_t size, bool alone,
                              bt_errors *err);
 void bt_case_files_free(bt_case_files *files);
 
-/// All texts as one, for the record: of a case without a base its own, otherwise one YAML document a file, which begins
-/// with "--- # FILE". Caller frees.
+/// All texts as one, for the record: without a base the case's own text, otherwise one YAML document for each file,
+/// which begins with "--- # FILE". Caller frees.
 char *bt_case_files_text(const bt_case_files *files);
 
-/// What a file holds, by its keys; other where it cannot be read. Pipes, which can be read only once, are not read.
+/// Kind of a file, by its keys; other if it cannot be read. Pipes are not read, since that is possible only once.
 typedef enum { BT_FILE_OTHER, BT_FILE_CASE, BT_FILE_STUDY } bt_file_kind;
 bt_file_kind bt_case_kind_of(const char *path);
-/// The same of a tree.
+/// The same for a tree.
 bt_file_kind bt_case_kind(const bt_node *root);
 
-extern const bt_key bt_base_key; ///< the key `base` of a case; of the file, and not of what it says
+extern const bt_key bt_base_key; ///< the key `base` of a case: it describes the file, not the case
 
 #endif

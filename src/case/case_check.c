@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Defaults that follow from other keys, and checks across keys.
 //
-// A check names the keys it looks at; when one of them was refused already, it is left out: its message would be about
-// the default that stands in for the refused value.
+// A check names the keys it looks at. If one of them was refused already, the check is skipped: its message would be
+// about the default that stands in for the refused value.
 #include "case/case_check.h"
 #include "case/case_tow.h"
 #include "case/warning.h"
@@ -39,8 +39,8 @@ static box bounds_of(int n, const double *v, double x, double y, double yaw)
     return bounds;
 }
 
-// Where a body stands against the boundaries: the axis in which it is outside, or 0. Walls hold the whole outline, open
-// and periodic boundaries the centroid. The slack is round-off of x0 + length.
+// The axis along which a body is outside the domain, or 0. Walls must hold the whole outline, open and periodic
+// boundaries the centroid. The slack allows for the round-off of x0 + length.
 static char outside(const bt_case *input, box bounds, double x, double y)
 {
     double slack = 1e-9 * (input->domain.length + input->domain.width);
@@ -66,7 +66,7 @@ char *bt_case_named_file(const char *from, const char *file)
     return joined;
 }
 
-/// Files that the case names, as absolute paths: the resolved file lies elsewhere.
+/// Make the paths of files that the case names absolute, since the resolved file lies elsewhere.
 static void follow_files(const bt_check *check)
 {
     for (int i = 0; i < bt_n_case_keys; i++) {
@@ -79,8 +79,8 @@ static void follow_files(const bt_check *check)
     }
 }
 
-/// A velocity of which nothing is given stays open where the body drifts freely at the start; otherwise what is not
-/// given is 0.
+/// A velocity without any given component stays open if the body drifts freely at the start; otherwise missing
+/// components become 0.
 static void follow_start(bool drifts, double *vx, double *vy)
 {
     if (drifts && isnan(*vx) && isnan(*vy)) return;
@@ -109,12 +109,12 @@ static void follow(const bt_check *check)
 
 // ---- defaults of the frames ----
 
-// Defaults that the frame of a case decides on.
+// Defaults that depend on the frame of a case.
 //
-// A row of the table of keys says with at_sea that its default is a model basin's. In the geographic frame such a
-// number would look like an answer: there it is none until the case gives it, or another key does (a programme the
-// speed, a named line its stiffness). Where it is then still none and has an effect, the case is refused. Other
-// defaults hold in both frames, or follow from the scene in the geographic one (case_fill.c, case_tow.c).
+// In the table of keys, at_sea marks a default that is a model basin's. In the geographic frame such a number would
+// look like an answer: the key has no value there until the case gives it, or another key implies it (a programme the
+// speed, a named line its stiffness). If it still has none, and has an effect, the case is refused. Other defaults hold
+// in both frames, or follow from the scene in the geographic one (case_fill.c, case_tow.c).
 
 static double *number(bt_case *input, const bt_key *key) { return (double *)(void *)((char *)input + key->offset); }
 
@@ -127,8 +127,8 @@ static bool is_used(const bt_case *input, const char *key, bool by_hand)
     return strcmp(key, "ice.thickness") || bt_case_makes_ice(input) || by_hand || input->ice.outlines;
 }
 
-/// Numbers that nobody gave, that have an effect, and whose default is a model basin's, become NaN. by_hand: there are
-/// floes of the list without a thickness of their own.
+/// Set numbers to NaN that nobody gave, that have an effect, and whose default is a model basin's. by_hand: the list
+/// has floes without a thickness of their own.
 static void clear_at_sea(const bt_check *check, bool by_hand)
 {
     if (!check->from || is_basin(check->c)) return;
@@ -145,14 +145,14 @@ static bool is_missing(const bt_check *check, const bt_key *row)
     return check->from && !is_basin(check->c) && !bt_check_given(check, row->name);
 }
 
-/// geojson.c asks for a thickness where outlines lack one.
+/// May this value stay open? geojson.c asks for a thickness if outlines lack one.
 static bool may_miss(const bt_case *input, const char *key, bool by_hand)
 {
     return !strcmp(key, "ice.thickness") && input->ice.outlines && !by_hand;
 }
 
-/// Refuse a case that lacks such a value once others have followed from what it gives. ice.thickness beside outlines
-/// may stay NaN: the file says whether it is needed.
+/// Refuse a case that still lacks such a value after others have followed from the given ones. With outlines
+/// ice.thickness may stay NaN: the file decides whether it is needed.
 static void check_at_sea(const bt_check *check, bool by_hand)
 {
     bt_case *input = check->c;
@@ -160,7 +160,7 @@ static void check_at_sea(const bt_check *check, bool by_hand)
     for (int i = 0; i < bt_n_case_keys; i++) {
         const bt_key *row = &bt_case_keys[i];
         if (!row->at_sea || !bt_check_sound(check, row->name) || !is_missing(check, row)) continue;
-        if (!is_used(input, row->name, by_hand)) { // a number without effect that is given as none
+        if (!is_used(input, row->name, by_hand)) { // given as none, and without effect
             bt_schema_preset(row, row->type == BT_KEY_REAL, input);
             continue;
         }
@@ -217,7 +217,7 @@ static void check_domain(const bt_check *check)
                   input->domain.width);
 }
 
-/// Reported elsewhere: sizes in the wrong order, a region without room.
+/// Sizes in the wrong order and a region without room are reported elsewhere.
 static void check_floes_made(const bt_check *check)
 {
     const bt_case *input = check->c;
@@ -298,8 +298,8 @@ static void check_tow(const bt_check *check)
     }
 }
 
-/// Way of the tow after which the body meets a wall, `room` ahead of it at the start, that comes with this speed;
-/// INFINITY: not within the run. towards: cosine of the angle between the course and the way to the wall.
+/// Way of the tow until the body meets a wall that is `room` ahead of it at the start and approaches at the speed
+/// `closing`; INFINITY if not within the run. towards: cosine between the course and the direction to the wall.
 static double way_to_wall(const bt_case *input, double room, double towards, double closing)
 {
     const double end = input->run.duration, slack = 1e-9 * (input->domain.length + input->domain.width);
@@ -315,12 +315,12 @@ static double way_to_wall(const bt_case *input, double room, double towards, dou
     return bt_case_tow_led(input, (double)early * input->run.dt);
 }
 
-// A body of prescribed velocity goes through a wall: two infinite masses have no contact law.
+// A body of prescribed velocity passes through a wall: no contact law holds between two infinite masses.
 static void check_path(const bt_check *check, int n, const double *v)
 {
     const bt_case *input = check->c;
-    // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A
-    // vessel may be slower. way-points: case_tow.c
+    // On a line the body follows the end, at the same speed on average, and would end up pulled against the wall. A
+    // vessel may be slower. Way-points: case_tow.c
     const bool straight = input->tow.mode != BT_TOW_NONE && input->tow.mode != BT_TOW_THRUST &&
                           input->tow.n_waypoints == 0;
     if (!straight || !(input->run.duration > 0) ||
@@ -349,7 +349,7 @@ static void check_path(const bt_check *check, int n, const double *v)
                    way, reach, time);
 }
 
-/// Least distance between two parallel lines that enclose the outline: one of them lies along an edge of its hull.
+/// Least distance between two parallel lines that enclose the outline; one lies along an edge of its convex hull.
 static double least_width(int n, const double *v)
 {
     double hull[2 * BT_MAX_VERTICES], least = INFINITY;
@@ -365,7 +365,7 @@ static double least_width(int n, const double *v)
 /// Square of the least radius of gyration of an area about an axis through its centroid, the origin, m².
 static double least_gyration2(int n, const double *v)
 {
-    double area = 0, xx = 0, yy = 0, xy = 0; // twice, and 12, 12 and 24 times, the integrals of 1, x², y² and x y
+    double area = 0, xx = 0, yy = 0, xy = 0; // 2, 12, 12 and 24 times the integrals of 1, x², y² and x y
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n), cross = p[0] * q[1] - p[1] * q[0];
         area += cross;
@@ -377,8 +377,8 @@ static double least_gyration2(int n, const double *v)
     return 0.5 * (xx + yy) - bt_hypot(0.5 * (xx - yy), xy);
 }
 
-/// Walls that close on the body: however it turns, it needs its least width. Between open ends it may be towed away,
-/// and guard.overlap: 0 lets bodies into each other.
+/// Walls that close on the body: whichever way it turns, it needs its least width. With an open boundary it may be
+/// pushed or towed away, and guard.overlap: 0 lets bodies overlap.
 static void check_squeeze(const bt_check *check, const char *key, double closing, double extent, int n, const double *v)
 {
     const bt_case *input = check->c;
@@ -387,7 +387,7 @@ static void check_squeeze(const bt_check *check, const char *key, double closing
         !bt_check_sound(check, "run.dt run.duration domain.length domain.width domain.ends domain.sides"))
         return;
     const double left = extent - 2 * closing * input->run.duration, needed = least_width(n, v);
-    if (left > 0 && left < needed * (1 - 1e-9)) // 0: check_closing
+    if (left > 0 && left < needed * (1 - 1e-9)) // 0 or less: check_closing
         bt_check_fault(check, key,
                        "%g m/s leaves %g m between the walls at the end of the run, and the body is %g m wide where it "
                        "is narrowest; slow them, or end the run after %.10g s",
@@ -419,7 +419,7 @@ static void check_floe(const bt_check *check, int index)
         bt_errors_add(check->err, "%s: the outline is refused: %s", where, why);
         return;
     }
-    if (isnan(floe->thickness)) return; // that of the ice, which is asked for
+    if (isnan(floe->thickness)) return; // the thickness of the ice, which is asked for elsewhere
     char text[BT_ICE_WHY];
     const bt_moments moments = bt_shape_moments(n, v);
     const bt_ice_floe given = {n, v, floe->x, floe->y, floe->yaw, floe->thickness, NAN, 0};
@@ -469,7 +469,7 @@ bt_status bt_case_check(bt_case *input, bt_origin *from, bt_errors *err)
     check_tow(&check);
     bt_case_tow_ramp(input);
     bt_case_tow_check(&check);
-    bt_case_fill_impact(input); // the reference speed goes by that of the tow
+    bt_case_fill_impact(input); // the reference speed depends on that of the tow
     if (placed) check_path(&check, n, v);
     if (placed && input->domain.ends == BT_BOUND_WALL)
         check_squeeze(&check, "domain.ends_closing", input->domain.ends_closing, input->domain.length, n, v);

@@ -19,7 +19,7 @@ const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1] = {BT_SHAPE_
 static bt_shape_outline added[BT_MAX_ADDED_SHAPES];
 static int n_added;
 
-/// Vertices of a shape that has a name, m: neither polygon nor none. As bt_shape_named.
+/// Vertices, m, of a shape that has a name: neither polygon nor none. As bt_shape_named.
 static int body_shape_named(bt_body_shape shape, double length, double width, double *v)
 {
     const int k = (int)shape - BT_OWN_SHAPES;
@@ -54,7 +54,7 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
 
 double bt_case_tow_sign(const bt_case *input) { return bt_cos(input->tow.direction) < 0 ? -1 : 1; }
 
-/// fault: why an outline is refused, or NULL.
+/// fault: returns why an outline is refused, or NULL.
 static int outline_of(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
                       const char *(*fault)(int n, const double *v), const char **why)
 {
@@ -76,7 +76,7 @@ int bt_case_outline(bt_body_shape shape, double length, double width, int n, con
     return outline_of(shape, length, width, n, vertices, v, bt_shape_fault, why);
 }
 
-/// Of a floe, which need not be convex.
+/// Why the outline of a floe, which need not be convex, is refused, or NULL.
 static const char *floe_fault(int n, const double *v)
 {
     bt_parts parts;
@@ -134,7 +134,7 @@ bool bt_case_key_is_idle(const bt_case *input, const char *key)
                                        "ice.size",          "ice.size_law",    "ice.size_min", "ice.size_max",
                                        "ice.size_spread",   "ice.size_exponent", "ice.shake",
                                        "ice.extent.x_min",  "ice.extent.x_max",  "ice.extent.y_min", "ice.extent.y_max",
-                                       // outlines may lack a thickness, and floes given by hand
+                                       // used by outlines without thickness; the last, by floes by hand
                                        "ice.thickness_law", "ice.thickness_spread", "ice.thickness"};
     enum { N = sizeof made / sizeof *made };
     const int n = !bt_case_reads_field(input) ? 0 : input->ice.outlines ? N - 3 : input->n_floes ? N - 1 : N;
@@ -183,15 +183,15 @@ double bt_case_area_by_hand(const bt_case *input)
 
 double bt_case_expected_floes(const bt_case *input)
 {
-    if (bt_case_reads_field(input) || input->ice.concentration == 0) return 0; // a power law has no limits then
+    if (bt_case_reads_field(input) || input->ice.concentration == 0) return 0; // a power law may then have no limits
     const double mean_area = BT_PI / 4 * bt_case_size_moment(input, 2);
-    return mean_area > 0 ? bt_max(0, bt_case_made_area(input) / mean_area) : 0; // a law that is refused makes none
+    return mean_area > 0 ? bt_max(0, bt_case_made_area(input) / mean_area) : 0; // a refused law makes none
 }
 
-// One axis: the region from low to high, and its domain.
+// Extend a region (low, high) and its domain along one axis.
 static void extend(double from, double to, double *low, double *high, double *x0, double *length, bt_bound *bound)
 {
-    // An end that is none, NaN, is that of the region; one within it has been refused.
+    // An end given as none (NaN) is that of the region; an end within the region has been refused.
     const double first = fmin(from, *low), last = fmax(to, *high), slack = 1e-9 * *length;
     if (first == *low && last == *high) return;
     if (!(fabs(*low - *x0) <= slack && fabs(*high - *x0 - *length) <= slack)) *bound = BT_BOUND_WALL;
@@ -217,7 +217,7 @@ double bt_case_floes_made(const bt_case *input)
 int64_t bt_case_steps(const bt_case *input)
 {
     double steps = ceil(input->run.duration / input->run.dt * (1 - 1e-12));
-    return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
+    return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case may ask for more than fits
 }
 
 double bt_case_body_mass(const bt_case *input)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What surrounds the body: tables of current and wind that a case names, and the lead ahead.
+// Surroundings of the body: tables of current and wind that a case names, and the lead ahead.
 #include "case/case_check.h"
 #include "case/case_tow.h"
 #include "case/warning.h"
@@ -15,18 +15,18 @@
 
 bt_status bt_case_read_flow_tables(bt_case *input, bt_errors *err)
 {
-    // Those that are there have been kept (bt_case_read_kept).
+    // A table that is there already comes from a checkpoint (bt_case_read_kept).
     const bt_status water = input->water.current_table && input->water.table.n == 0
                                 ? bt_table_read(&input->water.table, input->water.current_table, err)
                                 : BT_OK;
     const bt_status air =
         input->air.wind_table && input->air.table.n == 0 ? bt_table_read(&input->air.table, input->air.wind_table, err)
                                                          : BT_OK;
-    // What a table holds is reported before what cannot be read: 3 before 4.
+    // A faulty table (exit code 3) takes precedence over one that cannot be read (4).
     return water == BT_OK ? air : air == BT_OK || water == BT_ERR_CASE ? water : air;
 }
 
-/// A table must cover the times that the run asks it for: from 0 to the middle of the last step (force/environment.h).
+/// A table must cover the times that the run looks up: from 0 to the middle of the last step (force/environment.h).
 static void check_table(const bt_check *check, const char *key, const bt_table *table)
 {
     if (table->n == 0) return;
@@ -79,7 +79,7 @@ void bt_case_warn_tables(const bt_case *input, bt_errors *warnings)
     warn_of_table(input, "air.wind_table", &input->air.table, warnings);
 }
 
-// The lead is cut at time zero and goes with the ice, the planned path does not.
+// The lead is cut at time zero and moves with the ice; the planned path does not.
 void bt_case_warn_lead(const bt_case *input, double x, double y, bt_errors *warnings)
 {
     if (input->lead.mode == BT_LEAD_NONE) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How a check of a case complains: where a key stands, whether it was given, whether it was refused already.
+// How checks of a case report faults: where a key stands, whether it was given, whether it was refused already.
 #include "case/case_faults.h"
 
 #include <stdarg.h>

@@ -18,7 +18,7 @@ const char *bt_case_file(const bt_case *input, const bt_key *key)
     return file;
 }
 
-/// The comment of a key, NULL where it names no file, or one that cannot be read; the caller frees it.
+/// The comment for a key; the caller frees it. NULL if the key names no file, or the file cannot be read.
 static char *comment_of(const bt_case *input, const bt_key *key)
 {
     char digest[BT_CHECKSUM_DIGEST];
@@ -42,14 +42,14 @@ char *bt_case_digests(const bt_case *input)
     return bt_text_end(&text);
 }
 
-/// Length of a line with its end.
+/// Length of a line, its end included.
 static size_t line_length(const char *line)
 {
     const size_t n = strcspn(line, "\n");
     return n + (line[n] == '\n');
 }
 
-/// The comment line of a name in a text, NULL = none.
+/// The comment line for a name in a text; NULL if there is none.
 static const char *comment_in(const char *text, const char *name)
 {
     char *comment = bt_text_of("# %s", name);
@@ -78,7 +78,7 @@ char *bt_case_with_digests(const char *resolved, const char *digests)
                       digests ? digests : "");
 }
 
-/// Is a text what bt_case_with_digests has made, but for comments at its end? line: the comment of itself in it.
+/// Is a text the output of bt_case_with_digests, except for comments at its end? line: its comment about itself.
 static bool is_itself(const char *text, const char *line)
 {
     const size_t before = (size_t)(line - text);

@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: MIT
-// The files that a case names: field, outlines, tables. A case says their paths alone. A run that was killed before its
-// first checkpoint begins again by its case.resolved.yml and reads them anew, so what they held is kept there, in a
-// comment for each:
+// The files that a case names: field, outlines, tables. A case stores only their paths. A run that was killed before
+// its first checkpoint starts again from its case.resolved.yml and reads the files again; so case.resolved.yml records
+// what they contained, in a comment for each:
 //
 //     # water.current_table: 312 bytes, xxh128 0123...
 //
-// So is what the file itself said, in its second line (# case: ...), where a file that is cut has it, too: edited
-// meanwhile, it would be the case of another run under the name of this one.
+// Its second line (# case: ...) does the same for case.resolved.yml itself, and is still there if the file is cut: a
+// file edited in the meantime would be the case of another run under the name of this one.
 //
-// Rejected: a checkpoint at time zero, which holds them. A checkpoint means that a new result stands and the old one
-// may go (output/folder.h), and that a member of an ensemble whose process dies gets on (run/ensemble_list.h).
+// Rejected: a checkpoint at time zero, which contains them. A checkpoint means that a new result stands and the old one
+// may go (output/folder.h), and that a member whose process dies has made progress (run/ensemble_list.h).
 #ifndef BT_CASE_FILES_H
 #define BT_CASE_FILES_H
 
 #include "bergtow/case.h"
 #include "case/schema.h"
 
-/// The file of a key that names one, NULL = none.
+/// The file that a key names; NULL if none.
 const char *bt_case_file(const bt_case *input, const bt_key *key);
 
 /// These comments, for all files that can be read; the caller frees them.
 char *bt_case_digests(const bt_case *input);
 
-/// Those of them that a text has; the caller frees it.
+/// Those of these comments that a text contains; the caller frees them.
 char *bt_case_digests_in(const bt_case *input, const char *text);
 
-/// case.resolved.yml: the resolved case with the comment of itself, and those of its files (bt_case_digests), or NULL.
-/// The caller frees it.
+/// The text of case.resolved.yml: the resolved case with the comment about itself, and digests, those about its files
+/// (bt_case_digests), or NULL. The caller frees it.
 char *bt_case_with_digests(const char *resolved, const char *digests);
 
-/// Is the case.resolved.yml of this text what its comment says? dir: of the run, for the messages. Errors: BT_ERR_CASE.
+/// Does a case.resolved.yml match its comment about itself? dir: of the run, for messages. Errors: BT_ERR_CASE.
 bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *err);
 
-/// Are the files what the comments in input->text say? The rest as above.
+/// Do the files match the comments in input->text? The rest as above.
 bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err);
 
-/// What a text says behind "NAME: " at the beginning of a line, NULL = nothing.
+/// The text behind "NAME: " at the beginning of a line; NULL if there is none.
 const char *bt_case_said_of(const char *text, const char *name);
 
 #endif

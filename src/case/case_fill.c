@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers that follow from other keys where they are not given.
+// Defaults of numbers that follow from other keys.
 #include "case/case_check.h"
 #include "case/case_tow.h"
 
@@ -13,11 +13,11 @@ static double size_of(int n, const double *v) { return n ? sqrt(4 / BT_PI * bt_s
 void bt_case_fill_size(bt_case *input)
 {
     if (!isnan(input->ice.size) || input->domain.frame == BT_FRAME_BASIN) return;
-    if (bt_case_makes_ice(input) || bt_case_reads_field(input)) return; // that is asked for
+    if (bt_case_makes_ice(input) || bt_case_reads_field(input)) return; // the case must give it
     double v[2 * BT_MAX_VERTICES], sum = 0;
     for (bt_idx i = 0; i < input->n_floes; i++) sum += size_of(bt_case_floe_outline(&input->floes[i], v), v);
     const double body = size_of(bt_case_waterline(input, v), v);
-    input->ice.size = sum > 0 ? sum / input->n_floes : body > 0 ? body : 1; // of no bodies: without effect
+    input->ice.size = sum > 0 ? sum / input->n_floes : body > 0 ? body : 1; // without bodies it has no effect
 }
 
 void bt_case_fill_scene(bt_case *input)
@@ -36,7 +36,7 @@ void bt_case_fill_scene(bt_case *input)
     bt_check_fill(&input->body.sail, bt_max(0, input->body.draft * (input->water.density / input->body.density - 1)));
     bt_check_fill(&input->body.friction, input->ice.friction);
     bt_check_fill(&input->body.restitution, input->ice.restitution);
-    // A thickness that every floe has for itself, NaN, leaves what the frame says.
+    // If every floe has its own thickness (NaN here), bt_max leaves the 2 m of the geographic frame.
     bt_check_fill(&input->ice.splitting.least_size, basin ? 3 * input->ice.thickness
                                                           : bt_max(3 * input->ice.thickness, 2));
 }

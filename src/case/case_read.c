@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading of a case: file and --set overrides onto the schema, with every error of the case in one go.
+// Reading a case: file and --set overrides by the schema, with all errors of the case reported at once.
 #include "case/case_check.h"
 
 #include "bergtow/shape.h"
@@ -19,7 +19,7 @@
 
 typedef struct {
     bt_case *c;
-    const char *path;         // of the file that is read
+    const char *path;         // of the file being read
     bt_errors *err;
     bt_origin *from;          // [bt_n_case_keys]
     const bt_node **given;    // [bt_n_case_keys] the value of each key, or NULL
@@ -34,7 +34,7 @@ void bt_case_defaults(bt_case *input)
     input->n_extra = bt_schema_added();
 }
 
-/// Is the first word of a text, which has more, a key of this section (with its dot)?
+/// Does a text begin with a key of this section (with its dot), followed by more?
 static bool begins_with_key(const bt_key *keys, int n, const char *section, const char *text)
 {
     char name[160];
@@ -43,7 +43,7 @@ static bool begins_with_key(const bt_key *keys, int n, const char *section, cons
     return text[word] && (bt_schema_find(keys, n, name) >= 0 || bt_schema_is_section(name));
 }
 
-/// A text that is "key value", or "key:value" within { }; its key without the sections is written again.
+/// Report a text that is "key value", or "key:value" within { }; the remedy shows its key without the sections.
 static void colon_missing(reader *in, int line, const char *section, const char *text)
 {
     const size_t word = strcspn(text, " \t:");
@@ -73,7 +73,7 @@ static bool is_nothing(const bt_node *node)
            (!*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null"));
 }
 
-/// Is the value of a section "key value"?
+/// Is the value of a section "key value", without the colon?
 static bool lacks_colon(const bt_node *value, const char *name)
 {
     char section[164];
@@ -82,7 +82,7 @@ static bool lacks_colon(const bt_node *value, const char *name)
            begins_with_key(bt_case_keys, bt_n_case_keys, section, value->text);
 }
 
-/// The value of a key in the file that is read; one that stands in a file based on this holds.
+/// Record the value of a key in the file being read; a value in a file based on this one takes precedence.
 static void give(reader *in, int k, const bt_node *value, int line)
 {
     if (!in->given[k]) {
@@ -95,8 +95,8 @@ static void give(reader *in, int k, const bt_node *value, int line)
     }
 }
 
-/// A number with a decimal comma within { } is cut in two: `thickness: 0` and a key `8 m` without a value. section: of
-/// the map, or "".
+/// Report a decimal comma within { }, which cuts a number in two: `thickness: 0`, and a key `8 m` without a value.
+/// section: of the map, or "".
 static bool is_after_comma(reader *in, const bt_node *map, int i, const char *section)
 {
     const bt_node *left = i > 0 ? map->item[i - 1] : NULL;
@@ -125,7 +125,7 @@ static void walk(reader *in, const bt_node *map, const char *prefix)
         } else if (!strcmp(name, "floes")) {
             if (!in->floes) in->floes = value, in->floes_path = in->path;
         } else if (!strcmp(name, "base")) {
-            continue; // bt_case_files_read has followed it
+            continue; // done by bt_case_files_read
         } else if (is_after_comma(in, map, i, prefix)) {
             continue;
         } else if (!bt_schema_is_section(name)) {
@@ -143,7 +143,7 @@ static void walk(reader *in, const bt_node *map, const char *prefix)
     }
 }
 
-// A list of points [[x, y], ...] into base. where: start of the message.
+// Read a list of points [[x, y], ...] into base. where: start of the message.
 static bool read_points(const bt_key *key, void *base, const bt_node *list, const char *where, bt_errors *err)
 {
     if (list->kind == BT_NODE_SCALAR && list->plain && !strcmp(list->text, "none")) return true;
@@ -275,7 +275,7 @@ static void read_floes(reader *in)
     }
 }
 
-/// "ice.size" of "ice.size = 3 m".
+/// Length of "ice.size" in "ice.size = 3 m".
 static size_t key_length(const char *set)
 {
     size_t n = strcspn(set, "=");
@@ -318,21 +318,21 @@ static void read_override(reader *in, const char *set, const char *place)
         if (in->from[k].faulty) bt_errors_add(in->err, "%s: %s", where, why);
         return;
     }
-    bt_schema_release(&bt_case_keys[k], 1, in->c); // an earlier override of the same key
+    bt_schema_release(&bt_case_keys[k], 1, in->c); // of an earlier override of this key
     memset((char *)in->c + bt_case_keys[k].offset_count, 0, sizeof(int));
     bt_node *points = bt_tree_parse(value, strlen(value), where, in->err);
     in->from[k].faulty = !points || !read_points(&bt_case_keys[k], in->c, points, where, in->err);
     bt_tree_free(points);
 }
 
-/// Defaults, and the file name for messages.
+/// Set the defaults, and the file name for messages.
 static void begin_case(bt_case *input, const char *path)
 {
     bt_case_defaults(input);
     input->path = bt_text_copy(path);
 }
 
-/// Is the override the last one of its key, which holds?
+/// Is the override the last one of its key, which takes effect?
 static bool holds(const char *const *overrides, int i, int n)
 {
     const size_t own = key_length(overrides[i]);
@@ -341,8 +341,8 @@ static bool holds(const char *const *overrides, int i, int n)
     return strchr(overrides[i], '=');
 }
 
-/// The texts of the files, and behind them, as a document of its own, what was given in place of their values: who
-/// reads a result, also one that was resumed, tells from it which comment in the files is of the value that was run.
+/// The texts of the files, followed by the overrides as a separate document: from it a reader of a result, also of a
+/// resumed run, can tell whether a comment in the files belongs to the value that was run.
 static char *text_as_given(const bt_case_files *files, const char *const *overrides, int n)
 {
     char *text = bt_case_files_text(files);
@@ -365,7 +365,7 @@ static char *text_as_given(const bt_case_files *files, const char *const *overri
     return both;
 }
 
-/// The text of `input` into its values.
+/// Read the values of `input` from its text.
 static bt_status read_text(bt_case *input, size_t size, bool alone, const char *const *overrides,
                            const char *const *place, int n, bt_errors *err)
 {
@@ -387,7 +387,7 @@ static bt_status read_text(bt_case *input, size_t size, bool alone, const char *
     }
     in.path = input->path;
     for (int i = 0; i < n; i++) read_override(&in, overrides[i], place ? place[i] : NULL);
-    for (int k = 0; place && k < bt_n_case_keys; k++) // another member may have another value of what nobody gives here
+    for (int k = 0; place && k < bt_n_case_keys; k++) // not given: other members may have other values
         if (!in.given[k] && !in.from[k].set) in.from[k].place = "";
     read_given(&in);
     read_floes(&in);

@@ -15,9 +15,9 @@
 #include "case/speed_law.h"
 #include "base/elementary.h"
 
-enum { TIMES = 2000 };                 // of a run at which its planned track is looked at
-static const double DAMPING = 0.03;     // of critical, of a line at sea, assumed
-static const double BESIDE_HULL = 0.05; // of the hull's extent that a fastening point may lie outside it, assumed
+enum { TIMES = 2000 };                 // times of a run at which its planned track is checked
+static const double DAMPING = 0.03;     // share of the critical damping, of a line at sea, assumed
+static const double BESIDE_HULL = 0.05; // how far outside the hull a fastening point may lie / its extent, assumed
 
 static bool has_line(const bt_case *input)
 {
@@ -44,7 +44,7 @@ static void largest_speed(const bt_case *input, double end, double *speed, doubl
     if (isfinite(end) && bt_speed_law_at(&law, end) > *speed) *speed = bt_speed_law_at(&law, end), *time = end;
 }
 
-/// Until when a programme is followed: points after the end of the run are none of the tow.
+/// End of the time in which a programme counts: points after the end of the run are not part of the tow.
 static double programme_end(const bt_case *input) { return input->run.duration > 0 ? input->run.duration : INFINITY; }
 
 double bt_case_tow_distance(const bt_case *input, double t)
@@ -56,7 +56,7 @@ double bt_case_tow_distance(const bt_case *input, double t)
 double bt_case_tow_led(const bt_case *input, double t)
 {
     const bt_speed_law law = speed_law(input);
-    const double steps = ceil(t / input->run.dt * (1 - 1e-12)); // not a number in a case that is refused
+    const double steps = ceil(t / input->run.dt * (1 - 1e-12)); // NaN in a refused case
     return bt_speed_law_led(&law, steps > 0 && steps < 1e15 ? (int64_t)steps : 0, input->run.dt);
 }
 
@@ -88,7 +88,7 @@ double bt_case_tow_turn(const bt_case *input, int k)
 
 // ---- where it starts, and its path ----
 
-/// A point of the hull in the world at time zero.
+/// A point of the hull in coordinates of the world at time zero.
 static void hull_at(const bt_case *input, double hx, double hy, double at[2])
 {
     const double cy = bt_cos(input->body.yaw), sy = bt_sin(input->body.yaw);
@@ -96,8 +96,8 @@ static void hull_at(const bt_case *input, double hx, double hy, double at[2])
     at[1] = input->body.y + sy * hx + cy * hy;
 }
 
-/// Distance of the ends of a branch at the start, m: just taut, without tension. A line with a weight is never without:
-/// it starts with BT_START_PULL times its weight.
+/// Distance between the ends of a branch at the start, m: just taut, without tension. A line with a weight always has
+/// tension: it starts with a pull of BT_START_PULL times its weight.
 static double start_span(const bt_case *input, double length, double stiffness)
 {
     const double w = input->tow.line.weight;
@@ -116,8 +116,8 @@ bool bt_case_tow_start(const bt_case *input, double at[2])
     at[0] = p[0] + length[0] * ux;
     at[1] = p[1] + length[0] * uy;
     if (input->tow.line.branches < 2 || !has_line(input)) return true;
-    // Two branches: ahead of the middle between their fastening points, as far as neither is stretched. (Where both are
-    // just taut may lie far off the tow's axis, when one point lies ahead of the other.)
+    // Two branches: the end is as far ahead of the middle between their fastening points as it can be without
+    // stretching one. (Where both are just taut may be far off the tow's axis, if one point lies ahead of the other.)
     hull_at(input, input->tow.branch2.hull_x, input->tow.branch2.hull_y, q);
     const double *const hull[2] = {p, q};
     const double mx = 0.5 * (p[0] + q[0]), my = 0.5 * (p[1] + q[1]);
@@ -189,7 +189,7 @@ double bt_case_tow_cut(const bt_case *input)
 {
     bt_trail trail;
     if (input->tow.n_waypoints == 0 || !has_line(input) || !bt_case_trail_begin(input, &trail)) return 0;
-    enum { BEHIND = 100 }; // points of the path, to two lines' lengths behind the end: the body is beside one of these
+    enum { BEHIND = 100 }; // points of the path, up to two line lengths behind the end; the body is beside one of them
     double at[2], beside[2], tangent[2], most = 0;
     const double whole = bt_case_tow_distance(input, input->run.duration);
     for (int i = 1; i <= TIMES; i++) {
@@ -219,7 +219,7 @@ void bt_case_tow_course(const bt_check *check)
             bt_atan2(input->tow.waypoints[1] - input->body.y, input->tow.waypoints[0] - input->body.x);
 }
 
-/// Stiffness of a branch, N/m: of one with a weight as it starts, if that is wanted, or stretched.
+/// Stiffness of a branch, N/m: of a stretched line, or (at_start) of a line with a weight as it starts.
 static double branch_stiffness(const bt_case *input, double length, double stiffness, bool at_start)
 {
     double tangent = stiffness / length;
@@ -242,11 +242,11 @@ static double period_on(const bt_case *input, bool at_start)
     return isfinite(period) ? period : 0;
 }
 
-/// At sea: a share of the critical damping of the body on its line or lines, N s/m; 0 without a line.
+/// Damping at sea: a share of the critical damping of the body on its line or lines, N s/m; 0 without a line.
 static double damping_of(const bt_case *input)
 {
     const double stiffness = input->tow.line_stiffness / input->tow.line_length, period = period_on(input, false);
-    // 2 ζ k/ω of each of parallel lines makes 2 ζ M ω of them all
+    // parallel lines with 2 ζ k/ω each have 2 ζ M ω together
     return period > 0 ? DAMPING * stiffness * period / BT_PI : 0;
 }
 
@@ -267,16 +267,16 @@ void bt_case_tow_follow(const bt_check *check)
     bt_check_fill(&input->tow.branch2.length, input->tow.line_length);
     bt_check_fill(&input->tow.branch2.stiffness, input->tow.line_stiffness);
     bt_check_fill(&input->tow.branch2.breaking_load, input->tow.line.breaking_load);
-    bt_check_fill(&input->tow.line_damping, at_sea ? damping_of(input) : 100); // by the stiffness of both branches
+    bt_check_fill(&input->tow.line_damping, at_sea ? damping_of(input) : 100); // needs the stiffness of both branches
     bt_check_fill(&input->tow.branch2.damping, input->tow.line_damping);
     bt_check_fill(&input->tow.vessel.free_resistance, 0.4 * input->tow.vessel.bollard_pull);
     bt_check_fill(&input->tow.vessel.lookahead, input->tow.line_length > 0 ? input->tow.line_length : 1);
 }
 
-// A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r
-// with that amplitude. A sudden start has the amplitude M v ω = 2π M v/T: two periods bring it down to a twelfth, and
-// whole periods leave no swing behind. A line with a weight is softest as it starts, where its slack is still to be
-// taken up, and that period is the longest.
+// A linear ramp of duration T_r accelerates the body at v/T_r; the tension of an undamped line then swings about M
+// v/T_r with that amplitude. A sudden start has the amplitude M v ω = 2π M v/T: a ramp of two periods reduces it to a
+// twelfth, and one of whole periods leaves no swing behind. A line with a weight is softest as it starts, when its
+// slack is still to be taken up: its period is then the longest.
 double bt_case_line_period(const bt_case *input) { return period_on(input, true); }
 
 double bt_case_steepest_ramp(const bt_case *input)
@@ -301,13 +301,13 @@ double bt_case_earliest_window(const bt_case *input)
     if (input->output.window_start >= 0) return input->output.window_start;
     if (input->tow.mode == BT_TOW_NONE) return 0;
     if (bt_case_start_is_slow(input)) return input->tow.ramp;
-    // A start that jerks the line: the body swings on, and a few swings are too few to be told from chance. Of a short
-    // run half is left.
+    // After a start that jerks the line the body keeps swinging, and a few swings are too few to be told from chance:
+    // leave out two, but at most half of what follows the ramp.
     const double swings = BT_RAMP_PERIODS * bt_case_line_period(input), rest = input->run.duration - input->tow.ramp;
     return input->tow.ramp + bt_max(0, bt_min(swings, 0.5 * rest));
 }
 
-/// Speed and course that change within a step.
+/// Warn of a speed and a course that change within a step.
 static void warn_of_jerks(const bt_case *input, bt_errors *warnings)
 {
     const double *p = input->tow.programme;
@@ -332,7 +332,7 @@ static void warn_of_jerks(const bt_case *input, bt_errors *warnings)
     bt_path_free(&path);
 }
 
-/// Largest speed of the current along the tow, m/s; over all legs of it.
+/// Largest speed of the current along the tow over all its legs, m/s.
 static double following(const bt_case *input)
 {
     double most = 0;
@@ -349,7 +349,7 @@ static double following(const bt_case *input)
     return most;
 }
 
-/// A body that comes on faster than its towing end, which a line does not hinder.
+/// Warn of a current that carries the body past its towing end, which a line does not prevent.
 static void warn_of_overtaking(const bt_case *input, bt_errors *warnings)
 {
     const double along = has_line(input) ? following(input) : 0;
@@ -362,8 +362,8 @@ static void warn_of_overtaking(const bt_case *input, bt_errors *warnings)
                       along, input->tow.speed);
 }
 
-/// A run that is over before the tow has its speed. Of a programme the ramp is the time of its largest speed within
-/// the run.
+/// Warn of a run that ends before the tow has its speed. Not for a programme, whose ramp is the time of its largest
+/// speed within the run.
 static void warn_of_short_run(const bt_case *input, bt_errors *warnings)
 {
     if (input->tow.mode == BT_TOW_NONE || input->tow.n_programme > 0 || !(input->tow.speed > 0)) return;
@@ -403,7 +403,7 @@ void bt_case_tow_ramp(bt_case *input)
     input->tow.ramp = bt_max(way, BT_RAMP_PERIODS * bt_case_line_period(input));
 }
 
-/// The point of the waterline farthest in a direction; the middle when several corners are equally far.
+/// The point of the waterline farthest in a direction; the middle of the corners if several are equally far.
 static void farthest_point(int n, const double *v, double ux, double uy, double at[2])
 {
     double most = -INFINITY, size = 0, x = 0, y = 0;
@@ -458,7 +458,7 @@ static void check_programme(const bt_check *check)
             input->tow.ramp, time);
 }
 
-/// How far a point lies outside a convex outline, m; within it less than 0.
+/// How far a point lies outside a convex outline, m; negative inside.
 static double outside_of(int n, const double *v, double x, double y)
 {
     double most = -INFINITY;
@@ -469,7 +469,7 @@ static double outside_of(int n, const double *v, double x, double y)
     return most;
 }
 
-/// A line is fastened on the hull, or a little beside its waterline.
+/// A line must be fastened on the hull, or at most a little beside its waterline.
 static void check_fastening(const bt_check *check)
 {
     const bt_case *input = check->c;
@@ -492,8 +492,8 @@ static void check_fastening(const bt_check *check)
     }
 }
 
-/// First time at which the body, led along the path or trailing behind what is, leaves the walls; negative = never. At
-/// TIMES times of the run.
+/// First of TIMES times of the run at which the body, led along the path or trailing behind an end that is, passes a
+/// wall; negative = never.
 static double time_of_wall(const bt_case *input)
 {
     double v[2 * BT_MAX_VERTICES], at[2], found = -1;
@@ -526,7 +526,7 @@ static void check_waypoints(const bt_check *check)
     if (!bt_check_sound(check, "tow.waypoints tow.turn_radius tow.direction tow.mode tow.line_length tow.line.branches "
                                "body.x body.y body.yaw"))
         return;
-    if (input->tow.n_waypoints == 0 || input->tow.mode == BT_TOW_NONE) return; // that has no effect: constraints.c
+    if (input->tow.n_waypoints == 0 || input->tow.mode == BT_TOW_NONE) return; // no effect: constraints.c
     const double dx = input->tow.waypoints[0] - input->body.x, dy = input->tow.waypoints[1] - input->body.y,
                  course = bt_atan2(dy, dx);
     if (fabs(remainder(input->tow.direction - course, 2 * BT_PI)) > 1e-9) {
@@ -552,7 +552,7 @@ static void check_waypoints(const bt_check *check)
         bt_check_fault(check, "tow.waypoints", "%s", why);
         return;
     }
-    // As for the direction of a straight tow.
+    // The same limit as for the direction of a straight tow.
     for (int i = 0; input->domain.ends == BT_BOUND_MOVING && i + 1 < input->tow.n_waypoints &&
          bt_check_sound(check, "domain.ends");
          i++) {
@@ -565,7 +565,7 @@ static void check_waypoints(const bt_check *check)
                        i + 1, bt_atan2(ly, lx) * 180 / BT_PI);
         break;
     }
-    // A vessel may be slower than its programme, and is not held to it.
+    // A vessel need not keep up with its programme, so its way is not known.
     if (input->tow.mode != BT_TOW_THRUST && input->run.duration > 0 && input->body.shape != BT_BODY_ABSENT &&
         bt_check_sound(check, "run.duration tow.speed tow.ramp tow.programme domain.length domain.width domain.x0 "
                               "domain.y0 domain.ends domain.sides domain.ends_closing domain.sides_closing "

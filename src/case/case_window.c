@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Case keys of the moving window (domain.ends: moving): defaults that follow from other keys, and what it cannot follow
-// or take along.
+// Case keys of the moving window (domain.ends: moving): defaults that follow from other keys, and checks of what the
+// window cannot follow or carry along.
 #include <math.h>
 #include <stdio.h>
 
@@ -28,7 +28,7 @@ void bt_case_window_face(bt_case *input, double x)
     if (!isnan(input->body.x)) return;
     const double x0 = isnan(input->domain.x0) ? 0 : input->domain.x0, back = x0 + ahead_of(input),
                  on = x0 + input->domain.length - ahead_of(input);
-    input->body.x = x < on ? back : on; // what lies between the two is ahead of the one, and a way back from the other
+    input->body.x = x < on ? back : on; // x between the two is ahead of `on` and behind `back`: either will do
 }
 
 void bt_case_window_follow(bt_case *input)
@@ -42,14 +42,14 @@ void bt_case_window_follow(bt_case *input)
     if (isnan(input->body.x)) input->body.x = sign > 0 ? input->domain.x0 + length - ahead : input->domain.x0 + ahead;
 }
 
-/// First fault: its key, and why with remedy; NULL = none. The body reaches from x_min to x_max about its centroid.
+/// First fault: its key, with the remedy in why; NULL = none. The body reaches from x_min to x_max about its centroid.
 static const char *find_fault(const bt_case *input, bool ahead_given, double x_min, double x_max, char why[256])
 {
     const double sign = bt_case_tow_sign(input), ahead = input->domain.ahead, length = input->domain.length;
     const bool ice = bt_case_makes_ice(input) || bt_case_reads_field(input) || input->n_floes > 0;
     const double floe = ice ? bt_case_mean_size(input) : 0;
     if (input->domain.ends != BT_BOUND_MOVING) {
-        // the resolved file has every key
+        // a resolved file gives every key
         if (!ahead_given || fabs(ahead - bt_case_window_ahead(input)) <= 1e-9 * length) return NULL;
         snprintf(why, 256, "%g m has no effect without domain.ends: moving; set it or remove the key", ahead);
         return "domain.ahead";

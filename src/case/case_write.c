@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writing of a case: the resolved file, and the table of keys for --list-keys.
+// Writing a case: the resolved file, and the table of keys for --list-keys.
 #include "base/json.h"
 #include "base/largest.h"
 #include "case/case_base.h"
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Open the sections of a dotted name that the previous name was not in; returns the name's last part.
+// Open the sections of a dotted name that the previous name is not in; returns the last part of the name.
 static const char *open_sections(FILE *out, const char *previous, const char *name, int *depth)
 {
     *depth = 0;
@@ -40,7 +40,7 @@ char *bt_case_resolved(const bt_case *input)
     return bt_case_text(input, BT_CASE_RESOLVED_HEAD);
 }
 
-/// The member of a key, of `size` bytes.
+/// Copy the member of a key, `size` bytes.
 static void member_of(const bt_case *input, const bt_key *key, void *out, size_t size)
 {
     memcpy(out, (const char *)input + key->offset, size);
@@ -101,7 +101,7 @@ char *bt_case_text(const bt_case *input, const char *head)
     FILE *out = text.out;
     fputs(head, out);
     const char *previous = "";
-    const int n = bt_n_case_keys - bt_schema_added() + input->n_extra; // of a law that came later it has no values
+    const int n = bt_n_case_keys - bt_schema_added() + input->n_extra; // it has no values of laws added later
     for (int k = 0; k < n; k++) {
         const bt_key *key = &bt_case_keys[k];
         int depth;
@@ -159,7 +159,7 @@ void bt_case_list_keys(void *stream)
     bt_largest_print(out);
 }
 
-/// Least and most value in the unit of a number without one, and whether the value itself is left out.
+/// Bounds of a key in the unit of a number without one, and whether each bound itself is excluded.
 static void json_range(bt_json *json, const bt_key *key)
 {
     bt_key bare = *key;

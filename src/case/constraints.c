@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Constraints between keys: two tables of rows, each with the condition under which it holds. Where a message has to
-// compute more than a comparison, a function checks (case_check.c, case_tow.c, case_window.c).
+// Constraints between keys: two tables of rows, each with the condition under which it holds. A message that needs more
+// than a comparison comes from a function of its own (case_check.c, case_tow.c, case_window.c).
 //
-// Keys without effect. Who gives both keys in one file contradicts himself, and is refused. Where they come from
-// different places, the key may be inherited, from a base or from the case that a study or --set changes: then the run
-// says that it was not used. A default says nothing, nor does a file that has every key, as a resolved case and a
-// scaled twin have. Rows of ALWAYS are refused wherever the key comes from: what it asks for would be missing.
+// Keys without effect. A file that gives both keys contradicts itself, and is refused. If they come from different
+// places, the key may be inherited, from a base or from the case that a study or --set changes: then the run warns that
+// it is not used. Defaults cause no message, nor do files with every key, such as a resolved case and a scaled twin.
+// Rows of ALWAYS are refused wherever the key comes from: what it asks for would be missing.
 //
 // Limits: a value against a number or against another key, and combinations that are refused.
 #include "case/constraints.h"
@@ -24,7 +24,7 @@
 
 // --- keys without effect ---------------------------------------------------------------------------------------------
 
-/// When keys without effect are refused; NEVER: nor is there a warning, as the program itself gives them a value.
+/// When keys without effect are refused. NEVER: there is no warning either, since the program itself sets them.
 typedef enum { TOGETHER, ALWAYS, NEVER } refusal;
 
 /// Keys that are not used.
@@ -32,7 +32,7 @@ typedef struct idle {
     bool so;
     refusal refused;
     const char *keys;  ///< separated by blanks
-    const char *cause; ///< the keys that make them so, separated by blanks
+    const char *cause; ///< keys that make them useless, separated by blanks
     const char *why;   ///< completes "has no effect "
 } idle;
 
@@ -45,7 +45,7 @@ enum { IDLE = 38 };
 static void list_idle(const bt_case *input, idle out[IDLE])
 {
     const bool read = bt_case_reads_field(input), power = input->ice.size_law == BT_SIZE_POWER;
-    // of ice that is read a moving window has its room in floes of ice.size (case_window.c)
+    // for ice that is read, a moving window measures its room in floes of ice.size (case_window.c)
     const bool sized = input->domain.ends == BT_BOUND_MOVING;
     const bool line = input->tow.mode == BT_TOW_LINE || input->tow.mode == BT_TOW_THRUST;
     const bool walls = input->domain.ends == BT_BOUND_WALL || input->domain.sides == BT_BOUND_WALL;
@@ -147,7 +147,7 @@ static size_t size_of(const bt_key *key)
     return key->type == BT_KEY_REAL ? sizeof(double) : key->type == BT_KEY_INT ? sizeof(int64_t) : sizeof(int);
 }
 
-/// A case with a key of a number or a choice at its default, all others as they are. No memory of its own.
+/// A case with one key, a number or a choice, at its default, and all others as they are. Owns no memory.
 static bt_case with_default(const bt_case *c, const bt_key *key)
 {
     bt_case d = *c;
@@ -176,7 +176,7 @@ bool bt_case_changed(const bt_case *c, const char *key)
     return memcmp((const char *)c + k->offset, (const char *)&d + k->offset, size_of(k)) != 0;
 }
 
-/// Calls found for each key that is not used although its value is not the default.
+/// Call `found` for each key that is not used although its value is not the default.
 static void look(const bt_case *input, void (*found)(void *to, const char *key, const idle *rule), void *to)
 {
     idle rules[IDLE];
@@ -187,7 +187,7 @@ static void look(const bt_case *input, void (*found)(void *to, const char *key, 
             if (bt_case_changed(input, name)) found(to, name, &rules[i]);
 }
 
-/// Does the file in which the key stands have more than half of all keys? Nobody writes so many by hand.
+/// Does the file that gives the key have more than half of all keys? Nobody writes so many by hand.
 static bool says_all(const bt_check *check, const char *key)
 {
     int n = 0;
@@ -211,7 +211,7 @@ static void refuse(void *to, const char *key, const idle *rule)
     bt_check_fault(check, key, "has no effect %s; remove the key, or change %s", rule->why, cause);
 }
 
-/// Keys of one reason in a row, so that one warning says them.
+/// Keys with the same reason in sequence, so that one warning names them all.
 typedef struct warning {
     bt_errors *warnings;
     const char *why;
@@ -259,14 +259,14 @@ void bt_case_put_default(bt_case *c, int key)
 
 typedef enum { REFUSED, NEEDED, BELOW, AT_MOST, AT_LEAST } relation;
 
-/// A value that must be above 0 (NEEDED) or keep a bound; or a combination that is refused.
+/// A value that must be above 0 (NEEDED) or keep within a bound; or a combination that is refused.
 typedef struct limit {
-    bool so;           ///< the row holds; of REFUSED: the fault is there
+    bool so;           ///< the row applies; of REFUSED: the fault is present
     relation relation;
     const char *key;
-    const char *of;    ///< the key or words (with blanks) that the bound comes from, or who needs the value
+    const char *of;    ///< the key or words (with blanks) behind the bound; of NEEDED: why the value is needed
     double bound;
-    const char *beside; ///< keys that decide on the row, separated by blanks
+    const char *beside; ///< other keys that the row depends on, separated by blanks
     const char *why;    ///< reason and remedy, with the colon or semicolon before them; of NEEDED: an example
 } limit;
 
@@ -275,9 +275,9 @@ typedef struct limit {
 #define BODY "body.shape tow.mode"
 
 enum { LIMITS = 63 };
-enum { TIDE_STEPS = 20 }; // a step takes the current of its middle: 1 - sinc(π/20) = 0.4 % of the mean over it
+enum { TIDE_STEPS = 20 }; // a step takes the current at its middle: 1 - sinc(π/20) = 0.4 % off its mean
 
-/// Does the tow keep its place across x? Then what it leads through goes round a moving window as it is.
+/// Does the tow run along x? Then its lead goes round in a moving window without being displaced.
 static bool along_x(const bt_case *input)
 {
     bool along = fabs(bt_sin(input->tow.direction)) <= 1e-9;
@@ -296,7 +296,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
     const double slack = 1e-9 * (input->domain.length + input->domain.width), x0 = input->domain.x0 - slack,
                  x1 = input->domain.x0 + input->domain.length + slack, y0 = input->domain.y0 - slack,
                  y1 = input->domain.y0 + input->domain.width + slack;
-    // a region without room is refused for that alone; so are sizes in the wrong order
+    // a region without room, or sizes in the wrong order, are refused for that alone
     const double room = bt_min(input->ice.x_max - input->ice.x_min, input->ice.y_max - input->ice.y_min);
     const bool roomy = made && room > 0 && ordered;
     const double period = bt_min(bt_bound_wraps(input->domain.ends) ? input->domain.length : INFINITY,
@@ -321,7 +321,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
                       *const alone = "is given without the other coordinate of the origin; give both, or none for the "
                                      "middle of the outlines";
     const limit all[] = {
-        // a case built in memory can leave the two keys without default unset
+        // in a case built in memory, the two keys without a default may be unset
         {true, NEEDED, "run.dt", "a run needs it", 0, "", "0.1 s"},
         {true, NEEDED, "run.duration", "a run needs it", 0, "", "450 s"},
         {true, AT_MOST, "run.dt", "run.duration", input->run.duration, "", "; shorten the step or lengthen the run"},
@@ -360,7 +360,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
         {lognormal && size_max > 0, AT_MOST, "ice.size", "ice.size_max", size_max, MADE, one},
         {roomy && power, AT_MOST, "ice.size_max", "the short side of the ice region", room, MADE EXTENT, large},
         {roomy && !power, AT_MOST, "ice.size", "the short side of the ice region", room, MADE EXTENT, large},
-        // else a run is refused by its seed
+        // otherwise it depends on the seed whether a run is refused
         {roomy && input->ice.size_law != BT_SIZE_SINGLE && size_max <= room, BELOW, "ice.size_max",
          "half the period of the domain", 0.5 * period, MADE EXTENT,
          ": two such floes have no room side by side as they turn; take smaller floes or a larger domain"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a run costs, before it is made.
+// Cost of a run, estimated before it starts.
 #include "case/cost.h"
 
 #include <math.h>
@@ -15,18 +15,17 @@
 
 static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS,
                     BYTES_PER_PART = 450, BASE_BYTES = 30e6;
-// The history grows by doubling. HDF5 keeps what it knows of each entry of the series and of each frame, up to a bound.
+// The history doubles as it grows. HDF5 keeps some memory for each entry of the series and each frame, up to a bound.
 static const double GROWN = 1.25, BYTES_PER_ENTRY = 810, MOST_OF_ENTRIES = 110e6, BYTES_PER_FRAME = 140e3,
                     MOST_OF_FRAMES = 60e6;
-// on rank 0 while it writes one: contacts on the way, and a column of the bodies
+// on rank 0 while it writes a checkpoint: contacts in transit, and a column of the bodies
 static const double CHECKPOINT_BYTES_PER_FLOE = 300;
 
 // --- disk ------------------------------------------------------------------------------------------------------------
 
-// Of result.h5 without data; of a frame: its group and nine datasets (xdmf.h); of a dataset that is deflated, its
-// index.
+// Of result.h5 without data; of a frame: its group and nine datasets (xdmf.h); of the index of a deflated dataset.
 static const double RESULT_BASE = 350e3, FRAME_BASE = 4880, INDEX = 2600, LEAST_PACKED = 8192;
-// Shares that shuffle and deflate leave: of poses, of corners, and of speeds and forces, which are 0 of most floes.
+// Shares left by shuffle and deflate: of poses, of corners, and of speeds and forces, which are 0 for most floes.
 static const double POSE_LEFT = 0.9, CORNER_LEFT = 0.79, STILL_LEFT = 0.25;
 static const double OTHERS_FRAME = 960; // towed body and walls: 80 corners, poses, speeds
 static const double IMPACT_ROWS = 256, IMPACT_COLUMNS = 13, SERIES_CHUNK = 256;
@@ -34,7 +33,7 @@ static const double CHECKPOINT_BASE = 135e3, CHECKPOINT_FLOE = 180, CHECKPOINT_C
 static const double TEXTS = 38e3, XDMF_FRAME = 4440, XDMF_LINE = 880;
 static const double VORONOI_CORNERS = 5.6;
 
-static const double RAFTING = 1.8; // time of a step of floes that raft / of rigid ones
+static const double RAFTING = 1.8; // time of a step, floes that raft / rigid floes
 
 static double entries_of(const bt_case *input)
 {
@@ -51,10 +50,10 @@ double bt_cost_floe_step(const bt_case *input, double concentration)
 
 // --- time ------------------------------------------------------------------------------------------------------------
 
-// Of any step; of an entry of the series, with its share of the flushes; of a frame, and of a floe in it; of the start,
-// s.
+// Time of any step; of an entry of the series, with its share of the flushes; of a frame, and of a floe in it; of the
+// start, s.
 static const double STEP = 8e-6, ENTRY = 17e-6, FRAME = 1e-3, FRAME_FLOE = 1.6e-6, START = 0.1;
-// Of a convex part of a floe, and of a pair of parts of two floes that are near each other, each step, s.
+// Time in each step of a convex part of a floe, and of a pair of parts of two floes near each other, s.
 static const double PART = 0.05e-6, PAIR = 6e-9;
 
 double bt_cost_making(const bt_case *input, double floes)
@@ -86,8 +85,7 @@ double bt_cost_seconds(const bt_case *input)
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-/// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel
-/// (panel.h).
+/// Memory that the summary uses for the steps, B, also in a checkpoint: the history, and the loads by panel (panel.h).
 static double steps_kept(const bt_case *input)
 {
     const bool panels = input->body.shape != BT_BODY_ABSENT && input->impact.conversion != BT_IMPACT_NONE;
@@ -116,7 +114,7 @@ double bt_cost_corners(const bt_case *input, const bt_field *field, double n)
     return corners;
 }
 
-/// Bytes of a dataset that each frame has of its own.
+/// Bytes of a dataset that each frame has for itself.
 static double of_frame(double bytes, double left, bool packed)
 {
     return packed && bytes > LEAST_PACKED ? bytes * left + INDEX : bytes;
@@ -158,11 +156,11 @@ bt_cost_disk bt_cost_disk_of(const bt_case *input, double n, double corners, int
 
 double bt_cost_member(const bt_case *input, const bt_cost_disk *disk)
 {
-    const double row = 3 * 8 * entries_of(input) + 8 * 300; // three series, as many numbers of the summary
+    const double row = 3 * 8 * entries_of(input) + 8 * 300; // three series, and 300 numbers of the summary
     return disk->result + disk->texts + row;
 }
 
-/// A run that would take longer than anybody waits, or fill any disk.
+/// Refuse a run that would take longer than anybody waits, or fill any disk.
 void bt_case_check_cost(const bt_check *check)
 {
     const bt_case *input = check->c;
@@ -188,7 +186,7 @@ void bt_case_check_cost(const bt_check *check)
 double bt_cost_machine(void)
 {
     double bytes = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
-    // cgroup v2 ("max": none), v1
+    // cgroup v2 ("max": no limit), v1
     static const char *const files[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
     for (int i = 0; i < 2; i++) {
         char text[64];
@@ -204,7 +202,7 @@ bt_status bt_cost_fits(const bt_case *input, double n_floes, const bt_comm *comm
 {
     const double need = bt_cost_memory(input, n_floes, 0, comm->size, comm->ranks_here),
                  result = bt_cost_disk_of(input, n_floes, bt_cost_corners(input, NULL, n_floes), 2).result;
-    if (result > BT_MOST_RESULT_BYTES) { // of a field that was read; of others the case is refused
+    if (result > BT_MOST_RESULT_BYTES) { // a field that was read; with other ice the case is refused
         return bt_fail(err, BT_ERR_CASE,
                        "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g "
                        "are written; lengthen it, or raise output.sample_every",

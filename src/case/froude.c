@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The Froude-scaled twin of a case.
 //
-// With gravity and all densities kept, every equation of the model stays the same when lengths grow by L, times and
+// With gravity and all densities kept, every equation of the model stays the same if lengths grow by L, times and
 // speeds by √L, masses and forces by L³ and pressures by L: the Froude number V/√(g l) is that of the original. The
-// kind of unit in the schema gives the exponent of a key (bt_units_froude). What the table below lists does not follow
-// its unit.
+// kind of unit in the schema gives the exponent of a key (bt_units_froude), except for the keys in the table below.
 #include "bergtow/case.h"
 
 #include <math.h>
@@ -22,19 +21,19 @@ static const struct {
 } exceptions[] = {
     {"output.progress", 0},        // wall time
     {"output.checkpoint_wall", 0},
-    {"estimate.p_star", 0},        // at full scale; the length scale brings them to that of the case
+    {"estimate.p_star", 0},        // at full scale; the length scale converts them to the scale of the case
     {"estimate.p_s", 0},
     {"estimate.length_scale", -1}, // full scale / case
 };
 
-// Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well;
-// at a scale of 1 it is that of the twin.
+// Texts that stand for no numbers with a dimension. Any other may name a file, which would have to be scaled as well;
+// at scale 1 the twin uses the same file.
 static const char *const plain_texts[] = {"run.title",       "reference.source", "report.client",
                                          "report.project",  "report.author",    "report.document",
                                          "report.revision", "report.distribution"};
 
-// L^e. Square roots are taken exactly rounded: with L a power of 4 the twin is the original to the last bit, only with
-// other exponents.
+// L^e. Square roots are correctly rounded: if L is a power of 4, the numbers of the twin have the same bits as those of
+// the original, except for their exponents.
 static double power(double ratio, double e)
 {
     const double whole = floor(e);
@@ -53,7 +52,7 @@ static double factor(const bt_key *key, double ratio)
 static void refuse_range(const bt_case *input, const bt_key *key, double value, double ratio, bt_errors *err)
 {
     char why[BT_WHY];
-    double one = 1; // of the unit of the range
+    double one = 1; // in the unit of the range
     bt_units_parse("1", key->unit, &one, why);
     const char *unit = bt_units_bare(key->unit);
     bt_errors_add(err, "%s: %s: becomes %g in the twin of scale %g, out of its range %s%s%s; take a scale nearer to 1",
@@ -63,9 +62,9 @@ static void refuse_range(const bt_case *input, const bt_key *key, double value, 
 
 static void scale_real(const bt_case *input, const bt_key *key, double *v, double ratio, bt_errors *err)
 {
-    // A negative start of the window means that it is looked for.
+    // A negative window start is sought by the run, and a negative frame interval means no frames.
     const bool found = !strcmp(key->name, "output.window_start") || !strcmp(key->name, "output.frame_interval");
-    if (isnan(*v) || (found && *v < 0)) return; // a word such as auto, not a time
+    if (isnan(*v) || (found && *v < 0)) return; // not a quantity that scales
     *v *= factor(key, ratio);
     bt_range range;
     bt_value_range(key, &range);
@@ -132,11 +131,11 @@ bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err)
         free(now);
         return BT_ERR_CASE;
     }
-    // EA and strength of a rope grow with d², those of the twin with L³: it has the numbers, and no name.
+    // EA and strength of a rope grow with d², those of the twin with L³: the twin has their numbers, not the name.
     input->tow.line.type = BT_ROPE_NUMBERS;
     input->tow.line.diameter = 0;
     // A default without effect that was scaled would look like a value that somebody gave.
-    for (bool more = true; more;) { // the default of one may follow from another's
+    for (bool more = true; more;) { // one default may follow from another
         more = false;
         memset(now, 0, (size_t)bt_n_case_keys * sizeof *now);
         bt_case_mark_idle(input, now);
@@ -145,7 +144,7 @@ bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err)
     }
     free(was);
     free(now);
-    // It follows from where the body is, which without one is a default again.
+    // domain.ahead follows from body.x, which is a default again without a body.
     if (input->domain.ends != BT_BOUND_MOVING) input->domain.ahead = bt_case_window_ahead(input);
     return bt_case_finish(input, err);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What ice may be: bounds of one floe, and of a field, from the ranges in the table of keys.
+// Admissible ice: bounds of one floe, and of a field, from the ranges in the table of keys.
 //
-// A number that passes here can be multiplied as the mechanics do it, mass × radius², force × time, without leaving the
-// range of a double, so that no input makes an infinity or a NaN out of finite numbers. Rejected: bounds of their own
-// in each reader, which had let an HDF5 file have floes of 800 m where a case file may have 100 m.
+// A number that passes here can be multiplied as in the mechanics, mass × radius², force × time, without leaving the
+// range of a double, so that no input makes an infinity or a NaN out of finite numbers. Rejected: separate bounds in
+// each reader, which let an HDF5 file have a thickness of 800 m where a case file may have 100 m.
 #include "case/ice_bounds.h"
 #include "case/warning.h"
 
@@ -15,9 +15,9 @@
 #include "base/largest.h"
 #include "case/schema.h"
 
-static const double LEAST = 0.99; // a field that was made for the least concentration meets it but nearly
+static const double LEAST = 0.99; // a field made for the least concentration may fall just short of it
 
-/// The ranges that are asked for each floe, read from their texts once.
+/// The ranges for each floe, parsed once.
 typedef struct limits { bt_range thickness, size, corner, length; } limits;
 
 static bt_range range_of(const char *name)
@@ -66,7 +66,7 @@ const char *bt_ice_floe_fault(const bt_ice_floe *floe, char why[BT_ICE_WHY], bt_
     }
     *part = BT_ICE_OUTLINE;
     const bt_moments moments = bt_shape_extent(floe->n, floe->v);
-    // Only the mean has the range of ice.size: a single floe of a law, or a piece, is larger or smaller.
+    // The range of ice.size holds for the mean alone: a single floe of a law, or a piece, may be larger or smaller.
     if (!(moments.area > 0) || !(2 * moments.radius <= bounds->length.hi)) {
         snprintf(why, BT_ICE_WHY,
                  "its size, %g m across and %g m2, is beyond 0 to %g m; check the unit of its vertices",
@@ -169,7 +169,7 @@ void bt_ice_warn_slow(const bt_case *input, double size, bt_errors *warnings)
     for (int k = 0; k < 2; k++) {
         const double closing = k ? input->domain.sides_closing : input->domain.ends_closing,
                      across = (k ? input->domain.width : input->domain.length) / size;
-        // of a row of floes from wall to wall each contact takes an equal share, where they are locked
+        // where floes are locked, each contact of a row of floes from wall to wall takes an equal share
         const double share = 2 * closing / (across + 1);
         if (!(closing > 0 && size > 0 && share < 2 * accepted)) continue;
         bt_warn(warnings, BT_WARN_SLOW_CLOSING,
@@ -181,13 +181,13 @@ void bt_ice_warn_slow(const bt_case *input, double size, bt_errors *warnings)
     }
 }
 
-static const double THICK = 10, STOUT = 0.2; // m; of the floe size: beyond, ice is seldom so thick, assumed
+static const double THICK = 10, STOUT = 0.2; // m; / floe size: ice is seldom thicker, assumed
 
 static const double THIN = 0.1; // m, at full scale, assumed
 
-static const double FAR = 10; // times the range of the literature: more than its ice differs, assumed
+static const double FAR = 10; // times the range of the literature: ice is not expected so far outside, assumed
 
-/// Toughness and strength far from the literature: a number without k, or in another unit.
+/// Warn of toughness and strength far from the literature: a number without its k, or in another unit.
 static void warn_strength(const bt_case *input, bt_errors *warnings)
 {
     const struct {

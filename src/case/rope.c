@@ -11,7 +11,7 @@
 
 // The elastic catenary; equations in bergtow/catenary.h.
 
-enum { MOST_STEPS = 200 }; // of Newton's method, of which it takes fewer than 40
+enum { MOST_STEPS = 200 }; // of Newton's method, which takes fewer than 40
 
 double bt_catenary_span(double length, double stiffness, double weight, double pull)
 {
@@ -27,12 +27,11 @@ static double slackness(double u)
     return bt_asinh(u) / u - 1 / sqrt(1 + u2);
 }
 
-// With the slope u as the unknown, the span's equation times u is g(u) = asinh(u) + e − (l/L) u = 0, e = w L/2EA:
-// concave, with g(0) = e > 0 and −∞ at infinity, so that it has one root, and Newton's method from any point on its
-// right falls to it without a step beyond, for every line and span. Such a point: asinh(u) ≤ √2 u/√(1+u), since the
-// derivative of asinh is at most √2/(1+u) and log(1+u) ≤ u/√(1+u); so g ≤ 0 where √(1+u) ≥ 2√2 L/l and u ≥ 2e L/l. And
-// of a line that is longer than unstretched asinh(u) ≤ u gives u ≤ e/(l/L − 1). It ends where rounding does not let it
-// fall further.
+// With the slope u as the unknown, the span's equation times u is g(u) = asinh(u) + e − (l/L) u = 0, e = w L/2EA. g is
+// concave, with g(0) = e > 0 and −∞ at infinity, so that it has one root, and Newton's method from any point to its
+// right descends to it without overshooting, for every line and span. To find such a point: asinh(u) ≤ √2 u/√(1+u),
+// since the derivative of asinh is at most √2/(1+u) and log(1+u) ≤ u/√(1+u); so g ≤ 0 if √(1+u) ≥ 2√2 L/l and u ≥ 2e
+// L/l. If l > L, asinh(u) ≤ u also gives u ≤ e/(l/L − 1). The iteration ends when rounding stops the descent.
 double bt_catenary_pull(double length, double stiffness, double weight, double span, double *tangent)
 {
     if (tangent) *tangent = 0;

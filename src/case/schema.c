@@ -10,7 +10,7 @@
 //                            FESOM2's iceberg code
 //   [Flato & Hibler 1995]    J. Geophys. Res. 100: ridging, work / potential energy
 //   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
-// "assumed" is a choice of this program without a measurement behind it.
+// "assumed" marks a choice of this program without a measurement behind it.
 #include "case/schema.h"
 
 #include "bergtow/shape.h"
@@ -47,7 +47,7 @@ static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
         .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
         .doc = doc_                                                                                                    \
     }
-/// The default is a model basin's; `sea` is how to give the value in the geographic frame, which has none.
+/// A key with the default of a model basin; `sea`: how to give its value in the geographic frame, which has no default.
 #define BASIN(key, member, kind, preset_, range_, sea, doc_)                                                           \
     {                                                                                                                  \
         .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
@@ -67,7 +67,7 @@ static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 #define CHOICE(key, member, names, preset_, doc_) \
     {.name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, AT(member), .doc = doc_}
 
-// Ranges guard against slips of units and against values the model has no meaning for; they are wide on purpose.
+// Ranges guard against slips of units and against values that have no meaning in the model; they are wide on purpose.
 #define ANYWHERE "[-1e7, 1e7]"
 #define ANY_SPEED "[-100, 100]"
 
@@ -552,7 +552,7 @@ const bt_key bt_floe_keys[] = {
 };
 const int bt_n_floe_keys = sizeof bt_floe_keys / sizeof *bt_floe_keys;
 
-/// Does the section of this name stand in the table, and not at its end?
+/// Is the section of this name in the table, but not at its end?
 static bool section_is_closed(const char *name)
 {
     const size_t n = strcspn(name, ".") + 1;
@@ -566,7 +566,7 @@ int bt_schema_added(void) { return bt_n_case_keys - (int)(sizeof bt_case_keys / 
 
 void bt_schema_take_back(int added) { bt_n_case_keys -= bt_schema_added() - added; }
 
-/// One line of letters, digits and other signs: it stands in a comment behind the value.
+/// Is this one line of printable text? It becomes a comment behind the value.
 static bool is_line(const char *text)
 {
     for (const char *p = text; *p; p++)
@@ -574,7 +574,7 @@ static bool is_line(const char *text)
     return true;
 }
 
-/// SECTION.NAME, both names, in a section that a case may have?
+/// Is this SECTION.NAME, with valid names, in a section that a case may have?
 static bool is_key(const char *key)
 {
     char section[64];
@@ -672,7 +672,7 @@ void bt_schema_preset(const bt_key *keys, int n, void *base)
         const bt_key *key = &keys[i];
         if (key->type == BT_KEY_POINTS) continue;
         char *member = (char *)base + key->offset;
-        // Every preset is read without complaint: tests/unit/test_case.c. NaN stands for "not given" in a real.
+        // tests/unit/test_case.c checks that every preset can be read. In a real, NaN stands for "not given".
         if (key->preset && key->preset[0] != '=') bt_value_read(key, base, key->preset, true, why);
         else if (key->type == BT_KEY_REAL) memcpy(member, &(double){NAN}, sizeof(double));
     }

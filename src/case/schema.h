@@ -15,7 +15,7 @@ typedef enum {
     BT_KEY_TEXT,   ///< char *, owned; NULL = none
     BT_KEY_CHOICE, ///< an enum, index into choices
     BT_KEY_POINTS, ///< double *, owned, [count][2]; count is an int
-    BT_KEY_MAP,    ///< keys and what goes with them; of a study alone
+    BT_KEY_MAP,    ///< keys with their values; in studies only
 } bt_key_type;
 
 typedef struct bt_key {
@@ -28,11 +28,11 @@ typedef struct bt_key {
     size_t offset;       ///< of the member in bt_case (bt_floe_def for bt_floe_keys)
     size_t offset_count; ///< of the number of points
     int least, most;     ///< number of points; 0 = 3 and BT_MAX_VERTICES, a polygon
-    bt_unit unit_first;  ///< of the first of each pair where range_first says that it differs
+    bt_unit unit_first;  ///< of the first of each pair; used if range_first is not NULL
     const char *range_first;
-    /// how to give the value at sea, where the default is a model basin's and the geographic frame has none; else NULL
+    /// how to give the value at sea, if the default is a model basin's and the geographic frame has none; else NULL
     const char *at_sea;
-    bool file;           ///< a text that names a file, relative to the one in which it stands
+    bool file;           ///< a text that names a file, relative to the file that gives the key
     const char *doc;     ///< one sentence with its source
 } bt_key;
 
@@ -43,17 +43,17 @@ extern const int bt_n_floe_keys;
 extern const bt_key bt_study_keys[]; ///< the keys of a study file; read by src/run/study.c
 extern const int bt_n_study_keys;
 
-/// Add a key with a real value to bt_case_keys, before any case is read: the member bt_case.extra[its result] holds the
-/// value. The texts stay the caller's and must outlive every case. offset and type are set here. −1 with the reason in
-/// err: no room, or the name, its section, preset, range or sentence will not do.
+/// Add a key with a real value to bt_case_keys before any case is read; bt_case.extra[result] holds the value. The
+/// texts remain the caller's and must outlive every case. offset and type are set here. Returns −1, with the reason in
+/// err, if there is no room, or if the name, section, preset, range or sentence is not valid.
 int bt_schema_add(const bt_key *key, bt_errors *err);
-/// How many have been added, and: the last of them are taken back until so many are left.
+/// Number of keys added; and: remove the last of them until so many are left.
 int bt_schema_added(void);
 void bt_schema_take_back(int added);
 
-/// Tables that do not fit together, a fault of the program: every case is refused with these texts. Takes them over.
+/// Report tables that do not fit together, a fault of the program: every case is refused with these texts. Frees err.
 void bt_keys_fault(bt_errors *err);
-/// Add those texts to err. False where there are any.
+/// Append those texts to err. False if there are any.
 bool bt_keys_sound(bt_errors *err);
 
 /// Index of a key by its dotted name, or −1.
@@ -62,11 +62,11 @@ int bt_schema_find(const bt_key *keys, int n, const char *name);
 /// True when name is a section: a dotted prefix of some key of bt_case_keys ("ice", "ice.drag").
 bool bt_schema_is_section(const char *name);
 
-/// The key, section or last part of a key closest to a mistyped dotted name, or NULL. The text is static or lies in
-/// buffer.
+/// The key or section closest to a mistyped dotted name, or NULL; a known last part in the wrong section counts as
+/// close. The text is static or lies in buffer.
 const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char buffer[64]);
 
-/// A key of points as that of one column, 0 or 1, with its unit and range.
+/// The key for one column, 0 or 1, of a key of points, with the unit and range of the column.
 bt_key bt_schema_column(const bt_key *k, int column);
 
 /// Set the members of all keys to their defaults; NaN for those that follow from other keys.
@@ -79,7 +79,7 @@ void bt_schema_release(const bt_key *keys, int n, void *base);
 
 // Values of keys: text to member, and member to text.
 
-/// Bounds of a key in SI; those without a range get ±infinity.
+/// Bounds of a key in SI; ±infinity for a key without a range.
 typedef struct bt_range {
     double lo, hi;
     bool lo_open, hi_open;
@@ -89,7 +89,7 @@ typedef struct bt_range {
 bool bt_value_range(const bt_key *key, bt_range *range);
 
 /// Read a scalar into the member of the key under base. plain: not quoted, so that none means "no value". On refusal
-/// the member keeps its value and why says reason and remedy. Not for points.
+/// the member keeps its value, and why gives the reason and the remedy. Not for points.
 bool bt_value_read(const bt_key *key, void *base, const char *text, bool plain, char why[BT_WHY]);
 
 /// The member of a number or a switch (0 or 1) as a double; NaN of other keys.

@@ -7,11 +7,11 @@
 
 #include "base/elementary.h"
 
-#define LEAST_SHARE 1e-3 // of a law that its limits leave
+#define LEAST_SHARE 1e-3 // of draws within the limits of a law
 
 static double normal_cdf(double x) { return 0.5 * bt_erfc(-x / sqrt(2)); }
 
-/// Limits of a law that has one at least, for a message.
+/// Limits of a law, of which at least one is given, for a message.
 static const char *cut_at(const bt_sizes *sizes, char out[64])
 {
     if (sizes->min > 0 && sizes->max > 0) snprintf(out, 64, "%g..%g m", sizes->min, sizes->max);
@@ -39,7 +39,7 @@ static double log_gamma(double x)
            (1.0 / 12 - r * (1.0 / 360 - r * (1.0 / 1260 - r * (1.0 / 1680 - r / 1188)))) / x - bt_log(product);
 }
 
-/// Share of a gamma law of shape a and scale 1 that lies above x: Q(a, x), by the series of its complement.
+/// Share of a gamma law of shape a and scale 1 above x: Q(a, x), by the series of its complement.
 static double gamma_above(double a, double x)
 {
     double term = bt_exp(a * bt_log(x) - x - log_gamma(a + 1)), sum = term;
@@ -47,7 +47,7 @@ static double gamma_above(double a, double x)
     return bt_max(0, 1 - sum);
 }
 
-/// E[d^k; d > least] / P(d > least) of a gamma law: d^k times its density is one of shape + k.
+/// E[d^k; d > least] / P(d > least) of a gamma law: d^k times its density is a gamma density of shape + k.
 static double gamma_moment(const bt_sizes *sizes, double scale, int k)
 {
     const double shape = 1 / (sizes->spread * sizes->spread), x = sizes->least / scale;
@@ -64,7 +64,7 @@ static double power_moment(const bt_sizes *sizes, int k)
     return bt_pow(m, k) * a * top / (1 - bt_pow(q, -a));
 }
 
-#define CUT_MATTERS 0.5 // least spread at which it does: below, it moves the mean by less than 0.1 %
+#define CUT_MATTERS 0.5 // least spread at which the cut does: below, it moves the mean by less than 0.1 %
 
 /// Scale of the gamma law whose part above `least` has the mean `mean`.
 static void init_gamma(bt_sizes *sizes)
@@ -110,7 +110,7 @@ bt_status bt_sizes_init(bt_sizes *sizes, const bt_case *input, bt_errors *err)
         *(lognormal_moment(sizes, sizes->mu, 1) < sizes->mean ? &low : &high) = sizes->mu;
     }
     double mean = lognormal_moment(sizes, sizes->mu, 1);
-    // of all that is drawn, what lies between the limits: the rest is drawn again
+    // share of the draws that lie between the limits; the others are drawn again
     const double share = normal_cdf(sizes->max > 0 ? (bt_log(sizes->max) - sizes->mu) / sizes->sigma : INFINITY) -
                          normal_cdf(sizes->min > 0 ? (bt_log(sizes->min) - sizes->mu) / sizes->sigma : -INFINITY);
     if (!(fabs(mean - sizes->mean) < 1e-6 * sizes->mean) || !(share > LEAST_SHARE))

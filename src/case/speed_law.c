@@ -52,7 +52,7 @@ double bt_speed_law_led(const bt_speed_law *law, int64_t n, double dt)
     const double ramp[] = {0, 0, law->ramp, law->speed}, *p = law->n > 0 ? law->programme : ramp;
     const int points = law->n > 0 ? law->n : 2;
     double sum = 0;
-    int64_t k = 1; // of the steps that end in one linear piece the mean speed is that of the first and the last
+    int64_t k = 1; // steps that end in one linear piece have the mean speed of the first and the last of them
     for (int i = 0; i <= points && k <= n; i++) {
         const double ends = i < points ? floor(p[2 * i] / dt) : INFINITY;
         const int64_t last = ends < (double)n ? (int64_t)ends : n;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The keys of a study file (bergtow/study.h says what they do together): words, defaults and ranges for reading and for
-// --list-keys.
+// The keys of a study file (bergtow/study.h describes how they work together): words, defaults and ranges for reading
+// and for --list-keys.
 #include "case/schema.h"
 
 static const char *const samplings[] = {"grid", "latin-hypercube", NULL};

@@ -10,7 +10,7 @@
 #include "case/case_derived.h"
 #include "bergtow/shape.h"
 
-#define MOST_POINTS 20000.0 // of a track whose wake is sought: each is compared with all before
+#define MOST_POINTS 20000.0 // of a track that is searched for its wake: each is compared with all before it
 
 static double between(const bt_track *track, int64_t i, int64_t j)
 {
@@ -25,7 +25,7 @@ double bt_track_speed(const bt_track *track)
     return most;
 }
 
-/// The largest way along the sign of the tow, and by how much it falls behind that.
+/// The largest way along x in the direction of the tow, and how far the track falls back from it.
 static double farthest(const bt_case *input, const bt_track *track, double *fall)
 {
     const double sign = bt_case_tow_sign(input);
@@ -52,11 +52,11 @@ double bt_track_fall(const bt_case *input, const bt_track *track)
     return fall;
 }
 
-/// d less whole periods, as near to 0 as that gets.
+/// d less whole periods, as near to 0 as possible.
 static double nearest(double d, double period) { return period > 0 ? d - period * nearbyint(d / period) : d; }
 
-/// First point that lies less than `size` from an earlier one, around a period; track->n without. Of a track that is
-/// thinned out to an eighth of that, against one of half of it.
+/// First point that lies less than `size` from an earlier one, a period on; track->n if none. Points at least size/8
+/// apart are compared with earlier ones at least size/2 apart (more on a very long track).
 static int64_t first_in_wake(const bt_track *track, const double period[2], double size)
 {
     if (!(period[0] > 0 || period[1] > 0)) return track->n;
@@ -78,9 +78,9 @@ static int64_t first_in_wake(const bt_track *track, const double period[2], doub
     return found;
 }
 
-/// The last of the points after which the body is out of the ice; track->n where it is in it at the end, or never was.
-/// Where ice that does not fill a period comes again with it, the last before the first gap: then *gap, which comes in
-/// as false.
+/// The last point in the ice before the body leaves it for good; track->n if the body ends in the ice, or was never in
+/// it. If ice that does not fill a period is repeated with it: the last point before the first gap, and *gap is set,
+/// which is false on entry.
 static int64_t last_in_ice(const bt_case *input, const bt_track *track, double size, bool *gap)
 {
     const bt_bound kind[2] = {input->domain.ends, input->domain.sides};
@@ -90,7 +90,7 @@ static int64_t last_in_ice(const bt_case *input, const bt_track *track, double s
     bt_case_ice_region(input, low, high);
     for (int k = 0; k < 2 && track->region; k++) low[k] = track->region[k], high[k] = track->region[2 + k];
     for (int k = 0; k < 2; k++) {
-        // up to a wall, which holds ice that drifts, and the body
+        // a region that reaches a wall has no end there: the wall holds drifting ice, and the body
         const bool wall = kind[k] == BT_BOUND_WALL, wraps = bt_bound_wraps(kind[k]);
         const bool filled = wraps && high[k] - low[k] > extent[k] - size;
         if (filled || (wall && low[k] < first[k] + size)) low[k] = -INFINITY;

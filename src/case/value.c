@@ -31,7 +31,7 @@ bool bt_value_range(const bt_key *key, bt_range *range)
            bt_units_parse(comma + 1, key->unit, &range->hi, why) && range->lo < range->hi;
 }
 
-/// A ratio of 2 and more that would do as a percentage is taken for one; 1.2 is as well a slip of 0.12.
+/// Suggest a percentage for a ratio of 2 or more (1.2 may as well be a slip for 0.12), or tenths for a concentration.
 static void suggest_percent(const bt_key *key, const bt_range *range, double value, const char *text, char meant[80])
 {
     const double tenths = value / 10;
@@ -196,8 +196,8 @@ bool bt_value_read(const bt_key *key, void *base, const char *text, bool plain, 
     return false;
 }
 
-// A double-quoted YAML scalar. Control characters, the line separators that YAML folds, and the characters that
-// libyaml refuses to read raw are escaped, as JSON has it, too.
+// A double-quoted YAML scalar. Control characters, line separators that YAML folds, and characters that libyaml refuses
+// to read raw are escaped, in a form that is valid JSON, too.
 static void write_text(const char *text, FILE *out)
 {
     fputc('"', out);

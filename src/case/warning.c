@@ -14,7 +14,7 @@ const struct bt_warning_row bt_warning_rows[BT_N_WARNINGS] = {
 #undef BT_WARNING_ROW
 };
 
-/// The next word of a list with spaces between; false at its end.
+/// Take the next word of a list separated by spaces; false at its end.
 static bool next_word(const char **list, char word[32])
 {
     *list += strspn(*list, " ");
@@ -24,7 +24,7 @@ static bool next_word(const char **list, char word[32])
     return n > 0;
 }
 
-/// Values of a text, as members of the object that is open: each conversion takes the argument that printf takes.
+/// Write the values of a text as members of the open object: each conversion takes the argument that printf takes.
 static void put_values(bt_json *json, const char *names, const char *text, va_list ap)
 {
     char name[32];
@@ -64,12 +64,12 @@ void bt_warn(bt_errors *list, bt_warning w, const char *text, ...)
     list->note[list->n - 1] = (bt_note){bt_text_copy(bt_warning_rows[w].code), values.text};
 }
 
-/// The members of `one` behind the values of the last warning; frees it.
+/// Append the members of `one` to the values of the last warning; frees it.
 static void join(bt_errors *list, bt_json *one)
 {
     bt_json_close(one, '}');
     bt_note *note = &list->note[list->n - 1];
-    const size_t n = strlen(note->values); // "{...}": the brace gives way to the members of the other
+    const size_t n = strlen(note->values); // "{...}": the members of `one` replace the closing brace
     char *both = bt_text_of("%.*s%s%s", (int)n - 1, note->values, n > 2 ? ", " : "", one->text + 1);
     bt_json_free(one);
     free(note->values);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Warnings of a case and a run, and reasons of a verdict: a code, a text for readers, and the values in it.
 //
-// Scripts and postproc/ read codes and values, which stay. Texts may change at any time; they stand where the fact is
-// known, beside what they are made of. One row a code: its name, the names of the values in the order of the
-// conversions of its text, and its meaning, which is the same whatever the values are. A value is a number, or the name
-// of a key, a series or a choice; "-" stands for what is wording alone, as is all behind the last name.
+// Scripts and postproc/ read codes and values, which stay the same. Texts may change at any time; each stands where the
+// fact is known, beside the values in it. A row describes a code: its name, the names of the values in the order of the
+// text's conversions, and its meaning, which does not depend on the values. A value is a number, or the name of a key,
+// a series or a choice. "-" marks a conversion that is wording only, as are all after the last name.
 #ifndef BT_WARNING_H
 #define BT_WARNING_H
 
@@ -127,11 +127,11 @@ extern const struct bt_warning_row {
 /// Append a warning with its text (printf-style); the values of its row follow from the conversions. list: NULL = not
 /// wanted.
 void bt_warn(bt_errors *list, bt_warning w, const char *text, ...) __attribute__((format(printf, 3, 4)));
-/// Add to the values of the last warning what its text has in other words. name: as in a row.
+/// Add a value to the last warning that its text gives in other words. name: as in a row.
 void bt_warn_number(bt_errors *list, const char *name, double value);
 void bt_warn_name(bt_errors *list, const char *name, const char *value);
 
-/// An array of {"code", "text", "values"}, one a line; "code" is null of what has none.
+/// An array of {"code", "text", "values"}, one a line; "code" is null for entries without one.
 void bt_warnings_json(bt_json *json, const char *key, const bt_errors *list);
 /// All texts as one, "; " between them; the caller frees it.
 char *bt_warnings_text(const bt_errors *list);
