@@ -250,7 +250,7 @@ def budget(study: str | os.PathLike[str], out: str | os.PathLike[str], **options
 
 def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
     """How fast a vessel can tow in which ice, and which ice stops it, as the dictionary in OUT/capability.json.
-    options: those of `bergtow capability`; from_ and to give its range."""
+    options: those of `bergtow capability`; `from_` and `to` give its range."""
     return _found("capability", case, out, options)
 
 
