@@ -64,7 +64,7 @@ def keys(program, folder):
     table = json.loads(said(program, "--list-keys", "--json"))
     page = ["# Keys of a case", "", f"Every key of bergtow {said(program, '--version').split()[1]}, as "
             "`bergtow --list-keys` prints them. A number without a unit is in the unit shown here; other units of the "
-            "same kind may be written behind it ([cases](../manual.md#make-and-check-a-case)). A default that begins "
+            "same kind may be written behind it ([cases](../manual.md#write-and-check-a-case)). A default that begins "
             "with = follows from other keys.", ""]
     sections = {}
     for key in table["keys"]:
@@ -74,7 +74,7 @@ def keys(program, folder):
     page += ["## floes", "", "A list of floes given by hand; each is a map with these keys.", "",
              *table_of(table["floe_keys"]), "", "## base", "", *table_of(table["file_keys"]), "",
              "## Keys of a study", "", "A study file has these keys in place of sections ([studies]"
-             "(../../cases/studies/README.md#a-study-file)).", "", *table_of(table["study_keys"]), ""]
+             "(../../cases/studies/README.md#study-file-format)).", "", *table_of(table["study_keys"]), ""]
     limits = said(program, "--list-keys").split("What is refused as too large", 1)[1]
     page += ["## Limits of size", "", "```text", "What is refused as too large" + limits.rstrip(), "```", ""]
     write(folder / "keys.md", "\n".join(page))

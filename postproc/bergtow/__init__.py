@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""bergtow in Python: cases, simulations that are stepped, forces of one's own, results as xarray datasets.
+"""bergtow in Python: cases, simulations run step by step, user-defined forces, results as xarray datasets.
 
     import bergtow
+
     case = bergtow.Case("cases/basin/basin-80.yml")
     case["tow.speed"] = "0.2 m/s"
     with bergtow.Simulation(case) as sim:
@@ -9,7 +10,7 @@
             sim.step(100)
             print(sim.time, sim["ice_resistance"])
 
-What computes is libbergtow; see docs/library.md.
+The library libbergtow does the computing; see docs/library.md.
 """
 import sys as _sys
 
@@ -20,7 +21,7 @@ except ImportError:
              f"python3-numpy (Debian) or `{_sys.executable} -m pip install numpy`, or use /usr/bin/python3")
     if _sys.argv[:1] != ["-m"]:
         raise ImportError(_text) from None
-    print(f"bergtow: {_text}", file=_sys.stderr)  # python3 -m bergtow: a command ends with a line and its exit code
+    print(f"bergtow: {_text}", file=_sys.stderr)  # python3 -m bergtow: a command ends with one line and its exit code
     raise SystemExit(4) from None
 from ._library import library_path, start_mpi
 from .case import Case, quantities

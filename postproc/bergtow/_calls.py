@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Calls of the program that end with checkpoints when the caller is asked to stop."""
+"""Call the program so that it writes checkpoints before it ends when the caller is asked to stop."""
 from __future__ import annotations
 
 import subprocess
@@ -11,13 +11,13 @@ from ._interrupts import held
 
 
 def called(command: list[str], line: Callable[[str], Any] | None = None, **options: Any) -> tuple[int, str]:
-    """Exit code and messages of a call. line: function that gets each line of its standard output; options: of Popen.
-    An exception that arrives meanwhile, such as KeyboardInterrupt, asks the call to stop. It is raised again when the
-    call has written its checkpoints and ended. By SIGTERM, because a process that a shell has started in the background
-    ignores SIGINT until its run has a handler.
+    """Run a command and return its exit code and messages. line: function called with each line of its standard output;
+    options: passed to Popen. If an exception such as KeyboardInterrupt arrives meanwhile, the command is asked to stop,
+    and the exception is raised again once it has written its checkpoints and ended. The signal is SIGTERM, because a
+    process that a shell started in the background ignores SIGINT until its run has installed a handler.
 
-    Rejected: subprocess.run, which kills its process a quarter of a second after Ctrl-C; all work since the last
-    checkpoint is lost then."""
+    Rejected: subprocess.run, which kills its process a quarter of a second after Ctrl-C, so that all work since the
+    last checkpoint is lost."""
     if line:
         options["stdout"] = subprocess.PIPE
     process: subprocess.Popen[str] | None = None
@@ -30,10 +30,10 @@ def called(command: list[str], line: Callable[[str], Any] | None = None, **optio
                 line(text)
             process.wait()
         except BaseException:
-            with held():  # wait as long as it takes, also if the user repeats Ctrl-C
+            with held():  # wait as long as it takes, even if the user repeats Ctrl-C
                 if process:
                     process.terminate()
-                    for _ in process.stdout or ():  # else a full pipe would hold it up
+                    for _ in process.stdout or ():  # otherwise a full pipe would block it
                         pass
                     process.wait()
             raise

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ctrl-C, and other requests to stop, that wait for the end of a block."""
+"""Hold back Ctrl-C and other requests to stop until a block has ended."""
 from __future__ import annotations
 
 import contextlib
@@ -8,14 +8,14 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-#: what asks a program to stop, and raises an exception where it has a handler of Python
+#: signals that ask a program to stop, and that raise an exception where Python has a handler for them
 STOPS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 @contextlib.contextmanager
 def held(let_through: Callable[[], bool] = lambda: False) -> Iterator[None]:
-    """A request to stop is raised at the end of the block, where it would otherwise come within a call from C, and be
-    lost, or between a call and the name that its answer is kept by. let_through: is a second one raised at once?"""
+    """Raise a request to stop only at the end of the block. Otherwise it could arrive inside a call from C and be lost,
+    or between a call and the assignment of its result. let_through: is a second request raised at once?"""
     handlers: dict[int, Callable[[int, Any], Any]] = {}
     for stop in STOPS:
         if callable(handler := signal.getsignal(stop)):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""libbergtow by ctypes: where it is, what its functions take, and errors as exceptions.
+"""libbergtow through ctypes: where to find it, the signatures of its functions, and its errors as exceptions.
 
-Rejected: cffi and pybind11, which need a compiler at installation, or a package that Debian's Python lacks.
+Rejected: cffi and pybind11; they need a compiler at installation, or a package that Debian's Python does not have.
 """
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Applied(ctypes.Structure):
 
 
 class Mean(ctypes.Structure):
-    """bt_mean: of a correlated series, evenly spaced; its 95 % interval, correlation time and independent samples."""
+    """bt_mean: of a correlated, evenly spaced series; its 95 % interval, correlation time and independent samples."""
     _fields_ = [("mean", c_double), ("sd", c_double), ("se", c_double), ("low", c_double), ("high", c_double),
                 ("tau", c_double), ("n_eff", c_double), ("n", c_int64)]
 
@@ -72,7 +72,7 @@ class RouteTask(ctypes.Structure):
 
 
 class RouteFound(ctypes.Structure):
-    """bt_route; a stretch is eight doubles."""
+    """bt_route; each stretch is eight doubles."""
     _fields_ = [("n_corners", c_int64), ("n_stretches", c_int64), ("corner", POINTER(c_double)),
                 ("stretch", POINTER(c_double)), ("radius", c_double), ("length", c_double), ("duration", c_double),
                 ("work", c_double), ("force", c_double), ("peak", c_double), ("cost", c_double),
@@ -87,7 +87,7 @@ class RoutePlan(ctypes.Structure):
 
 
 class Status(c_int):
-    """bt_status of a call: any status but OK is raised, with the library's message."""
+    """The bt_status that a call returns: any status except OK is raised as an exception with the library's message."""
 
 
 APPLIED_FORCE = ctypes.CFUNCTYPE(c_int, POINTER(Applied), c_void_p)
@@ -148,8 +148,8 @@ _SIGNATURES = {
 
 
 def _candidates() -> list[str]:
-    """Where the library may be: BERGTOW_LIB alone, if that is set; else the source tree or the prefix that this package
-    lies in, then the places of the linker, which may have a library with MPI, then the library in the wheel."""
+    """Where the library may be. If BERGTOW_LIB is set: only there. Otherwise the source tree or prefix that contains
+    this package, then the linker's search path (where the library may be built with MPI), then the wheel."""
     named = os.environ.get("BERGTOW_LIB")
     if named:
         path = Path(named)
@@ -163,31 +163,31 @@ def _candidates() -> list[str]:
 
 
 def library_path() -> str:
-    """The file of libbergtow that is in use."""
+    """The path of the libbergtow in use."""
     return load()[1]
 
 
-#: The library is for one thread: what another one asks of it waits. A force that calls it back is of the same thread.
+#: The library is single-threaded: calls from other threads wait. A force that calls back runs in the same thread.
 LOCK = threading.RLock()
 
-#: the process whose simulations have started threads of OpenMP, which a fork leaves behind
+#: the process whose simulations have started OpenMP threads, which a fork does not inherit
 team: int | None = None
 
 
 def _after_fork() -> None:
     global LOCK
-    LOCK = threading.RLock()  # another thread, which is not here, may have had the old one
+    LOCK = threading.RLock()  # the old lock may be held by a thread that does not exist in this process
 
 
 os.register_at_fork(after_in_child=_after_fork)
 
 
 def threads_here(asked: int) -> int:
-    """Threads for a simulation that begins: in a fork of a process that had simulations one alone, for a team of more
-    would wait for those that the fork has left behind."""
+    """Number of threads for a new simulation. After a fork from a process that has run simulations it is one, because a
+    larger team would wait for threads that the fork did not copy."""
     global team
     most = limit("threads")
-    if not 0 <= asked <= most:  # before the library has it as a number of 32 bits
+    if not 0 <= asked <= most:  # checked before it is passed to the library as a 32-bit number
         raise BergtowError(f"threads: {asked} are not available; give 1 to {most}, or 0 for run.threads of the "
                            "case or all cores")
     if team in (None, os.getpid()):
@@ -201,7 +201,7 @@ def threads_here(asked: int) -> int:
 
 
 class Library:
-    """The functions of libbergtow, one call at a time."""
+    """The functions of libbergtow, called one at a time."""
 
     def __init__(self, lib: ctypes.CDLL) -> None:
         self._lib = lib
@@ -226,18 +226,18 @@ class Library:
 
 @functools.cache
 def load() -> tuple[Library, str]:
-    """The library with the types of its functions, and its file. Errors: BergtowError, which says what to do."""
-    # Threads that spin at a barrier make a busy machine many times slower (src/app/main.c); libgomp reads this when it
-    # is loaded, and values set by the user win.
+    """The library, with its function signatures, and its path. Raises BergtowError, which says what to do."""
+    # Threads that spin at a barrier slow a busy machine down many times (src/app/main.c). libgomp reads this when it is
+    # loaded, and values set by the user take precedence.
     if "OMP_WAIT_POLICY" not in os.environ:
         os.environ.setdefault("GOMP_SPINCOUNT", "20000")
-    # UCX, which the Open MPI of Debian 13 loads, takes SIGHUP for its debugger, also from nohup.
+    # UCX, which Open MPI loads on Debian 13, takes SIGHUP for its debugger, even under nohup.
     os.environ.setdefault("UCX_DEBUG_SIGNO", "0")
     from . import __version__
     reasons = []
     for path in dict.fromkeys(_candidates()):
         try:
-            lib = ctypes.CDLL(path, mode=ctypes.RTLD_GLOBAL)  # MPI opens modules that need its symbols
+            lib = ctypes.CDLL(path, mode=ctypes.RTLD_GLOBAL)  # MPI loads plug-ins that need its symbols
         except OSError as error:
             reasons.append(str(error))
             continue
@@ -255,7 +255,7 @@ def library() -> Library:
 
 
 def take_text(address: int | None) -> str:
-    """A text that the library has allocated."""
+    """Copy a text that the library has allocated, and release it."""
     assert address
     text = ctypes.string_at(address).decode()
     library().bt_release(address)
@@ -269,12 +269,12 @@ def listed(what: str) -> dict[str, Any]:
 
 
 def limit(name: str) -> Any:
-    """A number by which the program judges windows, domains and maps, or a size of its inputs and outputs."""
+    """A limit that the program applies to windows, domains or maps, or to the size of its inputs and outputs."""
     return listed("limits")[name]
 
 
 def unused(text: str) -> dict[str, str]:
-    """The keys without effect in the text of a case, with why: bt_case_unused."""
+    """The keys that have no effect in the text of a case, each with the reason: bt_case_unused."""
     return json.loads(take_text(library().bt_case_unused(text.encode(errors="surrogateescape"))))
 
 
@@ -285,20 +285,20 @@ def id_of_towed(towed: int | None) -> int:
 
 
 def start_mpi() -> None:
-    """Let simulations use all ranks of mpirun or srun, with MPI as it has been started (mpi4py), or start it."""
+    """Let simulations use all ranks of mpirun or srun. MPI is started here unless mpi4py has already started it."""
     if library().bt_comm_start(None, None) != OK:
         raise BergtowError("MPI cannot be started; check the mpirun call")
 
 
 def whole(text: bytes, what: str, status: int = USAGE) -> bytes:
-    """A text for the library. Errors: BergtowError for a text with a NUL, which would end it in C."""
+    """A text to pass to the library. Raises BergtowError for a text that contains NUL, which would end it in C."""
     if b"\0" in text:
         raise (CaseError if status == CASE else BergtowError)(f"{what} holds the character NUL; take it out", status)
     return text
 
 
 def options(case: Case | None, **more: Any) -> Options:
-    """bt_simulation_options of a Case, or None. Errors: BergtowError for a text with a NUL."""
+    """bt_simulation_options for a Case, or for None. Raises BergtowError for a text that contains NUL."""
     names = {"dir": "the name of the result folder", "command_line": "the command line",
              "from_": "the name of the checkpoint"}
     more |= {k: whole(os.fsencode(more[k]), name) for k, name in names.items() if more.get(k) is not None}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program `bergtow`, which makes runs of its own processes, on ranks, and ensembles."""
+"""The program `bergtow`, which starts runs as separate processes, on several ranks, and runs ensembles."""
 from __future__ import annotations
 
 import os
@@ -11,7 +11,7 @@ from .errors import IO, BergtowError
 
 
 def _compiled(path: Path) -> bool:
-    """And not the command that pip brings, which has the same name."""
+    """Is this the compiled program, not the command of the same name that pip installs?"""
     if not (path.is_file() and os.access(path, os.X_OK)):
         return False
     with open(path, "rb") as file:
@@ -19,7 +19,7 @@ def _compiled(path: Path) -> bool:
 
 
 def _places() -> list[Path]:
-    """Beside the library in use; beside this package, in the source tree or PREFIX/share/bergtow/postproc; PATH."""
+    """Beside the library in use; beside this package, in the source tree or PREFIX/share/bergtow/postproc; on PATH."""
     here = Path(__file__).resolve().parents
     try:
         library = Path(_library.library_path()).resolve().parent  # build/release, or PREFIX/lib
@@ -31,7 +31,7 @@ def _places() -> list[Path]:
 
 
 def program_path() -> str:
-    """The program: BERGTOW, or the first that is there. Errors: BergtowError."""
+    """Path of the program: BERGTOW, or the first one found. Raises BergtowError."""
     named = os.environ.get("BERGTOW")
     if named:
         found = shutil.which(named)

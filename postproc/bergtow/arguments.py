@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options that commands share, and kinds of numbers that options take."""
+"""Options that several commands share, and the types of numbers that options take."""
 import argparse
 import ctypes
 import math
@@ -11,15 +11,15 @@ from bergtow.writing import may_write
 
 
 def read(text, unit):
-    """A number with a unit as in a case: in the SI unit, "" for a plain number, "%" for a ratio. Errors:
-    BergtowError."""
+    """Read a number with a unit as in a case, and convert it to the SI unit given ("" for a plain number, "%" for a
+    ratio). Raises BergtowError."""
     value = ctypes.c_double()
     _library.library().bt_number_read(text.strip().encode(), unit.encode(), ctypes.byref(value))
     return value.value
 
 
 def measure(unit, fits=lambda x: x > 0, words="not above zero"):
-    """Type of an option with a unit, as of read(); of a length above zero by default."""
+    """Argparse type for a number with a unit, as in read(); by default it must be above zero."""
     def number(text):
         try:
             return read(text, unit)
@@ -29,7 +29,7 @@ def measure(unit, fits=lambda x: x > 0, words="not above zero"):
 
 
 def minutes(text):
-    """Minutes above zero: "90", "90 min", "1.5 h"."""
+    """A duration above zero, in minutes: "90", "90 min", "1.5 h"."""
     try:
         float(text)
     except ValueError:
@@ -67,7 +67,7 @@ share = measure("%", lambda x: 0 < x < 1, "not between 0 and 1")
 
 
 def whole_from(least, most):
-    """Type of a whole number of an option."""
+    """Argparse type for a whole number in a range."""
     def number(text):
         if not (text.isdecimal() and least <= int(text) <= most):
             raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {most}")
@@ -76,7 +76,7 @@ def whole_from(least, most):
 
 
 def add_run(p, output):
-    """RUN, -o/--output (default: RUN/output) and --force."""
+    """Add RUN, -o/--output (default: RUN/output) and --force."""
     p.add_argument("run", metavar="RUN", help="output folder of a run")
     p.add_argument("-o", "--output", metavar="FILE", type=Path, help=f"file to write (default: RUN/{output})")
     add_force(p)
@@ -87,8 +87,8 @@ def add_force(p):
 
 
 def output(a, default, allowed):
-    """Path to write to. Errors: BergtowError when its name does not end in one of the allowed suffixes, and when
-    another's file is there: before any work is done."""
+    """Path to write to. Raises BergtowError, before any work is done, if its suffix is not allowed or if the file
+    exists and bergtow did not write it."""
     path = a.output or Path(a.run) / default
     ends_in(path, allowed)
     may_write(path, a.force)
@@ -96,6 +96,6 @@ def output(a, default, allowed):
 
 
 def ends_in(path, allowed):
-    """Errors: BergtowError."""
+    """Check the suffix of a path. Raises BergtowError."""
     if path.suffix.lower() not in allowed:
         raise BergtowError(f"{path}: unknown kind of file; end the name in {', '.join(allowed)}", USAGE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cases: the inputs of a simulation, as the keys of a case file, each checked by the library."""
+"""Cases: the inputs of a simulation, stored under the keys of a case file, each checked by the library."""
 from __future__ import annotations
 
 import copy
@@ -24,23 +24,23 @@ def _keys() -> dict[str, dict[str, Any]]:
 
 
 def quantities() -> dict[str, Any]:
-    """The numbers that a run leaves: series, keys of the summary, estimates, with units and meaning."""
+    """The quantities that a run writes (series, summary keys, estimates), with units and meanings."""
     return copy.deepcopy(_library.listed("quantities"))
 
 
-#: units of values as they are read, where a case file takes a bare number for something else
+#: units in which values are read here, where a case file takes a bare number in another unit
 _SI = {"deg": "rad", "deg/s": "rad/s", "-": ""}
 
 
 def setting(key: str, value: Any) -> str:
-    """A value for a key as a case file has it: numbers are in SI units here, angles in radians."""
+    """Write a value as it stands in a case file. Here numbers are in SI units, and angles in radians."""
     unit = _keys()[key].get("unit") if key in _keys() else None
     in_radians = unit in ("deg", "deg/s") and value is not None and not isinstance(value, str)
     return _as_text(value) + (f" {_SI[str(unit)]}" if in_radians else "")
 
 
 def _plain(value: Any) -> Any:
-    """A path as text, a number of numpy as a number of Python."""
+    """Convert a path to text, and a NumPy number to a Python number."""
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if hasattr(value, "tolist"):
@@ -63,14 +63,14 @@ def _as_text(value: Any) -> str:
 
 
 def _as_file(sections: Mapping[str, Any]) -> str:
-    """A mapping as the text of a case file. YAML has no pairs of surrogates, and folds or refuses some characters that
-    JSON has as they are."""
+    """A mapping as the text of a case file. YAML does not allow surrogate pairs, and folds or rejects some characters
+    that JSON leaves as they are."""
     text = json.dumps(sections, indent=1, ensure_ascii=False, default=_plain)
     return re.sub("[\x7f-\xa0\u2028\u2029\ufeff\ufffe\uffff]", lambda c: f"\\u{ord(c[0]):04x}", text)
 
 
 def _content(path: str) -> str | None:
-    """The text of a case file; None if the library is to read it, and to report what is wrong with it."""
+    """The text of a case file; None if the library is to read the file and report its errors."""
     if not os.path.isfile(path):
         return None
     try:
@@ -84,27 +84,27 @@ def _content(path: str) -> str | None:
 def here() -> str:
     try:
         return os.getcwd()
-    except OSError:  # the folder is gone: names that are not absolute lead nowhere
+    except OSError:  # the folder is gone, so relative names cannot be resolved
         return ""
 
 
 def _as_real(value: Any) -> Any:
-    """JSON has no point in whole numbers."""
+    """Convert whole numbers to float: JSON writes them without a decimal point."""
     return [_as_real(v) for v in value] if isinstance(value, list) else value if value is None else float(value)
 
 
 class Case(MutableMapping[str, Any]):
-    """A case from a file, or from a mapping of sections as in a file.
+    """A case from a file, or from a mapping of sections laid out as in a file.
 
         case = Case("basin-80.yml", {"ice.concentration": 0.7})
-        case["tow.speed"] = "1.5 kn"      # a text is read as in a file
-        case["tow.speed"]                 # 0.7716..., numbers are in SI units, angles in radians, both ways
+        case["tow.speed"] = "1.5 kn"      # text is read as in a file
+        case["tow.speed"]                 # 0.7716...; numbers are in SI units, angles in radians, both ways
         case.unit("tow.speed")            # 'm/s'
 
-    Every value is checked when it is set; an invalid value raises CaseError and changes nothing. Where several
-    values only fit together, set them at once: case.update({...}). None stands for a key that has no value. The numbers
-    of a mapping of sections are those of a file: angles in degrees. A file is read once: what becomes of it later does
-    not change the case.
+    Every value is checked when it is set; an invalid value raises CaseError and changes nothing. If several values are
+    only valid together, set them in one call: case.update({...}). None stands for a key without a value. Numbers in a
+    mapping of sections are read as in a file: angles in degrees. A file is read once: later changes to it do not affect
+    the case.
     """
 
     def __init__(self, source: str | os.PathLike[str] | Mapping[str, Any] | None,
@@ -115,13 +115,13 @@ class Case(MutableMapping[str, Any]):
         self._folder = here()
         self.text = (text if text is not None else _as_file(source) if isinstance(source, Mapping) else
                      _content(self.path or ""))
-        self.overrides: dict[str, str] = {}  #: {key: text} that were set here
+        self.overrides: dict[str, str] = {}  #: {key: text} of the values set here
         self._resolve(self.overrides | {k: setting(k, v) for k, v in (values or {}).items()})
 
     @classmethod
     def from_text(cls, text: str, values: Mapping[str, Any] | None = None,
                   path: str | os.PathLike[str] | None = None) -> Case:
-        """A case from the text of a case file; path: its name in messages, beside which files it names are."""
+        """A case from the text of a case file. path: its name in messages; files it names are relative to it."""
         return cls(path, values, text=text)
 
     def _resolve(self, overrides: dict[str, str]) -> None:
@@ -136,15 +136,15 @@ class Case(MutableMapping[str, Any]):
         except Exception:
             self.overrides = before
             raise
-        self.resolved = resolved  #: every key with its value, as a case file
+        self.resolved = resolved  #: every key with its value, as the text of a case file
         self._values = values
 
     def place(self) -> str | None:
-        """The path, valid also after the working folder has changed."""
+        """The path, valid even after the working folder has changed."""
         return self.path if here() == self._folder else os.path.join(self._folder, self.path or "case")
 
     def frozen_copy(self) -> Case:
-        """A copy, if the files that the case builds on (`base`) are unchanged; CaseError otherwise."""
+        """A copy, if the files that the case builds on (`base`) are unchanged; otherwise raises CaseError."""
         other = self.copy()
         other._resolve(other.overrides)
         if other.resolved != self.resolved:
@@ -161,11 +161,11 @@ class Case(MutableMapping[str, Any]):
         self._resolve(self.overrides | {key: setting(key, value)})
 
     def update(self, values: Any = (), **more: Any) -> None:  # type: ignore[override]
-        """Set several values at once, which are checked together."""
+        """Set several values at once; they are checked together."""
         self._resolve(self.overrides | {k: setting(k, v) for k, v in dict(values, **more).items()})
 
     def __delitem__(self, key: str) -> None:
-        """Take back a value that was set: that of the file, or the default, holds again."""
+        """Remove a value set here, so that the value of the file, or else the default, applies again."""
         if key not in self.overrides:
             raise KeyError(f"{key}: has not been set")
         self._resolve({k: v for k, v in self.overrides.items() if k != key})
@@ -180,13 +180,13 @@ class Case(MutableMapping[str, Any]):
         return key in _keys()
 
     def unit(self, key: str) -> str:
-        """Unit of the value as it is read; '' for plain numbers, texts and choices."""
+        """Unit in which the value is read; '' for plain numbers, texts and choices."""
         self[key]
         unit = _keys()[key].get("unit") or ""
         return _SI.get(unit, unit)
 
     def meaning(self, key: str) -> str:
-        """The sentence of bergtow --list-keys."""
+        """The description that bergtow --list-keys prints."""
         self[key]
         return _keys()[key]["doc"]
 

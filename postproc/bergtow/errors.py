@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Exit codes and exceptions: one table, one tree, for the library, the functions and the commands."""
+"""Exit codes and exceptions: one table and one hierarchy for the library, the functions and the commands."""
 from __future__ import annotations
 
 import os
@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Optional, Union
 
-#: exit codes of the commands, as those of the program (bergtow/base.h: bt_status): done; usage; a case or a map that
-#: is refused; a file that cannot be read or written, and members that are missing from a number; a run that failed;
-#: stopped by the user, a signal or a limit
+#: exit codes of the commands, the same as those of the program (bergtow/base.h: bt_status): done; usage; a case or map
+#: that is rejected; a file that cannot be read or written, or a number that members are missing from; a run that
+#: failed; stopped by the user, a signal or a limit
 OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
 
 class Message(NamedTuple):
-    """Of the program, as it writes them with BERGTOW_MESSAGES=json; code: by which decisions are made."""
+    """A message of the program, as written with BERGTOW_MESSAGES=json. code: its kind, for callers that act on it."""
     text: str
     code: Optional[str] = None
     warning: bool = False
@@ -24,8 +24,8 @@ class Message(NamedTuple):
 
 
 class BergtowError(Exception):
-    """A request cannot be fulfilled; the text gives the reason and the remedy. status: the exit code of a command that
-    ends with it."""
+    """A request that cannot be fulfilled; the text gives the reason and the remedy. status: the exit code of a command
+    that ends with this error."""
 
     def __init__(self, text: str, status: int = USAGE) -> None:
         super().__init__(text)
@@ -33,7 +33,7 @@ class BergtowError(Exception):
 
 
 class CaseError(BergtowError, ValueError):
-    """A case that is refused; the text has one line for each error, with key and remedy."""
+    """A case that is rejected; the text has one line for each error, with key and remedy."""
 
 
 class RunError(BergtowError):
@@ -45,8 +45,8 @@ class RunError(BergtowError):
 
 
 class Refused(RunError):
-    """An input that the program refuses, with the errors among its messages, and its exit code. otherwise: the reason
-    where it gives none."""
+    """An input that the program rejects, with the errors from its messages and its exit code. otherwise: the reason, in
+    case the messages give none."""
 
     def __init__(self, path: Union[str, os.PathLike[str]], said: Sequence[Message], status: int,
                  otherwise: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forces as Python functions, called once a step with arrays of all bodies (bergtow/applied.h)."""
+"""Forces as Python functions, called once per step with arrays of all bodies (bergtow/applied.h)."""
 from __future__ import annotations
 
 import contextlib
@@ -20,20 +20,20 @@ _FX, _FY, _MOMENT, _G, _GX, _GY, _GW, _JX, _JY, _JW = range(_library.LOADS)
 
 
 def _view(pointer: Any, *shape: int, writeable: bool = False) -> np.ndarray:
-    # without bodies there is nothing that a pointer could point at
+    # without bodies the pointer has nothing to point at
     view = np.ctypeslib.as_array(pointer, shape) if shape[0] else np.empty(shape, pointer._type_)
     view.flags.writeable = writeable
     return view
 
 
 class Bodies:
-    """The bodies at the start of a step, as a force sees them; the arrays are valid during the call alone.
+    """The bodies at the start of a step, as a force sees them. The arrays are valid only during the call.
 
-    id [n]; place [n, 3] x, y, yaw (m, rad); velocity [n, 3] (m/s, rad/s); mass, inertia [n] with those of the water
-    carried along (kg, kg m²); time of the middle of the step, dt (s); water, air: velocities [2] (m/s).
+    id [n]; place [n, 3] x, y, yaw (m, rad); velocity [n, 3] (m/s, rad/s); mass, inertia [n] including added mass and
+    added inertia (kg, kg m²); time at the middle of the step, dt (s); water, air: velocities [2] (m/s).
 
-    A force adds to `force` [n, 2] (N) and `moment` [n] (N m), which are explicit, or calls drag() or adds to `load`
-    [n, 10], the rows of bergtow/applied.h, for what falls with the velocity.
+    For an explicit force, add to `force` [n, 2] (N) and `moment` [n] (N m). For a force that depends on the velocity,
+    call drag() or add to `load` [n, 10], the rows of bergtow/applied.h.
     """
 
     def __init__(self, a: _library.Applied) -> None:
@@ -50,8 +50,8 @@ class Bodies:
 
     @property
     def towed(self) -> int:
-        """Row of the towed body. Where there is none (`has_towed`) it is an error: as None it would mean all bodies
-        where it is an index."""
+        """Row of the towed body. It is an error if there is none (see `has_towed`): None as an index would mean all
+        bodies."""
         return _library.id_of_towed(self._towed)
 
     @property
@@ -82,7 +82,7 @@ class Bodies:
         self.moment[:] = value
 
     def _add(self, answer: npt.ArrayLike) -> None:
-        """Add the value that a force returns."""
+        """Add the value that a force function returned."""
         n = len(self.id)
         try:
             given = np.asarray(answer, float)
@@ -99,26 +99,26 @@ class Bodies:
         self._load[:, :given.shape[1]] += given
 
     def drag(self, k: npt.ArrayLike, velocity: npt.ArrayLike) -> None:
-        """The linear force k (velocity − U), taken at the end of the step, so that no step is too long for it. k: one
-        number or [n], kg/s; velocity: [2] or [n, 2], m/s. A quadratic drag has k = c |velocity − U|."""
+        """The linear force k (velocity − U), with the body's U at the end of the step, so stable for any step. k: one
+        number or [n], kg/s; velocity: [2] or [n, 2], m/s. For a quadratic drag use k = c |velocity − U|."""
         u = np.broadcast_to(velocity, (len(self.id), 2))
         self.load[:, _G] += k
         self.load[:, _JX] += k * u[:, 0]
         self.load[:, _JY] += k * u[:, 1]
 
 
-#: fills in what acts on the bodies, or returns forces [n, 2], or with moments [n, 3]
+#: adds the loads on the bodies itself, or returns forces [n, 2], or forces and moments [n, 3]
 Force = Callable[[Bodies], "npt.ArrayLike | None"]
 
 
 class Forces:
-    """The forces of one simulation. Laws are registered for the whole process: a law of another simulation that is
-    stepped in turn with this one does nothing in the steps of this one."""
+    """The forces of one simulation. Force laws are registered for the whole process: if two simulations are stepped in
+    turn, the laws of one do nothing in the steps of the other."""
 
-    _callbacks: dict[str, Any] = {}  # name -> the C function; kept for ever, as the library keeps its address
-    _owner: dict[str, Forces] = {}      # name -> the Forces that have it now
-    stepping: Forces | None = None  # whose simulation is in a step
-    calling = False                 # in a function of the user
+    _callbacks: dict[str, Any] = {}  # name -> the C function; kept for good, because the library keeps its address
+    _owner: dict[str, Forces] = {}      # name -> the Forces that owns it now
+    stepping: Forces | None = None  # the one whose simulation is in a step
+    calling = False                 # while a user's function is running
 
     def __init__(self, functions: Mapping[str, Force] | None) -> None:
         self.functions = dict(functions or {})
@@ -171,14 +171,14 @@ class Forces:
             if answer is not None:
                 bodies._add(answer)
             return 0
-        except BaseException as error:  # raised again when the step has returned
+        except BaseException as error:  # raised again after the step has returned
             cls.calling = False
             forces.raised = error
             return 1
 
     @contextlib.contextmanager
     def in_step(self) -> Iterator[None]:
-        """A step of their simulation; what one of them has raised comes out."""
+        """Surround a step of their simulation; an exception in one of the forces is raised here."""
         if not self.functions:
             yield
             return

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The commands as functions: pictures, statistics, reports, outlines, and studies that make runs.
+"""The commands as Python functions: pictures, statistics, reports, outlines, and studies that start runs.
 
-They run in this process, by the code of the commands, and draw on Figures of matplotlib without pyplot: they neither
-use nor change the backend and fonts that a program has chosen for its pictures. For other axes draw from open_result().
+They run in this process, with the code of the commands, and draw on matplotlib Figures without pyplot. So they neither
+use nor change the backend and fonts that a program has chosen. To draw on your own axes, use open_result().
 """
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .result.dataset import Result
     from .study.ensemble import Ensemble
 
-#: a folder by its path, or an object that stands for it
+#: a folder, given by its path or by an object that represents it
 Of = Union[str, "os.PathLike[str]", "Result", "Ensemble"]
 
 
@@ -31,13 +31,13 @@ def _folder(of: Of) -> str:
     return os.fspath(of if isinstance(of, (str, os.PathLike)) else of.folder)
 
 
-#: options that a command takes several times, not once with several values
+#: options that a command line repeats, instead of giving several values to one
 _REPEATED = ("exclude", "also", "of", "no_go")
 
 
 def _words(options: Mapping[str, Any]) -> list[str]:
-    """Options of a command: {"time_scale": 10, "linear": True, "times": [1, 2]} -> --time-scale=10 --linear ..., and
-    {"set": {"run.dt": "0.1 s"}} -> --set=run.dt=0.1 s"""
+    """Options as command-line words: {"time_scale": 10, "linear": True, "times": [1, 2]} -> --time-scale=10 --linear
+    ..., and {"set": {"run.dt": "0.1 s"}} -> --set=run.dt=0.1 s"""
     words = []
     for name, value in options.items():
         flag = "--" + name.rstrip("_").replace("_", "-")
@@ -55,7 +55,7 @@ def _words(options: Mapping[str, Any]) -> list[str]:
 
 
 def _perform(command: str, *words: str | os.PathLike[str]) -> None:
-    from . import cli  # which knows the functions here by their results
+    from . import cli  # imported here because cli needs the functions of this module
     from .cli import lacking
     try:
         cli.perform(command, *words)
@@ -66,14 +66,14 @@ def _perform(command: str, *words: str | os.PathLike[str]) -> None:
 
 
 def _call(command: str, *words: str | os.PathLike[str]) -> str:
-    """The text that a command prints. Errors: BergtowError."""
+    """The text that a command prints. Raises BergtowError."""
     with contextlib.redirect_stdout(io.StringIO()) as said:
         _perform(command, *words)
     return said.getvalue()
 
 
 class Picture:
-    """A picture: shown by a notebook, written by save()."""
+    """A picture: notebooks display it, save() writes it."""
 
     def __init__(self, draw: Callable[[Path], Any]) -> None:
         self._draw = draw
@@ -88,8 +88,8 @@ class Picture:
         return self._kept[kind]
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Write it to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as shown; the
-        others are drawn from the folder as it is now."""
+        """Write the picture to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as
+        displayed; the other formats are drawn again from the current contents of the folder."""
         path = Path(file)
         if path.exists() and not path.is_file():
             raise BergtowError(f"{path}: is no regular file and is not replaced; give another name", IO)
@@ -106,12 +106,12 @@ class Picture:
 
 def _picture(command: str, options: Mapping[str, Any], *arguments: str | os.PathLike[str]) -> Picture:
     picture = Picture(lambda path: _call(command, *arguments, "-o", path, "--force", *_words(options)))
-    picture._repr_png_()  # what cannot be drawn is said now
+    picture._repr_png_()  # errors in drawing show up now
     return picture
 
 
 def plot_force(run: Of, **options: Any) -> Picture:
-    """The forces of a run against time. run: its folder or Result. options: those of bergtow plot-force, as max=100."""
+    """Forces of a run against time. run: its folder or Result. options: those of bergtow plot-force, e.g. max=100."""
     return _picture("plot-force", options, _folder(run))
 
 
@@ -122,24 +122,24 @@ def plot_field(run: Of, **options: Any) -> Picture:
 
 
 def plot_impacts(run: Of) -> Picture:
-    """Loads around the hull by panel, and how often the peak of a collision is exceeded."""
+    """Loads around the hull by panel, and the exceedance of collision peaks."""
     return _picture("plot-impacts", {}, _folder(run))
 
 
 def plot_resistance(runs: Of | list[Of] | tuple[Of, ...], **options: Any) -> Picture:
-    """Mean ice resistance of runs against the concentration, beside the estimates. options: linear=True."""
+    """Mean ice resistance of runs against the concentration, with the estimates. options: linear=True."""
     several = runs if isinstance(runs, (list, tuple)) else [runs]
     return _picture("plot-resistance", options, *map(_folder, several))
 
 
 def plot_chains(run: Of, contacts: str | os.PathLike[str], **options: Any) -> Picture:
-    """The contact forces of one step. contacts: the file of --dump-contacts. options: whole=True."""
+    """The contact forces of one step. contacts: the file that --dump-contacts wrote. options: whole=True."""
     return _picture("plot-chains", options, _folder(run), contacts)
 
 
 def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
-    """The pictures that a study supports, {name: Picture}. ensemble: its folder or Ensemble. options: those of
-    bergtow plot-ensemble, as time_scale=10."""
+    """The pictures that a study allows, as {name: Picture}. ensemble: its folder or Ensemble. options: those of bergtow
+    plot-ensemble, such as time_scale=10."""
     def draw_all(kind: str) -> dict[str, bytes]:
         with tempfile.TemporaryDirectory() as there:
             _call("plot-ensemble", _folder(ensemble), "-o", there, "--format", kind, *_words(options))
@@ -159,9 +159,9 @@ def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
 
 
 def statistics(ensemble: Of, **options: Any) -> dict[str, Any]:
-    """The statistics of an ensemble, a dictionary as statistics.json has it: {"conditions": [...], ...}. options: those
-    of bergtow statistics, as time_scale=10, hours=[1, 10], exclude="jammed". Members that are missing are named in
-    "holes"."""
+    """The statistics of an ensemble, as a dictionary with the layout of statistics.json: {"conditions": [...], ...}.
+    options: those of bergtow statistics, such as time_scale=10, hours=[1, 10], exclude="jammed". Missing members are
+    listed in "holes"."""
     with tempfile.TemporaryDirectory() as there:
         _call("statistics", _folder(ensemble), "-o", there, "--partial", *_words(options))
         return json.loads((Path(there) / "statistics.json").read_text(encoding="utf-8"))
@@ -169,15 +169,15 @@ def statistics(ensemble: Of, **options: Any) -> dict[str, Any]:
 
 def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool = False, **options: Any) -> Path:
     """Write the report of a run or an ensemble, and return its path. of: a folder, Result or Ensemble. file: .html or
-    .pdf, report.html in the folder without. replace: a file there that is not a report of ours, too. options: those of
-    bergtow report, as client="...", size=20."""
+    .pdf; by default report.html in the folder. replace: overwrite a file even if it is not a report of bergtow.
+    options: those of bergtow report, such as client="...", size=20."""
     path = Path(file) if file is not None else Path(_folder(of)) / "report.html"
     _call("report", _folder(of), "-o", path, *(["--force"] if replace else []), *_words(options))
     return path
 
 
 class Outlines:
-    """What `outlines` has made of a map: `file`, the GeoJSON for ice.outlines; `record`, every number as a dictionary
+    """The result of `outlines`: `file`, the GeoJSON for ice.outlines; `record`, all numbers as a dictionary
     (coordinates, plane, changes with areas, floes); `text`, the same in words, with lines for a case."""
 
     def __init__(self, map: Path, file: Path, record: dict[str, Any], text: str, options: list[str]) -> None:
@@ -185,7 +185,7 @@ class Outlines:
         self._options = options
 
     def picture(self) -> Picture:
-        """The map beside the floes, with the parts that were left out."""
+        """The map next to the floes, with the parts that were left out."""
         def draw(path: Path) -> None:
             with tempfile.TemporaryDirectory() as there:
                 _call("outlines", self.map, "-o", Path(there) / "x.geojson", "--picture", path, "--force",
@@ -203,16 +203,15 @@ class Outlines:
 
 def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, replace: bool = False,
              **options: Any) -> Outlines:
-    """Floe outlines for a case from a map: any vector format that GDAL knows (shapefile, GeoPackage, ...) or an image
-    of labels, in any coordinate reference system, repaired with every change counted.
+    """Make floe outlines for a case from a map: any vector format that GDAL reads (shapefile, GeoPackage, ...) or an
+    image of labels, in any coordinate reference system. Outlines are repaired, and every change is counted.
 
         floes = bergtow.outlines("mosaic.gpkg", "floes.geojson", centre=(-12, 80), box=("1.1 km", "900 m"))
         case = bergtow.Case({"ice": {"outlines": "floes.geojson", ...}, ...})
 
     file: GeoJSON to write. options: those of `bergtow outlines`, where pairs may be tuples: centre, heading, crs,
     layer, where, thickness, water, unseen, footprint, band, pixel, box, clear, cut, stairs, tolerance, least. Needs
-    GDAL, pyproj and shapely.
-    Errors: BergtowError, with what to say of a map that is not understood.
+    GDAL, pyproj and shapely. Raises BergtowError, which names the missing option if the map is ambiguous.
     """
     known = {name: ",".join(str(v) for v in value) if isinstance(value, (list, tuple)) else value
              for name, value in options.items()}
@@ -225,9 +224,9 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
 
 
 def export(run: Of, file: str | os.PathLike[str], *, replace: bool = False, **options: Any) -> Path:
-    """Write floes, tracks and loads of a run for the map, and return the file's path. run: a folder or Result. file:
-    .gpkg, .geojson or .shp, which need GDAL but for .geojson, or trajectories as .csv or .nc. options: those of
-    `bergtow export`, as time=600, layer="tracks", start="2027-03-01"."""
+    """Write floes, tracks and loads of a run for use on a map, and return the file's path. run: a folder or Result.
+    file: .gpkg, .geojson or .shp (all but .geojson need GDAL), or .csv or .nc for trajectories. options: those of
+    `bergtow export`, such as time=600, layer="tracks", start="2027-03-01"."""
     _call("export", _folder(run), "-o", file, *(["--force"] if replace else []), *_words(options))
     return Path(file)
 
@@ -239,24 +238,24 @@ def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[st
 
 
 def converge(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """The numerical choices that a result depends on, as the dictionary of OUT/converge.json. options: those of
-    `bergtow converge`, as budget=10, vary="width,dt", set={"tow.speed": 0.5}."""
+    """How a result depends on the numerical settings, as the dictionary in OUT/converge.json. options: those of
+    `bergtow converge`, such as budget=10, vary="width,dt", set={"tow.speed": 0.5}."""
     return _found("converge", case, out, options)
 
 
 def budget(study: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """The uncertainty budget of a study, a dictionary as OUT/budget.json has it. options: those of `bergtow budget`."""
+    """The uncertainty budget of a study, as the dictionary in OUT/budget.json. options: those of `bergtow budget`."""
     return _found("budget", study, out, options)
 
 
 def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """How fast a vessel tows in which ice, and which ice stops it, as the dictionary of OUT/capability.json. options:
-    those of `bergtow capability`; from_ and to for its range."""
+    """How fast a vessel can tow in which ice, and which ice stops it, as the dictionary in OUT/capability.json.
+    options: those of `bergtow capability`; `from_` and `to` give its range."""
     return _found("capability", case, out, options)
 
 
 def _place(value: Any) -> str:
-    """A position or a line as an option has it: (3000, 400) or ((3000, -100), (3000, 100)), m; texts stay."""
+    """A position or a line as an option: (3000, 400) or ((3000, -100), (3000, 100)), m; text is left unchanged."""
     if isinstance(value, str):
         return value
     return (":" if hasattr(value[0], "__len__") else ",").join(_place(v) if hasattr(v, "__len__") else repr(float(v))
@@ -264,9 +263,9 @@ def _place(value: Any) -> str:
 
 
 def route(case: str | os.PathLike[str], out: str | os.PathLike[str], *, to: Any, **options: Any) -> dict[str, Any]:
-    """The way and the speed of a tow through known ice, a dictionary as OUT/route.json has it. to: the goal, (x, y) in
-    m, two points of a line, or a text as of `bergtow route`, "20.1E,76.5N". options: those of `bergtow route`, as
-    from_=(0, 0), no_go=["land.geojson"], members=1, plan_only=True."""
+    """The route and speed of a tow through known ice, as the dictionary in OUT/route.json. to: the goal, as (x, y) in
+    m, as the two end points of a line, or as text for `bergtow route`, "20.1E,76.5N". options: those of `bergtow
+    route`, such as from_=(0, 0), no_go=["land.geojson"], members=1, plan_only=True."""
     places = {k: _place(v) for k, v in {"to": to, "from_": options.pop("from_", None)}.items() if v is not None}
     speeds = options.get("speeds")
     if isinstance(speeds, (list, tuple)):
@@ -275,8 +274,8 @@ def route(case: str | os.PathLike[str], out: str | os.PathLike[str], *, to: Any,
 
 
 def design(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
-    """What a tow asks for: tow force with interval or named fall-back, load cases, ramp, vessel, line, speeds, as a
-    dictionary as OUT/answer.json has it; OUT/report.html is its page. options: those of `bergtow design`, as budget=14,
-    vessel="110 t", speeds="0.8 kn,1.3 kn", no_pdf=True."""
+    """The requirements of a tow: tow force with interval or a named fall-back, load cases, ramp, vessel, line, speeds,
+    as the dictionary in OUT/answer.json; OUT/report.html presents it. options: those of `bergtow design`, such as
+    budget=14, vessel="110 t", speeds="0.8 kn,1.3 kn", no_pdf=True."""
     _perform("design", case, "-o", out, *_words(options))
     return json.loads((Path(out) / "answer.json").read_text(encoding="utf-8"))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Progress of a command: a line after every few seconds of silence, none if the command is quick. A thread prints it,
-since long work is often a single call of NumPy or matplotlib.
+since long work is often a single call to NumPy or matplotlib.
 """
 import sys
 import threading
@@ -9,12 +9,12 @@ from contextlib import contextmanager
 
 EVERY = 8.0  # s
 
-_at = []  # current work of the command, the innermost last
+_at = []  # current tasks of the command, the innermost last
 
 
 @contextmanager
 def doing(what):
-    """with doing("drawing the ice field"): ..."""
+    """Name the current task: with doing("drawing the ice field"): ..."""
     _at.append(what)
     try:
         yield
@@ -23,7 +23,7 @@ def doing(what):
 
 
 def each(what, items):
-    """The items of a list, one after the other, each with its place among them: "condition 2 of 5"."""
+    """Yield the items of a list, each named with its index: "condition 2 of 5"."""
     for k, item in enumerate(items):
         with doing(f"{what} {k + 1} of {len(items)}"):
             yield item
@@ -31,7 +31,7 @@ def each(what, items):
 
 @contextmanager
 def told(name):
-    """Print the work named by doing() on standard error, within the block. name: of the command."""
+    """Within the block, print on standard error the task named by doing(). name: of the command."""
     over, began = threading.Event(), time.monotonic()
     def tell():
         while not over.wait(EVERY):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Simulations that are stepped, and runs from case to result folder."""
+"""Simulations run step by step, and runs from case to result folder."""
 from __future__ import annotations
 
 import contextlib
@@ -35,25 +35,25 @@ def _pointer(array: np.ndarray) -> Any:
 
 
 def _id(body: int) -> int:
-    """One that the library can take; which bodies there are is its own affair."""
+    """Check that an id fits the library's integer type; the library checks whether the body exists."""
     if not -2**63 <= body < 2**63:
         raise IndexError(f"body {body}: does not exist")
     return body
 
 
 class Simulation:
-    """A simulation of a case, step by step.
+    """A simulation of a case, run step by step.
 
         with Simulation(case, "out/my-run", forces={"my_drag": my_drag}) as sim:
             sim.step(100)
             sim.positions, sim.velocities, sim.contacts, sim["ice_resistance"]
 
-    out: a result folder as `bergtow run -o`, complete when the block ends; without it nothing is written. forces:
-    functions of Bodies by the name of their series (NAME_force). A block that ends by an exception writes no summary,
-    unless the run was asked to stop (the file `stop` in the folder). case: its state when the simulation began. Arrays
-    are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. Those of the simulation are
-    sorted by cells and allocated anew within a step, so that a view would come to show other bodies, or memory that has
-    been given back; positions of 100,000 bodies take 0.3 ms to copy.
+    out: a result folder as for `bergtow run -o`, complete when the block ends; without it nothing is written. forces:
+    functions of Bodies, keyed by the name of their series (NAME_force). If an exception ends the block, no summary is
+    written, unless the run was asked to stop (the file `stop` in the folder). case: its state when the simulation
+    began. Arrays are copies, in the order of the ids: floes, floes given by hand, the towed body, walls. The
+    simulation's own arrays are sorted by cell and reallocated within a step, so a view could end up showing other
+    bodies or freed memory. Copying the positions of 100,000 bodies takes 0.3 ms.
     """
 
     def __init__(self, case: Case | str | os.PathLike[str] | Mapping[str, Any],
@@ -65,12 +65,13 @@ class Simulation:
     @classmethod
     def resume(cls, folder: str | os.PathLike[str], *, checkpoint: str | os.PathLike[str] | None = None,
                forces: Mapping[str, Force] | None = None, threads: int = 0, progress: bool = False) -> Simulation:
-        """Continue a run in its folder, from its last checkpoint or the checkpoint that is named.
+        """Continue a run in its folder, from its last checkpoint or from the one given.
 
             with Simulation.resume("out/my-run", forces={"my_drag": my_drag}) as sim: ...
 
-        The run may be one of `bergtow run`, of an ensemble or of this class. forces: as they were, for the checkpoint
-        does not hold them. Errors: BergtowError for a run that is finished, CaseError for a checkpoint that is refused.
+        The run may come from `bergtow run`, an ensemble or this class. forces: pass the same ones again, because the
+        checkpoint does not contain them. Raises BergtowError for a run that is finished, CaseError for a checkpoint
+        that is rejected.
         """
         self = cls.__new__(cls)
         self._begin("bt_simulation_resume", None, folder, forces, threads=threads, progress=progress, from_=checkpoint)
@@ -84,7 +85,7 @@ class Simulation:
         more["threads"] = _library.threads_here(more["threads"])
         case = None if case is None else case.frozen_copy()
         folder = None if out is None else os.fsdecode(out)
-        self.folder = os.path.join(here(), folder) if folder else folder  # the working folder may become another one
+        self.folder = os.path.join(here(), folder) if folder else folder  # the working folder may change
         self._forces = Forces(forces)
         try:
             address = c_void_p()
@@ -100,7 +101,7 @@ class Simulation:
             raise
 
     def _look(self, case: Case | None) -> None:
-        """What stays as it is."""
+        """Read the properties that stay constant."""
         address = self._s
         self._case = case
         self._resolved = _library.take_text(self._library.bt_simulation_case(address))
@@ -120,23 +121,23 @@ class Simulation:
 
     @property
     def case(self) -> Case:
-        """The case that is simulated; for a resumed run, the case in its checkpoint. It is made on first use. Files
-        that it names must exist then, though a resumed run does not need them."""
+        """The simulated case; for a resumed run, the case in its checkpoint. It is built on first use. Files that it
+        names must exist then, although a resumed run does not need them."""
         if self._case is None:
             self._case = Case(os.path.join(self.folder or "", "case.resolved.yml"), text=self._resolved)
         return self._case
 
     @property
     def towed(self) -> int:
-        """Id of the towed body. Where there is none (`has_towed`) it is an error: as None it would mean all bodies
-        where it is an index."""
+        """Id of the towed body. It is an error if there is none (see `has_towed`): None as an index would mean all
+        bodies."""
         return _library.id_of_towed(self._towed)
 
     # --- steps --------------------------------------------------------------------------------------------------------
 
     def step(self, n: int = 1) -> None:
-        """Make n steps, or as many as are left. An exception of a force comes out of here. Ctrl-C ends it between two
-        steps; a second one ends a force that takes long, and with it the simulation."""
+        """Make n steps, or as many as are left. An exception in a force is raised from here. Ctrl-C stops between two
+        steps; a second Ctrl-C aborts a slow force, and with it the simulation."""
         while True:
             with self._forces.in_step():
                 self._library.bt_simulation_step(self._s, min(n, 1))
@@ -145,12 +146,12 @@ class Simulation:
                 return
 
     def end(self) -> Result | None:
-        """Summary and last checkpoint, where there is a folder. Returns its Result, None without."""
+        """Write summary and last checkpoint, if there is a folder. Returns its Result, or None without a folder."""
         self._close("bt_simulation_end")
         return None if self.folder is None else Result(self.folder)
 
     def drop(self) -> None:
-        """End without summary."""
+        """End without a summary."""
         if self._address is not None:
             self._close("bt_simulation_drop")
 
@@ -171,7 +172,7 @@ class Simulation:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
         if self._address is None:
             return
-        if kind is None or getattr(error, "status", None) == SIGNAL:  # asked to stop: nothing is lost
+        if kind is None or getattr(error, "status", None) == SIGNAL:  # the run was asked to stop: nothing is lost
             self.end()
         else:
             self.drop()
@@ -185,7 +186,7 @@ class Simulation:
         self._library.bt_simulation_checkpoint(self._s)
 
     def frame(self) -> None:
-        """Write a frame of the bodies as they are, beside those by output.frame_interval."""
+        """Write a frame of the bodies in their current state, in addition to those of output.frame_interval."""
         self._library.bt_simulation_frame(self._s)
 
     @property
@@ -198,7 +199,7 @@ class Simulation:
 
     @property
     def progress(self) -> str:
-        """The line of progress of `bergtow run`."""
+        """The progress line of `bergtow run`."""
         return _library.take_text(self._library.bt_simulation_progress(self._s))
 
     @property
@@ -246,7 +247,7 @@ class Simulation:
 
     @property
     def radii(self) -> np.ndarray:
-        """[n] of the circle about the outline, m"""
+        """[n] of the circle around the outline, m"""
         return self._read("radius")
 
     @property
@@ -256,8 +257,8 @@ class Simulation:
 
     @property
     def motions(self) -> np.ndarray:
-        """[n] 0 moved by forces, 1 velocity prescribed, 2 at rest for ever, -1 not there: a floe that has split, or a
-        piece that no floe has become yet; all other numbers of it are NaN"""
+        """[n] 0 moved by forces, 1 velocity prescribed, 2 permanently at rest, -1 absent: a floe that has split, or an
+        unused piece; all its other numbers are NaN"""
         return np.nan_to_num(self._read("motion"), nan=-1).astype(int)
 
     @property
@@ -266,7 +267,7 @@ class Simulation:
         return self._read("drag")
 
     def outline(self, body: int) -> np.ndarray:
-        """[n, 2] m, anticlockwise, where the body is."""
+        """[n, 2] m, anticlockwise, at the body's current position."""
         if not 0 <= body < self.n_bodies:
             raise IndexError(f"body {body}: does not exist; ids are 0 to {self.n_bodies - 1}")
         n = self._library.bt_simulation_outline(self._s, body, None, 0)
@@ -275,17 +276,17 @@ class Simulation:
         return out
 
     def set_velocity(self, body: int, x: float, y: float, rate: float = 0.0) -> None:
-        """m/s, m/s, rad/s. Refused for a body whose velocity is prescribed."""
+        """m/s, m/s, rad/s. Rejected for a body whose velocity is prescribed."""
         self._library.bt_simulation_set_velocity(self._s, _id(body), x, y, rate)
 
     def set_position(self, body: int, x: float, y: float, yaw: float) -> None:
-        """m, m, rad. Refused outside of the domain, over another body, and for a body that is towed."""
+        """m, m, rad. Rejected outside the domain, over another body, and for a towed body."""
         self._library.bt_simulation_set_place(self._s, _id(body), x, y, yaw)
 
     # --- numbers ------------------------------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> float:
-        """A number of the last step by the name of its series, in SI units; NaN where it does not apply."""
+        """A number of the last step by the name of its series, in SI units; NaN if it does not apply."""
         value = c_double()
         address = self._s
         try:
@@ -297,7 +298,7 @@ class Simulation:
 
     @property
     def contacts(self) -> np.ndarray:
-        """Contacts of the last step, an array of the type CONTACT; those without impulse might have come about."""
+        """Contacts of the last step, an array of dtype CONTACT; those without an impulse are candidates."""
         with _library.LOCK:
             n = self._library.bt_simulation_contacts(self._s, None, 0)
             rows = np.empty((n, _library.limit("contact_columns")))
@@ -326,11 +327,11 @@ class Simulation:
 def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.PathLike[str], *,
         forces: Mapping[str, Force] | None = None, threads: int = 0, replace: bool = False,
         progress: bool | Callable[[Simulation], Any] = False) -> Result:
-    """Run a case to its end and return its Result. out: the result folder. Ctrl-C ends it between steps as it ends
-    `bergtow run`: with a summary and a checkpoint, for Simulation.resume.
+    """Run a case to its end and return its Result. out: the result folder. Ctrl-C stops it between steps, like `bergtow
+    run`: with a summary and a checkpoint, for Simulation.resume.
 
-    progress: True for the line of `bergtow run`, which the run renews a few times a second, in notebooks too; or a
-    function, called as often with the Simulation.
+    progress: True for the progress line of `bergtow run`, updated a few times a second, also in notebooks; or a
+    function, called equally often with the Simulation.
     """
     show, last = _line if progress is True else progress, 0.0
     with Simulation(case, out, forces=forces, threads=threads, replace=replace) as sim:
@@ -342,7 +343,7 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
                     last = now
                     show(sim)
         except KeyboardInterrupt:
-            with contextlib.suppress(BergtowError):  # of a stop, or of a force that Ctrl-C has ended
+            with contextlib.suppress(BergtowError):  # from a stop, or from a force that Ctrl-C aborted
                 sim.end()
             raise
         if progress is True:
@@ -351,5 +352,5 @@ def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.P
 
 
 def _line(sim: Simulation) -> None:
-    """Standard output of Python, which a notebook shows; that of the library goes past it."""
+    """Print to Python's standard output, which a notebook shows; output of the library bypasses it."""
     print(f"\r{sim.progress}".ljust(100), end="", flush=True)

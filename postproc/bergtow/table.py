@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tables of text or Markdown, and the format of numbers in them.
+"""Tables as text or Markdown, and the format of numbers in them.
 
-What is written at a terminal and on a page is a list of parts: each a Table, or a list of lines, of which some are
-Warned.
+Output for a terminal or a page is a list of parts: each is a Table, or a list of lines, some of which may be Warned.
 """
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from bergtow.result.at_least import AtLeast
 
-FAR = 10.0  # times a level: an end beyond bounds nothing
+FAR = 10.0  # multiple of a level: an interval end beyond it counts as no bound
 
 
 def hours_text(hours):
@@ -18,14 +17,14 @@ def hours_text(hours):
 
 
 class Table(NamedTuple):
-    """A head and rows of texts; by: the column of which equal cells are one on a page."""
+    """A head and rows of texts; by: the column whose equal cells are merged on a page."""
     head: list
     rows: list
     by: int = 0
 
 
 class Warned(str):
-    """A line that warns."""
+    """A line with a warning."""
 
 
 def marked(line):
@@ -33,16 +32,16 @@ def marked(line):
 
 
 def written(parts, markdown=False):
-    """Parts as text or Markdown, with an empty line between two."""
+    """Parts as text or Markdown, separated by empty lines."""
     return "\n\n".join(table(part.head, part.rows, markdown) if isinstance(part, Table) else
                        "\n".join(map(marked, part)) for part in parts)
 
 
-PROSE = 40  # characters: a column with a longer cell holds words, not numbers
+PROSE = 40  # characters: a column with a longer cell contains words, not numbers
 
 
 def table(head, rows, markdown):
-    """Columns of a head and rows of texts: the first and those that hold words are left-aligned, the others right."""
+    """Columns of a head and rows of texts: the first, and those of words, are left-aligned, others right-aligned."""
     width = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
     left = [k == 0 or max((len(row[k]) for row in rows), default=0) > PROSE for k in range(len(head))]
     if markdown:
@@ -54,7 +53,7 @@ def table(head, rows, markdown):
 
 
 def scale(values, unit):
-    """(factor, unit): values / factor read well in the unit, with its k, M or G where they are large."""
+    """(factor, unit): values / factor are easy to read in the unit, with its k, M or G for large values."""
     values = np.asarray(values, dtype=float)
     values = np.abs(values[np.isfinite(values)])
     top = values.max(initial=0.0)
@@ -65,9 +64,9 @@ def scale(values, unit):
 
 
 def short(value, digits=3):
-    """A number to so many significant digits, without exponent where that can be avoided."""
+    """A number to this many significant digits, without an exponent if possible."""
     if value == 0 or not np.isfinite(value):
-        return f"{value + 0.0:g}"  # no minus zero
+        return f"{value + 0.0:g}"  # avoid minus zero
     if isinstance(value, AtLeast):
         return f"at least {short(float(value), digits)}"
     value = float(f"{value:.{digits - 1}e}")  # 99.96 has as many digits as 100
@@ -76,13 +75,13 @@ def short(value, digits=3):
 
 
 def quantity(value, unit):
-    """A number with unit, in thousands where it is large: 12345, "N" gives 12.3 kN."""
+    """A number with unit, in thousands if it is large: 12345, "N" gives 12.3 kN."""
     factor, name = scale([value], unit)
     return f"{short(value / factor)} {name}"
 
 
 def number(value, digits=3):
-    """A number to so many digits, "–" where there is none."""
+    """A number to this many digits, "–" if undefined."""
     if value is None or not np.isfinite(value):
         return "–"
     return short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
@@ -94,8 +93,8 @@ def _first(value):
 
 
 def designed(value, least=-np.inf):
-    """A load that is designed for, to three digits, which is within 0.5 %: with two, 1049 would be 1000. Rounded up
-    where the nearest lies below `least`, the largest simulated, and the value itself does not."""
+    """A design load to three digits, which is within 0.5 %: with two, 1049 would be 1000. It is rounded up if rounding
+    to nearest would bring it below `least`, the largest simulated load, and the value itself is not below it."""
     if value == 0 or not np.isfinite(value):
         return value
     place = _first(value) - 2
@@ -104,9 +103,9 @@ def designed(value, least=-np.inf):
 
 
 def last_place(value, low, high):
-    """Decimal place of the last digit that the ends of an interval are worth: of the two digits that its wider side
-    leaves, and two to three of the value's own; three where an end would be rounded to the other side of the value.
-    None where no side has a width."""
+    """Decimal place of the last digit that the ends of an interval justify: two digits of its wider side, and two to
+    three of the value; three if an end would otherwise be rounded to the other side of the value. None if neither side
+    has a width."""
     wide = max((abs(end - value) for end in (low, high) if np.isfinite(end)), default=0.0)
     if not wide > 0:
         return None
@@ -117,13 +116,13 @@ def last_place(value, low, high):
 
 
 def to_place(value, place):
-    """A number to this decimal place, "no bound" where it is not finite."""
+    """A number rounded to this decimal place, "no bound" if it is not finite."""
     return f"{round(value, -place) + 0.0:.{max(0, -place)}f}" if np.isfinite(value) else "no bound"
 
 
 def bound(value, high):
-    """The upper end of the interval of a level: one FAR times the level away bounds nothing, but says that the sample
-    does not know the tail, and is infinite."""
+    """The upper end of the interval of a level. If it exceeds FAR times the level it is no bound, but shows that the
+    sample does not determine the tail, and becomes infinite."""
     return np.inf if np.isfinite([value, high]).all() and value > 0 and high > FAR * value else high
 
 
@@ -146,7 +145,7 @@ def stated(value, low, high, unit, least=None):
 
 
 def level(value, ends, factor=1.0):
-    """A level, to three digits, and its interval, to those that it is worth."""
+    """A level, to three digits, and its interval, to the digits that it justifies."""
     low, high = ends[0], bound(value, ends[1])
     place = last_place(value / factor, low / factor, high / factor)
     if place is None or np.isnan([low, high]).any():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Writing of files, and the one rule for replacing files.
+"""Writing files, and the single rule for replacing files.
 
-An existing file is replaced only if bergtow made it, or with --force. Each file carries MARK: a PNG and an MP4 in
-their texts, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_by`, Markdown in a comment. Rejected: a
+An existing file is replaced only if bergtow made it, or with --force. Each file carries MARK: a PNG and an MP4 in their
+text fields, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_by`, Markdown in a comment. Rejected: a
 list of the files in the folder, which does not cover a file that was moved there.
 """
 import csv
@@ -19,7 +19,7 @@ import numpy as np
 
 PICTURES = (".png", ".pdf", ".svg")
 MARK = "made by bergtow postproc, which may replace it"
-#: where matplotlib puts the mark, by the end of a picture's name
+#: matplotlib's metadata field for the mark, by the suffix of a picture
 PLACES = {".png": "Software", ".pdf": "Producer", ".svg": "Source"}
 
 
@@ -33,7 +33,7 @@ def made_here(path):
 
 
 def may_write(path, force):
-    """Errors: RunError for a file that bergtow did not make, and for a path that is not a file."""
+    """Raises RunError for a file that bergtow did not make, and for a path that is not a file."""
     try:
         if not path.exists():
             return
@@ -49,7 +49,7 @@ def may_write(path, force):
 
 @contextmanager
 def written(path, force):
-    """with written(path, force) as new: write the file `new`, which takes its place when it is whole. Errors:
+    """with written(path, force) as new: write the file `new`, which replaces `path` once it is complete. Raises
     RunError."""
     may_write(path, force)
     new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
@@ -57,7 +57,7 @@ def written(path, force):
         path.parent.mkdir(parents=True, exist_ok=True)
         yield new
         with open(new, "rb") as whole:
-            os.fsync(whole.fileno())  # a crash leaves the old file or the new one
+            os.fsync(whole.fileno())  # so that a crash leaves either the old file or the new one
         os.replace(new, path)
     except OSError as error:
         raise RunError(path, f"cannot be written ({error.strerror or error})", "choose another place with -o") from None
@@ -67,14 +67,14 @@ def written(path, force):
 
 
 def write_text(text, path, force):
-    """Write a text that carries the mark already. Errors: RunError."""
+    """Write a text that already contains the mark. Raises RunError."""
     assert MARK in text
     with written(path, force) as new:
         new.write_text(text, encoding="utf-8")
 
 
 def plain(value):
-    """The value as read back from JSON: numbers of numpy as those of Python, numbers that are not finite as None."""
+    """The value as read back from JSON: NumPy numbers as Python numbers, numbers that are not finite as None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
@@ -85,12 +85,12 @@ def plain(value):
 
 
 def write_json(value, path, force):
-    """Write a dict, and the mark with it. Errors: RunError."""
+    """Write a dict together with the mark. Raises RunError."""
     write_text(json.dumps({"made_by": MARK, **plain(value)}, indent=1, allow_nan=False) + "\n", path, force)
 
 
 def write_csv(rows, path, force):
-    """Write dicts of the same keys as a table, with the mark as the last column. Errors: RunError."""
+    """Write dicts with the same keys as a table, with the mark as the last column. Raises RunError."""
     text = io.StringIO()
     table = csv.DictWriter(text, [*rows[0], "made_by"])
     table.writeheader()
@@ -103,7 +103,7 @@ def write_markdown(text, path, force):
 
 
 def save(figure, path, force=False):
-    """Write a figure; its folder is made if missing. Errors: RunError."""
+    """Write a figure; its folder is created if missing. Raises RunError."""
     with written(path, force) as new:
         figure.savefig(new, metadata={PLACES[path.suffix.lower()]: MARK})
     print(path)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The command line: the modules of the commands, messages and exit codes.
+"""The command line: the modules behind the commands, messages and exit codes.
 
-A command is a module with options(p), which adds its options to a parser, and perform(a). Any other command belongs to
-the program, which gets the whole line.
+A command is a module with options(p), which adds its options to a parser, and perform(a). Any other command line is
+passed unchanged to the compiled program.
 """
 import os
 import sys
@@ -38,12 +38,12 @@ COMMANDS = {
     "plot-chains": ("plot.chains", "draw the force chains of one step"),
     "plot-ensemble": ("plot.ensemble", "draw the pictures of an ensemble that its study supports"),
 }
-#: options whose value may begin with a minus: a western longitude is no option, nor is a negative label
+#: options whose value may begin with a minus sign: a western longitude or a negative label is not an option
 SIGNED = ("--centre", "--heading", "--water", "--unseen", "--footprint", "--from", "--to")
 
 
 def _joined(words):
-    """With --option=-1 in place of --option -1."""
+    """Replace --option -1 with --option=-1."""
     out = []
     for word in words:
         if out and out[-1] in SIGNED and word[:1] == "-":
@@ -54,7 +54,7 @@ def _joined(words):
 
 
 def tree(name=None):
-    """The parser of all commands; the options of `name` alone, so that the modules of the others need not be loaded."""
+    """The parser of all commands, with options for `name` only, so that the other modules need not be loaded."""
     p = command.Parser(prog="bergtow", description="Commands of the Python package bergtow; all others are those of "
                        "the program, see bergtow --help.")
     some = p.add_subparsers(metavar="COMMAND", required=True)
@@ -68,19 +68,19 @@ def tree(name=None):
 
 
 def arguments(name, *words):
-    """The options of a command. Errors: BergtowError; SystemExit of --help."""
+    """Parse the options of a command. Raises BergtowError; SystemExit for --help."""
     return tree(name).parse_args([name, *_joined(map(os.fspath, words))])
 
 
 def perform(name, *words):
-    """A command, within this process. Errors: as arguments()."""
+    """Run a command in this process. Raises the same errors as arguments()."""
     a = arguments(name, *words)
     with _look():
         a.perform(a)
 
 
 def _look():
-    """The look of pictures; a command that draws nothing does without matplotlib."""
+    """The style of pictures. Without matplotlib no style is needed: the command draws nothing."""
     try:
         from bergtow.plot import style
     except ModuleNotFoundError:
@@ -89,7 +89,7 @@ def _look():
 
 
 def main():
-    """The program of python3 -m bergtow, and the console command."""
+    """Entry point of python3 -m bergtow and of the console command."""
     words = sys.argv[1:]
     if words and words[0] in COMMANDS:
         command.guarded(f"bergtow {words[0]}", lambda: perform(*words))
@@ -98,7 +98,7 @@ def main():
 
 
 def _program(words):
-    """The program in place of this process."""
+    """Replace this process with the compiled program."""
     sys.stdout.flush()
     path = program_path()
     os.execv(path, [path, *words])

@@ -14,14 +14,14 @@ from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises BergtowError where argparse would print its message and exit."""
+    """A parser that raises BergtowError where argparse would print a message and exit."""
 
     def error(self, message):
         raise BergtowError(f"{message}; see {self.prog} --help", USAGE)
 
 
 class _Stream:
-    """A stream of text that may be lost, when its reader leaves (`| head`) or the disk is full: text is then discarded,
+    """A text stream that may fail because its reader has gone (`| head`) or the disk is full. Text is then discarded,
     and the work continues."""
 
     def __init__(self, stream):
@@ -36,7 +36,7 @@ class _Stream:
         except OSError:
             self.lost = True
             nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())  # for text in buffers, and for child processes
+            os.dup2(nowhere, self._stream.fileno())  # for buffered text, and for child processes
             os.close(nowhere)
 
     def write(self, text):
@@ -48,13 +48,13 @@ class _Stream:
 
 
 def guarded(name, main):
-    """Run main() and exit with the code of its outcome. SIGTERM and SIGHUP act as Ctrl-C, so that the runs that main()
-    has started end with checkpoints; nohup keeps its effect. Once the outcome is known they do nothing: Python would
-    die of them while it ends. name: in front of messages."""
+    """Run main() and exit with the matching code. SIGTERM and SIGHUP act like Ctrl-C, so that runs started by main()
+    write checkpoints before they end; nohup still works. Once the outcome is known these signals are ignored, because
+    they would kill Python while it shuts down. name: prefix of messages."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)
-    for stream in (sys.stdout, sys.stderr):  # a terminal without a dash still gets its table
+    for stream in (sys.stdout, sys.stderr):  # a terminal whose encoding has no dash still gets its table
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     sys.stdout, sys.stderr = _Stream(sys.stdout), _Stream(sys.stderr)
@@ -86,7 +86,7 @@ def guarded(name, main):
 
 
 def _of_system(error):
-    """An error of the system with its path and a remedy in place of its number."""
+    """Describe an operating-system error by its path and a remedy instead of its number."""
     if error.filename is None:
         return error.strerror or error
     path = Path(os.fsdecode(error.filename))

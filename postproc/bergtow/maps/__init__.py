@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Maps of ice: read, brought into a plane, repaired."""
+"""Maps of ice: read, projected onto a plane, and repaired."""

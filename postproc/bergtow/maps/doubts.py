@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""What makes it doubtful that the shapes of a map are floes: {code, text, values} each.
+"""Reasons to doubt that the shapes of a map are floes, each as {code, text, values}.
 
-    doubts(found, floes, book)      the map, the floes that it became, the ledger of changes
+    doubts(found, floes, book)      the map, the floes made from it, the ledger of changes
 """
 import numpy as np
 
 from bergtow.maps import repair as map_repair
 from bergtow.maps.text import area
 
-MOST = 3 / 4        # of the ice, in one floe of several
-NECK = 1 / 8        # of the size of a floe: narrower is a neck
-HEAD = 0.1          # of its area, on either side of a neck
+MOST = 3 / 4        # of the ice, in a single floe out of several
+NECK = 1 / 8        # of the size of a floe: a narrower part is a neck
+HEAD = 0.1          # of the floe's area, on either side of a neck
 HUNG = 0.05         # of the ice, in floes with necks
 
 
@@ -23,7 +23,7 @@ def doubt(code, text, **values):
 
 
 def chart(found, book):
-    """Regions of an ice chart: ice of a concentration that is called a floe of 100 %, and land in its holes."""
+    """Regions of an ice chart: ice of some concentration taken for a floe of 100 %, and land in the holes."""
     if not found.chart:
         return None
     holes = book["holes"].after - book["holes"].before if "holes" in book else 0.0
@@ -54,7 +54,7 @@ def necks(floes):
 
 
 def has_neck(polygon):
-    """Does a floe that loses half a neck's width all around fall apart?"""
+    """Does the floe fall apart if half a neck's width is removed all around?"""
     least = HEAD * polygon.area
     half = NECK / 2 * map_repair.diameter(polygon)
     parts = map_repair.parts_of(polygon.buffer(-half))

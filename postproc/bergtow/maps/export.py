@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: MIT
 """From the folder of a run back to the map: floes at a time, tracks of iceberg, towing end and vessel, loads.
 
-    bergtow export RUN -o after.gpkg                     floes, bodies, tracks and loads, a layer each
+    bergtow export RUN -o after.gpkg                     floes, bodies, tracks and loads, one layer each
     bergtow export RUN -o after.geojson --time 600       one layer; the floes are outlines for ice.outlines
     bergtow export RUN -o drift.nc                       trajectories of everything in the frames, CF-1.8
 
-Coordinates are those of the map that the ice came from: degrees on WGS 84 or metres of its projection; metres of no
-place on the earth where the case names none. Degrees follow from the plane of the case by the projection of the
-library, by which it reads them (bergtow/outline.h), so a file comes back to where it was.
-
-Formats: GeoJSON by hand, as RFC 7946 has it, but for a crs of metres, which it leaves to those who agree on one; an
-outline over the 180th meridian is not cut there. GeoPackage and shapefile by GDAL, as maps are read. Trajectories: the
-discrete sampling geometry of CF-1.8, in the classic format of NetCDF, all with the times of the frames.
+Coordinates are those of the map that the ice came from: degrees on WGS 84, or metres of its projection. If the case
+names no map, they are metres without a geographic position. The library converts between metres in the plane of the
+case and degrees in both directions (bergtow/outline.h), so an exported file lies where the map lay. Formats: GeoJSON is
+written here, as RFC 7946 requires, except that it may have a crs in metres, which the RFC leaves to agreement; an
+outline across the 180th meridian is not cut there. GDAL writes GeoPackage and shapefile, as it reads maps.
+Trajectories: discrete sampling geometry of CF-1.8, in the classic NetCDF format, at the times of the frames.
 """
 import argparse
 import csv
@@ -34,7 +33,7 @@ from bergtow.result.run import Run
 import numpy as np
 
 LAYERS = ("floes", "bodies", "tracks", "loads")
-#: layers that a file gets where --layer names none
+#: layers written if --layer is not given
 DEFAULT = {".gpkg": LAYERS, ".geojson": ("floes",), ".json": ("floes",), ".shp": ("floes",), ".csv": (), ".nc": ()}
 TRAJECTORIES = (".csv", ".nc")
 WGS84 = {"grid_mapping_name": "latitude_longitude", "semi_major_axis": 6378137.0, "inverse_flattening": 298.257223563,
@@ -44,20 +43,20 @@ TRACKS = (("iceberg", "body_x", "body_y"), ("towing end", "carriage_x", "carriag
           ("vessel", "vessel_x", "vessel_y"))
 
 
-# ---- where the case lies
+# ---- position of the case
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where x = y = 0 of a run lies, and how."""
+    """Position and orientation of the frame of a run."""
 
     geographic: bool     #: x is north and y east; else x is the first axis and y the second
-    crs: str             #: for PROJ: OGC:CRS84 for degrees, "EPSG:32633"; "" for no place on the earth
-    zero: tuple          #: coordinates of x = y = 0 in it: longitude and latitude, or m
+    crs: str             #: for PROJ: OGC:CRS84 for degrees, "EPSG:32633"; "" without a geographic position
+    zero: tuple          #: coordinates of x = y = 0 in the crs: longitude and latitude, or m
 
     @staticmethod
     def of(run):
-        """Errors: RunError."""
+        """The place of a run. Raises RunError."""
         a = run.map_axes
         swapped = run.geographic
         if "crs" not in a:
@@ -77,7 +76,7 @@ class Place:
         return "geographic" if self.geographic else "basin"
 
     def metres(self, xy):
-        """East and north [..., 2] of places in the frame of the case, from x = y = 0."""
+        """East and north [..., 2], from x = y = 0, of positions in the frame of the case."""
         return xy[..., ::-1] if self.geographic else xy
 
     def coordinates(self, xy):
@@ -86,12 +85,12 @@ class Place:
         return _degrees(east_north, self.zero) if self.degrees else east_north + self.zero
 
     def ring(self, outline):
-        """A closed ring, anticlockwise on the map, of an outline that is so in x and y."""
+        """A closed ring, anticlockwise on the map, from an outline that is anticlockwise in x and y."""
         ring = self.coordinates(outline)[::-1 if self.geographic else 1]
         return np.concatenate([ring, ring[:1]])
 
     def lonlat(self, xy):
-        """Longitude and latitude [..., 2], or None of no place on the earth. Errors: ModuleNotFoundError."""
+        """Longitude and latitude [..., 2], or None without a geographic position. Raises ModuleNotFoundError."""
         at = self.coordinates(xy)
         if self.degrees or not self.crs:
             return at if self.degrees else None
@@ -110,7 +109,7 @@ class Place:
 
 
 def _degrees(east_north, zero):
-    """Longitude and latitude of metres about a place, by the library; NaN stays."""
+    """Longitude and latitude of metres about a reference point, computed by the library; NaN stays NaN."""
     unproject = _library.library().bt_outline_unproject
     lon0, lat0 = map(math.radians, zero)
     lon, lat = ctypes.c_double(), ctypes.c_double()
@@ -122,7 +121,7 @@ def _degrees(east_north, zero):
     return np.degrees(out)
 
 
-# ---- what is exported
+# ---- exported quantities
 
 
 @dataclass
@@ -136,15 +135,15 @@ class Layer:
 
 
 def _iceberg(run, frame):
-    """Where the iceberg is [2] m: frames have it in the domain, the series not wrapped."""
+    """Position of the iceberg [2] m, not wrapped: frames hold it wrapped into the domain, the series do not."""
     time = run.frame_times[frame]
     way = [np.interp(time, run["time"], run[name]) for name in ("body_x", "body_y")]
     return run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2], way)[0]
 
 
 def _about(run, frame):
-    """The middle of the ice that is exported of a periodic domain: that of a moving window, which has its end a fixed
-    distance ahead of the iceberg; otherwise the iceberg. None without one."""
+    """Centre of the ice exported from a periodic domain: with a moving window, the middle of the window, whose end lies
+    a fixed distance ahead of the iceberg; otherwise the iceberg. None without an iceberg."""
     if run.towed is None:
         return None
     ahead = run.number("moving_window.ahead_m", run.period[0] / 2)
@@ -153,7 +152,7 @@ def _about(run, frame):
 
 
 def floes_layer(run, frames):
-    """The floes that are there at the frames."""
+    """The floes that exist at the frames."""
     places, index, at = [], [], []
     for frame in frames:
         there = np.flatnonzero(np.isfinite(run.pose(frame)).all(axis=1))
@@ -173,7 +172,7 @@ def floes_layer(run, frames):
 
 
 def bodies_layer(run, frames):
-    """The iceberg and fixed bodies; walls are limits of the computation, and none of the map."""
+    """The iceberg and fixed bodies. Walls are boundaries of the computation and do not appear on the map."""
     rows = [(body, frame, ring) for frame in frames
             for body, ring in zip(run.bodies, run.body_polygons(frame, None if run.towed is None else
                                                                 _iceberg(run, frame))) if not body.wall]
@@ -183,7 +182,7 @@ def bodies_layer(run, frames):
 
 
 def tracks_layer(run, _):
-    """Ways of the iceberg, the towing end and the vessel over the whole run."""
+    """Tracks of the iceberg, the towing end and the vessel over the whole run."""
     names, places, columns = [], [], []
     for name, x, y in TRACKS:
         if x not in run:
@@ -201,7 +200,7 @@ def tracks_layer(run, _):
 
 
 def loads_layer(run, _):
-    """Forces and loads of each sample, at the place of the iceberg."""
+    """Forces and loads of each sample, at the position of the iceberg."""
     if "body_x" not in run:
         return Layer("loads", "Point", {}, [])
     xy = np.column_stack([run["body_x"], run["body_y"]])
@@ -215,13 +214,13 @@ MAKE = {"floes": floes_layer, "bodies": bodies_layer, "tracks": tracks_layer, "l
 
 @dataclass
 class Trajectories:
-    """Places of everything in the frames, [n, T]; NaN where it is not there."""
+    """Positions of everything in the frames, [n, T]; NaN where an object does not exist."""
 
     name: list            #: [n]: "floe 17", "iceberg", "towing end", "vessel"
     time: np.ndarray      #: [T] s
     xy: np.ndarray        #: [n, T, 2] m, in the frame of the case
     speed: np.ndarray     #: [n, T] m/s
-    thickness: np.ndarray  #: [n] m, NaN but for floes
+    thickness: np.ndarray  #: [n] m, NaN except for floes
 
     @staticmethod
     def of(run, frames):
@@ -240,7 +239,7 @@ class Trajectories:
             if x in run and np.isfinite(run[x]).any():
                 if name == "iceberg":
                     way = np.array([_iceberg(run, f) for f in frames])
-                else:  # frames lie between samples, and the first before all of them
+                else:  # frames lie between samples, and the first one before all of them
                     way = np.column_stack([np.interp(time, run["time"], run[c], np.nan, np.nan) for c in (x, y)])
                 speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
                 out._add(name, way, np.array(speeds), np.nan)
@@ -256,8 +255,8 @@ class Trajectories:
 
 
 def _pieces(xy, period):
-    """[n, T] which piece of ice a floe is at each time: in a periodic domain one that is left behind comes again ahead,
-    a period on, as other ice."""
+    """[n, T] index of the piece of ice that a floe represents at each time: in a periodic domain a floe left behind
+    reappears one period ahead as other ice."""
     jumps = (np.abs(np.diff(xy, axis=1)) > np.where(period > 0, period / 2, np.inf)).any(axis=2)
     return np.concatenate([np.zeros((len(xy), 1), int), np.cumsum(jumps, axis=1)], axis=1)
 
@@ -278,7 +277,7 @@ def _rows(layer):
 
 
 def geojson(layer, place):
-    """The text. Its head is that of `bergtow outlines` and `bergtow field`, so ice.outlines knows frame and origin."""
+    """The text, with the head that `bergtow outlines` and `bergtow field` write: frame and origin for ice.outlines."""
     head = {"type": "FeatureCollection", "made_by": writing.MARK,
             "bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
     if not place.degrees:
@@ -293,7 +292,7 @@ def geojson(layer, place):
 
 
 def write_ogr(layers, place, path, driver):
-    """Layers by GDAL, in a file that is not there yet. Names that it has changed, {ours: its own}."""
+    """Write layers with GDAL to a new file. Returns the names that GDAL changed, {ours: its own}."""
     from osgeo import ogr, osr
     ogr.UseExceptions()
     osr.UseExceptions()
@@ -331,13 +330,13 @@ def write_ogr(layers, place, path, driver):
             feature.SetGeometryDirectly(_geometry(ogr, layer.geometry, kind, place, at))
             there.CreateFeature(feature)
         there.CommitTransaction()
-    there = file = None  # which closes it
+    there = file = None  # this closes it
     return renamed
 
 
 def _geometry(ogr, name, kind, place, at):
     points = place.ring(at) if name == "Polygon" else place.coordinates(at)
-    if place.degrees:  # whole over the 180th meridian
+    if place.degrees:  # keep it in one piece across the 180th meridian
         points = np.column_stack([np.unwrap(points[:, 0], period=360), points[:, 1]])
     line = ogr.Geometry(ogr.wkbLinearRing if name == "Polygon" else kind)
     for x, y in points:
@@ -350,7 +349,7 @@ def _geometry(ogr, name, kind, place, at):
 
 
 def write_shapefile(layer, place, path):
-    """The files of a shapefile, the one with its name last. The mark is in its table."""
+    """Write the files of a shapefile, the .shp last. The mark is in its table."""
     with tempfile.TemporaryDirectory() as there:
         new = Path(there) / path.name
         renamed = write_ogr([layer], place, new, "ESRI Shapefile")
@@ -361,7 +360,7 @@ def write_shapefile(layer, place, path):
 
 
 def trajectory_columns(place):
-    """Names of the two coordinates in a table."""
+    """Names of the two coordinate columns in a table."""
     return ("longitude", "latitude") if place.degrees else ("east_m", "north_m") if place.crs or place.geographic else (
         "x_m", "y_m")
 
@@ -371,7 +370,7 @@ def write_table(t, place, path, force):
     with writing.written(path, force) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(["name", "time_s", *trajectory_columns(place), "speed_m_s", "thickness_m", "made_by"])
-        mark = writing.MARK  # once: a table of all floes has millions of rows
+        mark = writing.MARK  # written once: a table of all floes has millions of rows
         for i, name in enumerate(t.name):
             for k in np.flatnonzero(np.isfinite(at[i]).all(axis=1)):
                 row = [_value(v) for v in (t.time[k], *at[i, k], t.speed[i, k], t.thickness[i])]
@@ -380,8 +379,8 @@ def write_table(t, place, path, force):
 
 
 def dataset(t, place, start, title):
-    """Trajectories as xarray.Dataset: CF-1.8, section 9 and appendix H.4, multidimensional arrays; the times, which all
-    share, are an axis, as OpenDrift has it."""
+    """Trajectories as an xarray.Dataset: multidimensional arrays as in CF-1.8, section 9 and appendix H.4. All
+    trajectories share the times, which are therefore an axis, as in OpenDrift."""
     import xarray
     both = ("trajectory", "time")
     named = start or datetime.datetime(1970, 1, 1)
@@ -432,7 +431,7 @@ def write_netcdf(t, place, path, force, start, title):
 
 
 def moment(text):
-    """--time: "all", "last" or a time, s."""
+    """Read --time: "all", "last" or a time in s."""
     if text in ("all", "last"):
         return text
     return arguments.finite(text.removesuffix("s").strip())
@@ -501,7 +500,7 @@ def perform(a):
 
 
 def frames_of(run, time):
-    """Indices of frames. Errors: RunError, BergtowError for a time beyond them."""
+    """Indices of the frames. Raises RunError; BergtowError for a time beyond the last frame."""
     last = run.frame_at(math.inf if time == "last" else 0.0 if time == "all" else time)
     if time == "all":
         return list(range(run.n_frames))

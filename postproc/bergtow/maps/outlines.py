@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""From a map of the ice to floe outlines that bergtow reads: any vector format that GDAL knows, or an image of labels.
+"""From a map of the ice to floe outlines that bergtow reads: any vector format that GDAL reads, or an image of labels.
 
-    bergtow outlines MAP -o FILE.geojson --centre LON,LAT        FILE.geojson, and what was done to the map a line each
+    bergtow outlines MAP -o FILE.geojson --centre LON,LAT        FILE.geojson, and one line for each kind of change
 
-The outlines are put into a plane at the towed body (maps/plane.py), made sound floes, with every change counted
-(maps/repair.py), and written in degrees, or in metres where the map is of no place on the earth or a heading is asked
-for. ice.outlines of a case reads the file.
+The outlines are projected onto a plane centred at the towed body (maps/plane.py) and repaired into valid floes, with
+every change counted (maps/repair.py). They are written in degrees, or in metres if the map has no geographic position
+or if a heading is given. A case reads the file through ice.outlines.
 """
 import argparse
 import json
@@ -22,10 +22,10 @@ from bergtow.maps import text as map_text
 
 import numpy as np
 
-PIXEL = 0.55            # tolerance, of a pixel: half of one, as steps along a straight shore have, would be a tie
-MARGIN = 1.0            # m, of the domain around all floes
-LEAST_SIZE = 0.01       # m, mean; below it metres are degrees
-EDGE = 64               # pieces of an edge of the image, which is bent in the plane
+PIXEL = 0.55            # tolerance, in pixels: with half a pixel, the steps along a straight shore would be a tie
+MARGIN = 1.0            # m, between the floes and the edge of the domain
+LEAST_SIZE = 0.01       # m, mean; if smaller, the metres are probably degrees
+EDGE = 64               # pieces per edge of the image, which is curved in the plane
 
 
 def pair(text):
@@ -36,7 +36,7 @@ def pair(text):
 
 
 def place(text):
-    """LON,LAT"""
+    """Read LON,LAT."""
     try:
         return pair(text)
     except ValueError:
@@ -44,7 +44,7 @@ def place(text):
 
 
 def metres(text):
-    """A number above zero, with m, km or nothing behind it."""
+    """A number above zero, followed by m, km or nothing."""
     word = text.strip()
     scale = 1e3 if word.endswith("km") else 1.0
     try:
@@ -81,7 +81,7 @@ def integers(text):
 
 
 def corners(text):
-    """X,Y,X,Y,..."""
+    """Read X,Y,X,Y,..."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
@@ -140,7 +140,7 @@ def options(p):
     arguments.add_force(p)
 
 def check_files(a):
-    """Before any work: names, and whether they may be written."""
+    """Check, before any work, the file names and whether the files may be written."""
     arguments.ends_in(a.output, (".geojson", ".json"))
     if a.record:
         arguments.ends_in(a.record, (".json",))
@@ -154,11 +154,11 @@ def check_files(a):
 
 
 def in_plane(found, plane):
-    """Shapes in metres of the plane; and how far edges that are straight on the map bend there, m."""
+    """Shapes in metres in the plane, and the largest bend there of edges that are straight on the map, m."""
     bend = 0.0
     for shape in found.shapes:
         there = moved(shape.geometry, plane.onto)
-        if there.distance(map_repair.Point(0, 0)) < _library.limit("map_farthest_m"):  # others are not for this plane
+        if there.distance(map_repair.Point(0, 0)) < _library.limit("map_farthest_m"):  # others: too far away
             bend = max(bend, bent(shape.geometry, plane))
         shape.geometry = there
         if shape.pixels is not None:
@@ -169,7 +169,7 @@ def in_plane(found, plane):
 
 
 def moved(geometry, onto):
-    """A polygon or several with all rings moved."""
+    """A polygon or multipolygon with all its rings transformed."""
     Polygon, MultiPolygon = map_read.Polygon, map_read.MultiPolygon
     parts = [Polygon(onto(np.asarray(p.exterior.coords)), [onto(np.asarray(r.coords)) for r in p.interiors])
              for p in getattr(geometry, "geoms", [geometry])]
@@ -177,7 +177,7 @@ def moved(geometry, onto):
 
 
 def divided(ring, n):
-    """A closed ring with n pieces to each edge."""
+    """A closed ring with each edge divided into n pieces."""
     t = np.arange(n)[:, None, None] / n
     between = ring[:-1] + t * np.diff(ring, axis=0)
     return np.r_[between.swapaxes(0, 1).reshape(-1, 2), ring[:1]]
@@ -187,7 +187,7 @@ def bent(geometry, plane):
     worst = 0.0
     for p in getattr(geometry, "geoms", [geometry]):
         ring = np.asarray(p.exterior.coords)
-        if not isinstance(plane.crs, str) and plane.crs.is_geographic:  # an edge over the 180th meridian is a short one
+        if not isinstance(plane.crs, str) and plane.crs.is_geographic:  # an edge across the 180th meridian is short
             ring = ring.copy()
             ring[:, 0] = np.unwrap(ring[:, 0], period=360)
         xy, between = plane.onto(ring), plane.onto((ring[:-1] + ring[1:]) / 2)
@@ -196,24 +196,24 @@ def bent(geometry, plane):
 
 
 def rules_of(a, found):
-    """Lengths of the repair: of an image they follow from its pixels."""
+    """Lengths for the repair; for an image they follow from its pixels."""
     pixel = math.sqrt(found.seen.area / found.pixels) if found.pixels else None
-    along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame is north
+    along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame points north
     return map_repair.Rules(detail=a.tolerance or 0.0, tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
                             least=a.least if a.least is not None else 4 * pixel ** 2 if pixel else 0.0,
                             keep_cut=a.cut == "keep", box=along, clear=a.clear)
 
 
 def summed_up(floes, found, rules):
-    """The numbers of the floes, over the box or the rectangle around them."""
+    """Statistics of the floes, over the box or over the rectangle around them."""
     bounds = np.array([f.polygon.bounds for f in floes])
     reach = (*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0))
     half = [v / 2 for v in rules.box] if rules.box else None
     x0, y0, x1, y1 = (-half[0], -half[1], *half) if half else reach
     rectangle = map_read.Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-    hull = found.seen is None  # of outlines nothing else says what was looked at
+    hull = found.seen is None  # outlines alone do not tell which area was observed
     seen = rectangle.intersection(map_repair.hull_of_shapes(found.shapes) if hull else found.seen.buffer(0))
-    boxed = hull and rules.box  # the user says what was mapped
+    boxed = hull and rules.box  # the user gives the mapped area
     ground = rectangle if boxed else seen
     if rules.clear:
         ground = ground.difference(map_repair.Point(0, 0).buffer(rules.clear, 64))
@@ -225,7 +225,7 @@ def summed_up(floes, found, rules):
 
 
 def geojson(floes, found, plane):
-    """The text. A file in degrees carries its centre where the reader looks for it."""
+    """The GeoJSON text. A file in degrees carries its centre where the reader of the program looks for it."""
     local = isinstance(plane.crs, str) or plane.heading is not None
     mark = {"frame": "basin"} if plane.heading is not None else {} if local else {"origin": list(plane.centre)}
     head = {"type": "FeatureCollection", "made_by": writing.MARK, "bergtow": mark}

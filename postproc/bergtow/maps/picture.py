@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A picture of a map and of what became of it: the outlines as they were read, the floes that were written."""
+"""A picture of a map and of the result: the outlines as read, and the floes as written."""
 from bergtow import writing
 from bergtow.maps.repair import parts_of
 from bergtow.plot import style
@@ -15,7 +15,7 @@ def rings(geometries):
 
 
 def draw(found, floes, rules, plane, path, force):
-    """Left the map in the plane, right the floes over it, with the parts that were left out or cut away in red."""
+    """Left: the map in the plane. Right: the floes on the map, with the parts left out or cut away in red."""
     x0, y0, x1, y1 = bounds_of([s.geometry for s in found.shapes])
     scale, unit = style.scale([x1 - x0, y1 - y0], "m")
     ratio = min(1.6, max(0.4, (y1 - y0) / (x1 - x0)))
@@ -50,7 +50,7 @@ def names(plane):
 
 
 def frame(axes, rules, scale):
-    """The box and the clear circle."""
+    """Draw the box and the clear circle."""
     if rules.box:
         half = np.array(rules.box) / 2 / scale
         axes.plot(*np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]).T * half[:, None], color=style.BODY)

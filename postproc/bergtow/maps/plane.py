@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""From the coordinates of a map to metres in a plane that touches the earth at the towed body, and back to degrees.
+"""From map coordinates to metres in a plane that touches the earth at the towed body, and back to degrees.
 
     plane = Plane.of(map, said, centre, heading)
     plane.onto(xy)      metres (n, 2)            plane.degrees(xy)      longitude and latitude (n, 2)
 
-The plane is azimuthal equidistant about the centre, on WGS 84, by PROJ: distances and directions from the centre are
-true, and across the line of sight lengths are too great by (d/R)²/6 at the distance d, 4e-7 at 10 km. Rejected: UTM,
-whose metres are 0.9996 to 1.001 of those on the ground, turned by up to 3° and torn at the edges of zones; polar
-stereographic, 0.97 to 1.1; the stereographic projection about the centre, which keeps angles and has (d/R)²/4. It is
-the projection of src/geometry/outline.c, which was derived without PROJ, so a file in degrees comes to lie in the case
-where it lay here.
+The projection is azimuthal equidistant about the centre, on WGS 84, computed by PROJ. Distances and directions from the
+centre are true; lengths across the line of sight are too great by (d/R)²/6 at the distance d, 4e-7 at 10 km. Rejected:
+UTM, whose metres are 0.9996 to 1.001 of those on the ground, rotated by up to 3° and discontinuous at zone boundaries;
+polar stereographic, with 0.97 to 1.1; stereographic about the centre, which preserves angles but has (d/R)²/4.
+src/geometry/outline.c uses the same projection, derived without PROJ, so a file in degrees ends up in the case where it
+was here.
 
-With a heading H the first axis points along H and the second to the left of it, as in the basin's frame; without one
-they are east and north.
+With a heading H the first axis points along H and the second to the left of it, as in the basin's frame; without a
+heading they are east and north.
 
-Missing information about coordinates is not guessed: a file without a crs, with a crs that has no place on the earth,
-or with numbers that contradict it is refused, and the message gives the remedy.
+Missing information about coordinates is not guessed. A file is rejected if it has no crs, has a crs without a place on
+the earth, or contains numbers that contradict its crs; the message gives the remedy.
 """
 import ctypes
 import warnings
@@ -28,7 +28,7 @@ from bergtow.errors import RunError
 from bergtow.maps.read import INSTALL, local_crs
 
 WGS84 = "OGC:CRS84"   # degrees, longitude first
-ROUNDING = 1e-3       # degrees beyond which coordinates are no degrees
+ROUNDING = 1e-3       # degrees outside the valid range, beyond which coordinates cannot be degrees
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
       "east and north of no place on the earth"
 
@@ -43,17 +43,17 @@ except ImportError as error:
 
 
 def vertices(geometry):
-    """All vertices of a polygon or of several, (n, 2)."""
+    """All vertices of a polygon or multipolygon, (n, 2)."""
     rings = [r for p in getattr(geometry, "geoms", [geometry]) for r in [p.exterior, *p.interiors]]
     return np.concatenate([np.asarray(r.coords)[:, :2] for r in rings])
 
 
-# ---- which system
+# ---- coordinate reference system
 
 
 def system(path, found, said, implied=False):
-    """The crs of a map: a pyproj.CRS, or local_crs(). found, said: of the file and of --crs, or None; implied: that of
-    the file says no more than its format, and gives way to --crs. Errors: RunError."""
+    """The crs of a map: a pyproj.CRS, or local_crs(). found, said: from the file and from --crs, or None; implied: the
+    crs of the file is only the default of its format, and --crs overrides it. Raises RunError."""
     if MISSING:
         raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
     ours = None if said is None else local_crs() if said in ("local", local_crs()) else known(path, said, "--crs")
@@ -72,7 +72,7 @@ def system(path, found, said, implied=False):
 
 
 def known(path, text, whose):
-    """A pyproj.CRS of the plane or the ellipsoid, or None for one of a file that names no place on the earth."""
+    """A pyproj.CRS that is projected or geographic, or None if the file's crs has no place on the earth."""
     try:
         crs = pyproj.CRS.from_user_input(text)
     except CRSError:
@@ -99,7 +99,7 @@ def name_of(crs):
 
 
 def hold_against(path, crs, xy, implied=False):
-    """Refuse coordinates that contradict their system. xy: of all shapes, (n, 2); implied: as in `system`."""
+    """Reject coordinates that contradict their crs. xy: of all shapes, (n, 2); implied: as in `system`."""
     far, span = np.abs(xy).max(axis=0), np.ptp(xy, axis=0)
     if isinstance(crs, str):
         return
@@ -123,18 +123,18 @@ def hold_against(path, crs, xy, implied=False):
 
 @dataclass
 class Plane:
-    """A plane at a place. Degrees in, metres out."""
+    """A plane at a given centre: takes map coordinates, returns metres."""
 
-    crs: object             #: of the map: a pyproj.CRS, or local_crs() (to compare the two, PROJ would parse it)
-    centre: tuple           #: longitude, latitude, degrees; of local metres the place of 0, 0
-    heading: float = None   #: degrees from north to east, of the first axis
-    accuracy: float = 0.0   #: m, of the step to WGS 84; NaN: not known
+    crs: object             #: of the map: a pyproj.CRS, or local_crs() (PROJ would parse that if the two were compared)
+    centre: tuple           #: longitude, latitude, degrees; for local metres the position of 0, 0
+    heading: float = None   #: of the first axis, degrees clockwise from north
+    accuracy: float = 0.0   #: m, of the transformation to WGS 84; NaN: unknown
     _to: object = None      #: pyproj: map to degrees
     _aeqd: object = None
 
     @staticmethod
     def of(found, crs, centre, heading):
-        """The plane of a map, about the centre or about the middle of its shapes. Errors: RunError."""
+        """The plane of a map, centred at the given point or at the middle of its shapes. Raises RunError."""
         xy = np.concatenate([vertices(s.geometry) for s in found.shapes])
         hold_against(found.path, crs, xy, found.implied)
         plane = Plane(crs, centre, heading)
@@ -155,7 +155,7 @@ class Plane:
         return plane
 
     def _prepare(self, found, xy):
-        """Choose the way to WGS 84 that PROJ holds for the best where the map lies; longitude and latitude."""
+        """Choose the transformation to WGS 84 that PROJ ranks best for this area; return longitude and latitude."""
         first = pyproj.Transformer.from_crs(self.crs, WGS84, always_xy=True)
         lonlat = np.array(first.transform(*xy.T)).T
         if not np.isfinite(lonlat).all():
@@ -165,7 +165,7 @@ class Plane:
         lon, lat = middle(lonlat)
         around = AreaOfInterest(lon - 1, max(lat - 1, -90), lon + 1, min(lat + 1, 90))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that a better grid could be fetched is said by the accuracy
+            warnings.simplefilter("ignore")  # the accuracy already tells the user that a better grid exists
             ways = TransformerGroup(self.crs, WGS84, always_xy=True, area_of_interest=around).transformers
         self._to = ways[0] if ways else first
         known = "ballpark" not in self._to.description.lower() and self._to.accuracy >= 0
@@ -173,19 +173,19 @@ class Plane:
         return self.lonlat(xy)
 
     def lonlat(self, xy):
-        """Degrees on WGS 84 of coordinates of the map. The 180th meridian has one longitude only: parts of a floe that
-        a map has cut there share one edge, to the last bit, and are joined again."""
+        """Degrees on WGS 84 from map coordinates. The 180th meridian gets a single longitude, so that parts of a floe
+        that a map cut there share one edge to the last bit and are joined again."""
         lon, lat = np.array(self._to.transform(*np.asarray(xy).T))
         return np.c_[np.where(lon <= -180, lon + 360, lon), lat]
 
     def onto(self, xy):
-        """Metres in the plane of coordinates of the map."""
+        """Metres in the plane from map coordinates."""
         if isinstance(self.crs, str):
             return self.turned(np.asarray(xy) - self.centre)
         return self.turned(np.array(self._aeqd(*self.lonlat(xy).T)).T)
 
     def turned(self, en):
-        """East and north to the axes of the plane."""
+        """Rotate east and north to the axes of the plane."""
         if self.heading is None:
             return en
         s, c = np.sin(np.radians(self.heading)), np.cos(np.radians(self.heading))
@@ -198,14 +198,14 @@ class Plane:
         return np.c_[xy[:, 0] * s - xy[:, 1] * c, xy[:, 0] * c + xy[:, 1] * s]
 
     def degrees(self, xy):
-        """Longitude and latitude of metres in the plane."""
+        """Longitude and latitude from metres in the plane."""
         lon, lat = self._aeqd(*self.unturned(np.asarray(xy)).T, inverse=True)
         return np.c_[lon, lat]
 
     def distortion(self, xy):
-        """Distortion of lengths, areas and north by the plane and the map, at places of the plane, computed by PROJ:
-        the farthest place, m; the greatest relative errors of a length and of an area; the greatest angle between the
-        plane's north and the true one, degrees; least and greatest scale of the map, or None where it has degrees."""
+        """Distortion of lengths, areas and north by the plane and the map, at points of the plane, computed by PROJ:
+        distance of the farthest point, m; largest relative errors of length and of area; largest angle between the
+        plane's north and true north, degrees; least and greatest scale of the map, or None if it is in degrees."""
         xy = np.asarray(xy)
         out = {"farthest_m": float(np.hypot(*xy.T).max())}
         if isinstance(self.crs, str):
@@ -228,7 +228,7 @@ def about(centre):
 
 
 def middle(lonlat):
-    """The place in the middle of others, as the program has it of a map (bergtow/outline.h)."""
+    """The middle of a set of positions, as the program computes it for a map (bergtow/outline.h)."""
     places, out = np.ascontiguousarray(lonlat, dtype=float), (ctypes.c_double * 2)()
     _library.library().bt_outline_middle(len(places), places.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), out)
     return tuple(out)

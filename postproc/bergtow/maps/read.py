@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Read maps of ice in the formats of GIS programs: outlines in any vector format of GDAL, or an image of labels.
+"""Read maps of ice in GIS formats: outlines in any vector format of GDAL, or an image of labels.
 
     read(path, Reading(layer=..., where=...))     Map: shapes in the coordinates of the file, its crs, the imaged area
 
-A label image is cut into connected regions of one value; each is a shape. (Regions that meet at a corner only are two.)
-Along pixels an outline would be a staircase, whose corners are no bays: maps/stairs.py makes it straight, that of an
-image and that of outlines which were traced along pixels. Where this would leave nothing of a tiny floe, or is not
-wanted, the outline passes through the middle of each unit step of an image: each convex corner loses an eighth of a
-pixel and each concave corner gains as much. A closed ring has four more convex than concave corners, so its area
-changes by half a pixel in all.
+A label image is divided into connected regions of equal value; each region is a shape. (Regions that meet only at a
+corner are separate.) An outline along pixels would be a staircase, with corners that are not real bays. maps/stairs.py
+straightens such outlines, both those of an image and those in a vector file that were traced along pixels. If this
+would leave nothing of a tiny floe, or is switched off, the outline passes through the middle of each unit step of an
+image: each convex corner loses an eighth of a pixel and each concave corner gains as much. A closed ring has four more
+convex than concave corners, so its area changes by half a pixel in total.
 
-Libraries: osgeo alone, since GDAL reads outlines and images by the same call and both Debians have it. Rejected:
-fiona and rasterio, two more packages over the same library.
+Libraries: only osgeo, since GDAL reads outlines and images through the same call, and both Debian releases have it.
+Rejected: fiona and rasterio, two more packages on top of the same library.
 """
 import json
 import re
@@ -26,10 +26,10 @@ from bergtow.maps import stairs as map_stairs
 
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
 MOST_PIXELS = 400_000_000
-IMPLIED = ("OGC:1.3:CRS84", "OGC:CRS84", "EPSG:4326")  # what GeoJSON is in where nobody says it [RFC 7946]
-#: of SIGRID-3 and of the national ice charts: kind of region, total concentration, stage and form, egg code
+IMPLIED = ("OGC:1.3:CRS84", "OGC:CRS84", "EPSG:4326")  # crs of GeoJSON if nothing else is given [RFC 7946]
+#: columns of SIGRID-3 and of the national ice charts: kind of region, total concentration, stage and form, egg code
 CHART = {"POLY_TYPE", "PGON_TYPE", "CT", "E_CT", "N_CT", "SA", "E_SA", "FA", "E_FA", "ICECODE", "NIS_CLASS", "A_LEGEND"}
-LISTED = 20  # grids of a file that are named
+LISTED = 20  # number of grids of a file that a message lists
 TELLS_ITSELF = ("TIFFTAG_IMAGEDESCRIPTION", "DESCRIPTION", "Description", "Comment")
 
 try:
@@ -44,36 +44,36 @@ except ImportError as error:
 
 
 def local_crs():
-    """The name of the crs for metres east and north without a place on the earth."""
+    """The name of the crs for metres east and north without a geographic position."""
     return _library.limit("map_local_crs")
 
 
 @dataclass
 class Reading:
-    """How a file is to be read, where it leaves a choice."""
+    """How to read a file if there is a choice."""
 
     layer: str = None
     where: str = None
     thickness: str = None   #: name of a column; of an image, "VALUE=M,..."
-    water: tuple = (0,)     #: values of an image that are no ice
+    water: tuple = (0,)     #: values of an image that are not ice
     band: int = None
-    pixel: float = None     #: m, of an image without a place on the earth
-    nodata: str = None      #: "water" or "unseen": meaning of an image's nodata if --water names its value, too
-    unseen: tuple = ()      #: values of an image that mark areas that were not seen
-    footprint: tuple = None #: corners of the imaged area, columns and rows of an image
+    pixel: float = None     #: m, of an image without a geographic position
+    nodata: str = None      #: "water" or "unseen": meaning of the image's nodata value if --water names it, too
+    unseen: tuple = ()      #: values of an image that mark areas that were not observed
+    footprint: tuple = None #: corners of the imaged area, in columns and rows for an image
     stairs: str = "undo"    #: or "keep"
 
 
 @dataclass
 class Shape:
-    """One feature of the file: an outline, or several."""
+    """One feature of the file, with one or more outlines."""
 
     name: str
     geometry: object            #: Polygon, MultiPolygon or None
     thickness: float = None     #: m
     cut: bool = False           #: by the edge of the image
-    pixels: object = None       #: Polygon along the edges of its pixels, whose area an image has
-    straight: bool = False      #: its staircase was made straight
+    pixels: object = None       #: Polygon along the edges of its pixels; its area is the true one for an image
+    straight: bool = False      #: its staircase was straightened
 
 
 @dataclass
@@ -81,25 +81,25 @@ class Map:
     """The contents of a file."""
 
     path: Path
-    crs: str                    #: WKT or a name, local_crs(), or None where the file says nothing
+    crs: str                    #: WKT or a name, local_crs(), or None if the file gives no crs
     shapes: list
     implied: bool = False       #: the crs is the default of the format
-    seen: object = None         #: the imaged area, in the coordinates of the file; None: not known
-    pixels: int = 0             #: in `seen`
+    seen: object = None         #: the imaged area, in the coordinates of the file; None: unknown
+    pixels: int = 0             #: number of pixels in `seen`
     about: str = ""             #: description in the file
-    near: list = field(default_factory=list)     #: columns not read whose names are nearly that of the thickness
-    skipped: dict = field(default_factory=dict)  #: {why: [names]}
-    chart: list = field(default_factory=list)    #: columns that an ice chart has, and floes have not
+    near: list = field(default_factory=list)     #: unread columns with names close to that of the thickness
+    skipped: dict = field(default_factory=dict)  #: {reason: [names]}
+    chart: list = field(default_factory=list)    #: columns that indicate an ice chart, not a map of floes
 
 
 def need_libraries():
-    """Errors: RunError where GDAL or shapely is not installed."""
+    """Raises RunError if GDAL or shapely is not installed."""
     if MISSING:
         raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
 
 
 def read(path, how):
-    """The map. Errors: RunError."""
+    """Read the map. Raises RunError."""
     need_libraries()
     gdal.UseExceptions()
     ogr.UseExceptions()
@@ -120,7 +120,7 @@ def read(path, how):
 
 
 def quietly(call, *words, **named):
-    """A call of GDAL without the warnings that it prints; its errors are raised as ever."""
+    """Call GDAL without printing its warnings; errors are still raised."""
     gdal.PushErrorHandler("CPLQuietErrorHandler")
     try:
         return call(*words, **named)
@@ -176,7 +176,7 @@ def from_layer(path, source, how):
 
 
 def retrace(shapes):
-    """Make the staircases of outlines straight that were traced along the pixels of an image."""
+    """Straighten the staircases of outlines that were traced along the pixels of an image."""
     polygons = [s.geometry for s in shapes if s.geometry.geom_type == "Polygon"]
     pixel = map_stairs.lattice(polygons) if polygons else None
     for shape in shapes if pixel is not None else []:
@@ -188,8 +188,8 @@ def retrace(shapes):
 
 
 def thickness_column(layer, columns):
-    """The column of the thickness if the caller names none, or None. A column with another spelling may hold anything:
-    remarks, texts with units, 0 for floes that were not measured."""
+    """The thickness column if the caller names none, or None. Only the exact name counts: a column with a similar name
+    may hold anything, such as remarks, texts with units, or 0 for floes that were not measured."""
     def sound(name):
         values = (f.GetField(name) for f in layer if f.IsFieldSetAndNotNull(name))
         return all(positive(value) is not None for value in values)
@@ -224,12 +224,12 @@ def add_feature(found, feature, column):
 
 
 def polygons_of(geometry):
-    """([Polygon], why something of an OGR geometry is left out or None)."""
+    """([Polygon], reason why part of an OGR geometry is left out, or None)."""
     kind = geometry.GetGeometryName()
     if kind == "POLYGON":
         try:
             return [wkb.loads(bytes(geometry.ExportToWkb()))], None
-        except Exception:  # GEOS has no class of its own for a ring of two points
+        except Exception:  # GEOS has no exception class of its own for a ring of two points
             return [], "fewer than 3 vertices"
     parts = [polygons_of(geometry.GetGeometryRef(k)) for k in range(geometry.GetGeometryCount())]
     if kind in ("POINT", "LINESTRING") or not parts:
@@ -246,14 +246,14 @@ def positive(value):
 
 
 def crs_of_layer(path, source, layer):
-    """(crs or None, is it only implied). Without a crs GeoJSON is in degrees; programs that do not know their system
-    write the name of these, and GDAL takes any name that it does not know for them: so there the file is asked. An
-    undefined system, as a GeoPackage has it, is none."""
+    """(crs or None, is it only implied?). GeoJSON without a crs is in degrees. Programs that do not know their system
+    write some name of one, and GDAL takes any unknown name for degrees; so the crs is read from the file itself there.
+    An undefined system, as a GeoPackage may have, counts as none."""
     driver = source.GetDriver().ShortName
     crs = head_of(path).get("crs") if driver == "GeoJSON" else None
     if crs is not None:
         name = f"{crs.get('properties', {}).get('name') if isinstance(crs, dict) else None}"
-        return name, name.upper().replace("::", ":").endswith(IMPLIED)  # for PROJ to judge, but for local_crs()
+        return name, name.upper().replace("::", ":").endswith(IMPLIED)  # PROJ judges all but local_crs()
     reference = layer.GetSpatialRef()
     if reference is None or (reference.GetName() or "").lower().startswith("undefined"):
         return None, False
@@ -261,7 +261,7 @@ def crs_of_layer(path, source, layer):
 
 
 def head_of(path):
-    """The members of a GeoJSON text."""
+    """The top-level members of a GeoJSON text."""
     try:
         text = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
@@ -280,8 +280,8 @@ def about_of(path, source, layer=None):
 
 def mark_cut(found, degrees):
     """Mark outlines that the edge of an image has cut. A vector file has no image: if edges of several outlines lie on
-    one side of the box of all, that side is taken for the edge of an image. The 180th meridian, where files in degrees
-    divide floes (RFC 7946), is not an edge."""
+    one side of the bounding box of all, that side is taken for the edge of an image. The 180th meridian, where files in
+    degrees divide floes (RFC 7946), does not count as an edge."""
     if found.seen is not None:
         return
     drawn = [s.pixels or s.geometry for s in found.shapes]
@@ -298,7 +298,7 @@ def mark_cut(found, degrees):
 
 
 def lies_on(geometry, axis, value, near):
-    """Has a shape an edge, not only a vertex, where one coordinate has this value?"""
+    """Does the shape have an edge, not only a vertex, where one coordinate has this value?"""
     for part in getattr(geometry, "geoms", [geometry]):
         on = np.abs(np.asarray(part.exterior.coords)[:, axis] - value) <= near
         if np.any(on[1:] & on[:-1]):
@@ -310,8 +310,7 @@ def lies_on(geometry, axis, value, near):
 
 
 def grid_of(path, source, how):
-    """(the data set to read, its name or None). A file of NetCDF or HDF5 may hold several grids: how.layer names
-    one."""
+    """(the dataset to read, its name or None). A NetCDF or HDF5 file may hold several grids: how.layer selects one."""
     grids = {re.sub(r'^.*":/*|^[^:]*:[^:]*:/*', "", full): (full, text) for full, text in source.GetSubDatasets()}
     if not grids:
         refuse_unused(path, how, ("layer",), "an image")
@@ -326,8 +325,8 @@ def grid_of(path, source, how):
 
 
 def as_stored(source):
-    """The same grid, with its rows as they are in the file. Of one without a place GDAL's netCDF driver takes the first
-    row for the southernmost, even where the file has rows from the north."""
+    """The same grid with its rows in the order of the file. If a grid has no georeference, GDAL's netCDF driver takes
+    the first row for the southernmost, even if the file begins in the north."""
     before = gdal.GetConfigOption("GDAL_NETCDF_BOTTOMUP")
     gdal.SetConfigOption("GDAL_NETCDF_BOTTOMUP", "NO")
     try:
@@ -337,8 +336,8 @@ def as_stored(source):
 
 
 def place_of(path, source, name):
-    """GDAL's six numbers, or None where the file does not say them; also from the coordinate variables of a grid of
-    NetCDF or HDF5 that GDAL does not take for one, whose axes have no units."""
+    """The six numbers of GDAL's geotransform, or None if the file does not give them. They are also derived from
+    coordinate variables without units in NetCDF or HDF5, which GDAL does not recognise."""
     place = source.GetGeoTransform(can_return_null=True)
     if place is not None or source.GetDriver().ShortName not in ("netCDF", "HDF5", "HDF5Image"):
         return place
@@ -357,7 +356,7 @@ def place_of(path, source, name):
 
 
 def inside(footprint, shape):
-    """Which pixels have their middle in the polygon of columns and rows."""
+    """Which pixels have their centre in the polygon, given in columns and rows."""
     image = gdal.GetDriverByName("MEM").Create("", shape[1], shape[0], 1, gdal.GDT_Byte)
     memory = (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
     layer = memory.CreateLayer("footprint")
@@ -421,8 +420,8 @@ def from_image(path, source, how, name=None):
 
 
 def of_labels(found, labels, valid, water, place, how):
-    """The map of an image. valid: pixels that were seen; water: pixels without ice, also those without a label (a
-    nodata of NaN). place: GDAL's six numbers from column and row to coordinates, or None."""
+    """The map of an image. valid: pixels that were observed; water: pixels without ice, including those without a label
+    (nodata of NaN). place: GDAL's geotransform, from column and row to coordinates, or None."""
     if how.unseen:
         valid = valid & ~np.isin(labels, how.unseen)
     if how.footprint:
@@ -463,7 +462,7 @@ def of_labels(found, labels, valid, water, place, how):
 
 
 def numbered(labels, ice):
-    """(labels that 32 bits hold, what gives back the label of one): GDAL polygonizes no larger ones."""
+    """(labels that fit in 32 bits, function that recovers the original label): GDAL polygonizes no larger ones."""
     if labels[ice].max(initial=0) < 2 ** 31:
         return np.where(ice, labels, 0).astype(np.int32), int
     kept, places = np.unique(labels[ice], return_inverse=True)
@@ -484,7 +483,7 @@ def thickness_by_value(path, text):
 
 
 def regions(values, mask):
-    """[(Polygon in columns and rows, value)] of connected pixels of one value."""
+    """[(Polygon in columns and rows, value)] for connected pixels of equal value."""
     rows, columns = values.shape
     image = gdal.GetDriverByName("MEM").Create("", columns, rows, 2, gdal.GDT_Int32)
     image.GetRasterBand(1).WriteArray(values)
@@ -497,7 +496,7 @@ def regions(values, mask):
 
 
 def shore_of(polygon, how):
-    """(a region of pixels with its shore, was its staircase made straight)."""
+    """(a region of pixels with its final shore, whether its staircase was straightened)."""
     middles = bevelled(polygon)
     straight = map_stairs.straight(polygon) if how.stairs == "undo" else None
     if straight is not None and polygon.interiors:
@@ -507,7 +506,7 @@ def shore_of(polygon, how):
 
 
 def bevelled(polygon):
-    """The polygon through the middles of the unit steps of its rings."""
+    """The polygon through the midpoints of the unit steps of its rings."""
     def ring(points):
         p = np.asarray(points)
         steps = np.abs(np.diff(p, axis=0)).sum(axis=1).astype(int)
@@ -518,7 +517,7 @@ def bevelled(polygon):
 
 
 def placed(geometry, place):
-    """From columns and rows to the coordinates of the map."""
+    """Convert columns and rows to the coordinates of the map."""
     x0, a, b, y0, c, d = place
 
     def ring(points):

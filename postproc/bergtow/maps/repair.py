@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Polygons of a map to floes: simple rings of few enough vertices that neither overlap nor touch. Every change is
-counted.
+"""From polygons of a map to floes: simple rings with a limited number of vertices that neither overlap nor touch. Every
+change is counted.
 
     book = Ledger()
     floes = repaired(shapes, Rules(tolerance=2.0), book)       shapes of maps/read.py in metres of a plane
 
-In this order: rings that cross themselves, several polygons of one feature, holes; floes outside the box or in the
-clear circle; staircases and other detail below the tolerance; slivers and small pieces; floes that were cut by the
-image's edge, if they are to be left out; overlaps, and the remains of the cuts.
+The order is: self-crossing rings, several polygons in one feature, holes; floes outside the box or in the clear circle;
+staircases and other detail below the tolerance; slivers and small pieces; floes cut by the edge of the image, if they
+are to be left out; overlaps, and the pieces that cutting them leaves.
 
 An overlap is cut from the larger of two floes, which changes it least. If the overlap is nearly all of both, they are
-the same floe traced twice; if it is nearly all of the smaller floe, that floe lies in the other. Rejected: a middle
+the same floe traced twice; if it is nearly all of the smaller floe, that floe lies inside the other. Rejected: a middle
 line through the overlap, which changes both floes, and for three floes depends on the order.
 
 Floes that touch are separated by a gap of GAP. Neighbours in a label image share an edge to the last bit; without a gap
 no direction separates them, and the reader takes corners of their convex parts for overlaps.
 
 In an image the area of a floe is that of its pixels. Simplifying removes the bevelled corners (2.5 % of a square of 40
-pixels, 15 % of a square of 6), so the shore is moved out again until the area is right. If two floes then share some
-area, it is treated as any other overlap.
+pixels, 15 % of a square of 6), so the shore is moved outwards again until the area is right. If this makes two floes
+overlap, the overlap is treated like any other.
 
-A sliver is a polygon that is everywhere narrower than the tolerance: a disc of that diameter fits nowhere into it.
+A sliver is a polygon that is narrower than the tolerance everywhere: no disc of that diameter fits into it.
 """
 from dataclasses import dataclass, field, replace
 
@@ -34,16 +34,16 @@ try:
     from shapely.geometry import Point, Polygon
     from shapely.ops import unary_union
     from shapely.validation import make_valid
-except ImportError:  # map_read.need_libraries tells it
+except ImportError:  # map_read.need_libraries reports it
     pass
 
-SAME = 0.9               # of both areas: traced twice; of the smaller one: it lies in the other
-THIN = 1e-4              # of the tolerance and of the reader's: below it detail is rounding
-GAP = 2e-5               # left between floes, of the mean size
+SAME = 0.9               # of both areas: traced twice; of the smaller area: lies inside the other
+THIN = 1e-4              # of the tolerance, and of the reader's tolerance: smaller detail is rounding error
+GAP = 2e-5               # passes of `apart`, and after how many the cuts get wider
 PASSES, PATIENCE = 40, 8
-NAMED = 20               # of those that are named in the record
+NAMED = 20               # at most so many floes are named in the record
 
-#: changes that are counted, in the order of the report
+#: kinds of change, in the order of the report
 KINDS = {
     "empty": "features without a geometry, left out",
     "no polygon": "features that are no polygons, left out",
@@ -77,7 +77,7 @@ class Change:
     count: int = 0
     before: float = 0.0
     after: float = 0.0
-    largest: float = 0.0    #: of the relative changes of single outlines
+    largest: float = 0.0    #: largest relative change of a single outline
     names: list = field(default_factory=list)
 
 
@@ -102,7 +102,7 @@ class Floe:
     thickness: float = None
     cut: bool = False
     pixels: float = None        #: area of its pixels, m²
-    straight: bool = False      #: its staircase was made straight
+    straight: bool = False      #: its staircase was straightened
 
 
 @dataclass
@@ -110,18 +110,18 @@ class Rules:
     """Lengths in metres, areas in square metres."""
 
     tolerance: float = None     #: None: a thousandth of the mean size
-    detail: float = 0.0         #: the same for shores that were made straight; 0: they stay
+    detail: float = 0.0         #: the same for straightened shores; 0: keep them as they are
     least: float = 0.0
     keep_cut: bool = True
     box: tuple = None           #: length along the first axis and width, about the centre
     clear: float = 0.0          #: radius about the centre
-    thin: float = 0.0           #: follows, as the next
+    thin: float = 0.0           #: derived, like the next two
     gap: float = 0.0            #: between floes
-    reach: float = 0.0          #: a floe is enlarged by this before it is cut out of another
+    reach: float = 0.0          #: a floe is enlarged by this before it is cut out of another one
 
 
 def repaired(shapes, rules, book):
-    """The floes. Errors: RunError where nothing is left."""
+    """The floes. Raises RunError if nothing is left."""
     floes = [floe for shape in shapes for floe in whole(shape, book)]
     floes = [f for f in floes if chosen(f, rules, book)]
     size = float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1e3
@@ -134,17 +134,17 @@ def repaired(shapes, rules, book):
 
 
 def allowed_overlap():
-    """Of floes, of their mean size, that a case reads by default."""
+    """Overlap of floes, relative to their mean size, that a case accepts by default."""
     return next(float(key["default"]) for key in _library.listed("keys")["keys"] if key["name"] == "solver.slop")
 
 
 def diameter(polygon):
-    """Of the disc of the same area, m: what bergtow calls the size of a floe."""
+    """Diameter of the disc of equal area, m: bergtow's definition of floe size."""
     return np.sqrt(4 * polygon.area / np.pi)
 
 
 def parts_of(geometry):
-    """The polygons in whatever GEOS returns."""
+    """The polygons in any geometry that GEOS returns."""
     if geometry.geom_type == "Polygon":
         return [] if geometry.is_empty else [geometry]
     return [p for g in getattr(geometry, "geoms", []) for p in parts_of(g)]
@@ -154,7 +154,7 @@ def parts_of(geometry):
 
 
 def whole(shape, book):
-    """Floes of a shape: valid polygons without holes."""
+    """The floes of a shape: valid polygons without holes."""
     parts = []
     for part in parts_of(shape.geometry):
         if not part.is_valid:
@@ -191,7 +191,7 @@ def filled(polygon, name, book):
 
 
 def chosen(floe, rules, book):
-    """Is the middle in the box, and the floe clear of the circle?"""
+    """Is the middle of the floe in the box, and the floe outside the circle?"""
     area = floe.polygon.area
     if rules.box:
         middle = floe.polygon.centroid
@@ -205,8 +205,8 @@ def chosen(floe, rules, book):
 
 
 def simplified(floe, rules, book):
-    """With fewer vertices: by Douglas & Peucker, no vertex farther from the new outline than the tolerance; with a
-    larger tolerance if vertices are too many. with_area() then restores the area that corners of a label lose."""
+    """Remove vertices by Douglas & Peucker: none lies farther from the new outline than the tolerance, which is raised
+    if too many remain. with_area() then restores the area that corners of a label lose."""
     before, tolerance = floe.polygon, rules.detail if floe.straight else rules.tolerance
     polygon = with_area(before.simplify(tolerance) if tolerance else before, floe.pixels)
     if floe.straight:
@@ -220,8 +220,8 @@ def simplified(floe, rules, book):
 
 
 def with_area(polygon, area):
-    """The polygon with its edges moved out or in, all by the same, so that it has this area; as it is where that makes
-    more vertices than a floe may have."""
+    """The polygon with all edges moved out or in by the same distance, so that it has this area. It is returned
+    unchanged if that makes more vertices than a floe may have."""
     new = polygon
     for _ in range(4 if area else 0):
         if abs(new.area - area) < 1e-6 * area:  # for a buffer of almost zero GEOS may return an empty polygon
@@ -236,7 +236,7 @@ def too_many(polygon):
 
 
 def fewer(polygon, tolerance, inside=False):
-    """Not too many vertices, with the least tolerance in steps of a quarter that does it; inside: nothing is added."""
+    """Reduce the number of vertices to the limit, raising the tolerance by a quarter at a time; inside: add no area."""
     out = polygon
     while too_many(out):
         tolerance *= 1.25
@@ -246,8 +246,8 @@ def fewer(polygon, tolerance, inside=False):
 
 
 def opened(floe, rules, book):
-    """Floes without spikes, necks and cracks that are too thin: when their coordinates are rounded, as they are in
-    degrees, they may fold over, and the reader looks at exact signs."""
+    """The floes without spikes, necks and cracks that are too thin. Rounding of coordinates, as in degrees, may fold
+    these over, and the reader of the program checks signs exactly."""
     thin, polygon = rules.thin, floe.polygon
     if polygon.is_empty or polygon.minimum_clearance >= thin:
         return [floe] if not polygon.is_empty else []
@@ -268,7 +268,7 @@ def large_enough(floe, rules, book):
     if floe.polygon.buffer(-rules.tolerance / 2).is_empty:
         book.note("slivers", floe.name, area)
         return False
-    if area < rules.least * (1 - 1e-9):  # of coordinates that are rounded
+    if area < rules.least * (1 - 1e-9):  # allows for rounded coordinates
         book.note("small", floe.name, area)
         return False
     return True
@@ -285,7 +285,7 @@ def stays(floe, rules, book):
 
 
 def meeting(floes, changed):
-    """Pairs (i, j) of floes whose boxes meet, i < j, one of them changed: by a sweep along the first axis."""
+    """Pairs (i, j), i < j, of floes whose bounding boxes meet, one of them changed; by a sweep along the first axis."""
     if not floes:
         return
     boxes = np.array([f.polygon.bounds for f in floes])
@@ -301,15 +301,15 @@ def meeting(floes, changed):
 
 
 def apart(floes, rules, book):
-    """Floes that neither overlap nor touch. A cut can leave what overlaps another, so: until a pass changes nothing.
-    Where the tip of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made
-    wider."""
+    """Make floes neither overlap nor touch. A cut can leave a piece that overlaps another floe, so passes repeat until
+    one changes nothing. If the tip of one floe lies in a crack of another that `opened` keeps closing, the cuts become
+    wider after PATIENCE passes."""
     changed = np.ones(len(floes), bool)
     for k in range(PASSES):
         rules.reach = min(rules.tolerance, rules.thin * 2.0 ** (k - PATIENCE)) if k > PATIENCE else 0.0
         new, touched = {}, set()
         for i, j in sorted(meeting(floes, changed)):
-            if i in touched or j in touched:  # it is looked at again as it is now
+            if i in touched or j in touched:  # the next pass looks at the pair in its new shape
                 continue
             pair = parted(floes[i], floes[j], rules, book)
             if pair is not None:
@@ -317,7 +317,7 @@ def apart(floes, rules, book):
                 new[i], new[j] = pair
         if not touched:
             return floes
-        # A floe that was skipped had met a changed floe, and meets it again in the next pass.
+        # A floe that was skipped met a changed floe, and the next pass tests it again.
         kept = [([f], False) if k not in new else (new[k], True) for k, f in enumerate(floes)]
         floes = [f for some, _ in kept for f in some]
         changed = np.array([is_new for some, is_new in kept for _ in some], bool)
@@ -326,7 +326,7 @@ def apart(floes, rules, book):
 
 
 def parted(a, b, rules, book):
-    """([Floe] of a, [Floe] of b), or None where they lie apart. An overlap no wider than `thin` does not count."""
+    """([Floe] of a, [Floe] of b), or None if they lie apart. An overlap no wider than `thin` does not count."""
     small, large = sorted((a, b), key=lambda f: f.polygon.area)
     shared = small.polygon.intersection(large.polygon).area
     overlap = shared > rules.thin * small.polygon.length
@@ -342,7 +342,7 @@ def parted(a, b, rules, book):
 
 
 def without(large, small, kind, rules, book):
-    """The parts of one floe outside another."""
+    """The parts of one floe that lie outside another."""
     knife = small.polygon.buffer(rules.gap + rules.reach, join_style=2)
     parts = [trimmed(p, rules.tolerance) for p in parts_of(large.polygon.difference(knife))]
     book.note(kind, f"{large.name} ({small.name})", large.polygon.area, sum(p.area for p in parts))
@@ -362,8 +362,8 @@ def without(large, small, kind, rules, book):
 
 
 def trimmed(polygon, tolerance):
-    """The outer ring without the short edges that a cut leaves: corners that stick out by less than the tolerance go,
-    so nothing is added."""
+    """The outer ring without the short edges that a cut leaves: corners that protrude by less than the tolerance are
+    removed, so no area is added."""
     ring = np.asarray(polygon.exterior.coords)[:-1]
     ring = ring if polygon.exterior.is_ccw else ring[::-1]
     place = 0
@@ -381,13 +381,13 @@ def trimmed(polygon, tolerance):
 
 
 def hull_of_shapes(shapes):
-    """Polygon around all shapes with a place in the plane: the only information in outlines about the area observed."""
+    """Polygon around all shapes that lie in the plane: outlines tell nothing else about the area observed."""
     from shapely.geometry import MultiPoint
     places = np.concatenate([vertices(s.geometry) for s in shapes])
     return MultiPoint(places[np.isfinite(places).all(axis=1)]).convex_hull
 
 
 def hull_of(floes):
-    """Places on the outside of all floes, (n, 2)."""
+    """Points on the convex hull of all floes, (n, 2)."""
     from shapely.geometry import MultiPoint
     return vertices(MultiPoint(np.concatenate([vertices(f.polygon) for f in floes])).convex_hull.buffer(0))

@@ -1,39 +1,39 @@
 # SPDX-License-Identifier: MIT
-"""Shores that were drawn along pixels: from a staircase to the shore with the fewest bays that the pixels allow.
+"""Shores traced along pixels: replace a staircase by the shore with the fewest bays that agrees with the pixels.
 
     straight(polygon)       a polygon along pixels, in columns and rows, with such a shore; None: nothing is left of it
-    lattice(polygons)       the pixels of outlines that were traced along them; None: they were not
+    lattice(polygons)       the pixels along which outlines were traced; None: they were not
     retraced(polygon, pixel)        such an outline with that shore; None: it has no staircase
 
-Across each unit step of a staircase the shore lies somewhere within half a pixel of its middle: between the pixels of
-ice and water on both sides of the step. The shortest ring through all these gates, in turn, bends only where it must
-[minimum-perimeter polygon: Sklansky, Chazin & Hansen 1972, IEEE Trans. Comput. C-21, 260], found by pulling a string
-tight [funnel: Lee & Preparata 1984, Networks 14, 393]. So a shape with the pixels of a convex shape is convex, and the
-pixels prove every bay that stays.
+At each unit step of a staircase the shore lies within half a pixel of the step's midpoint, between the pixels of ice
+and water on its two sides. The shortest ring through all these gates, in turn, bends only where it must
+[minimum-perimeter polygon: Sklansky, Chazin & Hansen 1972, IEEE Trans. Comput. C-21, 260]. It is found by pulling a
+string tight [funnel: Lee & Preparata 1984, Networks 14, 393]. So pixels of a convex shape give a convex shape, and
+every bay that remains is proven by the pixels.
 
-The ring lies against the ice on capes and against the water in bays. So its edges move back, on capes out and in bays
-in, all by the same distance but each no farther than its gates allow, until the area is that of the pixels. They keep
-their directions, so no corner turns the other way. All edges share the remaining difference of the area, some
-hundredths of a pixel along the shore, more for the smallest floes.
+The ring touches the ice at capes and the water in bays. Its edges are therefore moved back, outwards at capes and
+inwards in bays, all by the same distance but none beyond its gates, until the area is that of the pixels. Edges keep
+their directions, so no corner turns the other way. All edges share the remaining difference in area, which amounts to
+some hundredths of a pixel along the shore, and more for the smallest floes.
 
-Rejected: Douglas & Peucker, which keeps corners of the staircase and with them its bays; convex hulls where they are
-near enough, which do not help a floe with one bay.
+Rejected: Douglas & Peucker, which keeps corners of the staircase and so its bays; convex hulls where they are close
+enough, which do not help a floe with one bay.
 """
 import numpy as np
 
-HALF = 0.5              # pixels: of a gate
-STEPS, EXACT = 12, 1e-8 # to find by how much edges move; of the area
-ALIKE = 0.1             # of the area: a shore that has less or more has lost its way
-LEAST = 1e-6            # pixels: shorter edges are none
-FLAT = 1e-9             # sine of the angle between two edges that are one
-ROUNDED = 0.1           # of a pixel: as far coordinates may be off their lattice
-ON = 0.98               # of the edges of a map run along the lattice
-UNIT, CORNERS = 0.25, 8 # of the edges of a staircase are of one pixel; it has at least so many
+HALF = 0.5              # half the width of a gate, pixels
+STEPS, EXACT = 12, 1e-8 # of the search for how far edges move; relative to the area
+ALIKE = 0.1             # of the area: if a shore's area differs by more, the search failed
+LEAST = 1e-6            # pixels: shorter edges are dropped
+FLAT = 1e-9             # sine of the angle between two edges that count as one
+ROUNDED = 0.1           # of a pixel: how far coordinates may be off their lattice
+ON = 0.98               # share of the edges of a map that run along the lattice
+UNIT, CORNERS = 0.25, 8 # share of edges of one pixel in a staircase; least number of corners
 
 
 def straight(polygon):
-    """See above. Edges run along the axes or their diagonals, over whole numbers; holes are passed over. Where gates
-    cross, as at the tip of a sharp cape, narrower ones do."""
+    """Straighten a shore (see above). Edges run along the axes or their diagonals, between whole numbers; holes are
+    ignored. If gates cross, as at the tip of a sharp cape, narrower gates are used."""
     steps = unit_steps(np.asarray(polygon.exterior.coords))
     for half in (HALF, HALF / 2, HALF / 4):
         inner, outer = gates(*steps, half)
@@ -49,12 +49,12 @@ def straight(polygon):
 
 
 def filled(corners, room, area, most):
-    """The ring with its edges moved by up to `most`, and no farther than `room`, so that it has this area; or as near
-    to it as that goes."""
+    """The ring with its edges moved by up to `most`, but no farther than `room`, so that it has this area or comes as
+    close to it as possible."""
     low, high, best = 0.0, most, corners
     open_ = area - ring_area(corners)
     for _ in range(STEPS):
-        # the shore times the way is the least that this brings
+        # shore length times distance is the least change in area
         way = low + abs(open_) / np.hypot(*np.diff(best, axis=0, append=best[:1]).T).sum()
         way = way if way < high else (low + high) / 2
         ring = moved(corners, room, way)
@@ -69,7 +69,7 @@ def filled(corners, room, area, most):
 
 
 def unit_steps(points):
-    """(middles, directions) of the unit steps of a closed ring along pixels, anticlockwise."""
+    """(midpoints, directions) of the unit steps of a closed ring along pixels, anticlockwise."""
     points = points if ring_area(points[:-1]) > 0 else points[::-1]
     way = np.diff(points, axis=0)
     number = np.rint(np.abs(way).max(axis=1)).astype(int)
@@ -80,7 +80,7 @@ def unit_steps(points):
 
 
 def gates(middles, directions, half):
-    """Their ends on the ice, which is on the left, and on the water."""
+    """The ends of the gates on the ice, which is on the left, and on the water."""
     left = np.c_[-directions[:, 1], directions[:, 0]] * (half / np.hypot(*directions.T))[:, None]
     return middles + left, middles - left
 
@@ -95,8 +95,8 @@ def turn(a, b, c):
 
 
 def tight(inner, outer):
-    """(corners, gate of each) of the shortest ring through all gates. It passes the inner end that is farthest to the
-    right, a corner of the hull of all of them."""
+    """(corners, gate of each) of the shortest ring through all gates. It starts at the rightmost inner end, which is a
+    corner of the convex hull of all inner ends."""
     first = int(np.lexsort((inner[:, 1], inner[:, 0]))[-1])
     left, right = (np.roll(ends, -first, axis=0).tolist() for ends in (inner, outer))
     left.append(left[0])
@@ -104,13 +104,13 @@ def tight(inner, outer):
     at, corner, found = 0, left[0], [(0, left[0])]
     n = len(left) - 1
     while at < n:
-        # the funnel from here: the last ends on either side that narrowed it
+        # the funnel from this corner: the last ends on either side that narrowed it
         a, b, ka, kb, end = left[at + 1], right[at + 1], at + 1, at + 1, None
         for k in range(at + 2, n + 1):
             if turn(corner, b, right[k]) >= 0:        # the right side narrows
                 if b == corner or turn(corner, a, right[k]) < 0:
                     b, kb = right[k], k
-                else:                                 # over the left one
+                else:                                 # it crosses the left side
                     end = ka, a
                     break
             if turn(corner, a, left[k]) <= 0:
@@ -132,14 +132,14 @@ def tight(inner, outer):
 
 
 def capes(corners):
-    """Which corners turn to the left."""
+    """Which corners turn left."""
     a, b = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 0
 
 
 def edge_room(corners, at, inner, outer):
-    """By how much each edge may move: out (above zero) between two capes, in (below) between two bays, not between one
-    of each. Edge k runs from corner k to the next."""
+    """How far each edge may move: out (positive) between two capes, in (negative) between two bays, zero between a cape
+    and a bay. Edge k runs from corner k to the next."""
     n, cape = len(inner), capes(corners)
     way = np.roll(corners, -1, axis=0) - corners
     out = np.c_[way[:, 1], -way[:, 0]] / np.hypot(*way.T)[:, None]
@@ -153,8 +153,8 @@ def edge_room(corners, at, inner, outer):
 
 
 def moved(corners, room, way):
-    """The ring with its edges moved by `way` or as far as they may; None where one between a cape and a bay would
-    vanish. Others go where their neighbours meet before them."""
+    """The ring with its edges moved by `way`, or as far as they may move; None if an edge between a cape and a bay
+    would vanish. Other edges are dropped where their neighbours meet first."""
     edge, cape = np.roll(corners, -1, axis=0) - corners, capes(corners)
     unit = edge / np.hypot(*edge.T)[:, None]
     out, by = np.c_[unit[:, 1], -unit[:, 0]], np.clip(room, -way, way)
@@ -171,7 +171,7 @@ def moved(corners, room, way):
             return ring
         if not alike[gone].all():
             return None
-        stay = ~gone | (length > np.minimum(np.roll(length, 1), np.roll(length, -1)))   # of neighbours the shorter goes
+        stay = ~gone | (length > np.minimum(np.roll(length, 1), np.roll(length, -1)))   # of neighbours drop the shorter
         out, unit, line, alike = out[stay], unit[stay], line[stay], alike[stay]
     return None
 
@@ -180,19 +180,19 @@ def moved(corners, room, way):
 
 
 def lattice(polygons):
-    """(width, height) of the pixels along whose edges or middles outlines run, in their coordinates; or None."""
+    """(width, height) of the pixels along whose edges or middles the outlines run, in the outlines' units; or None."""
     ways = np.concatenate([np.diff(np.asarray(p.exterior.coords), axis=0) for p in polygons])
     pitch = [pitch_of(np.abs(ways[:, axis])) for axis in (0, 1)]
     return None if None in pitch else np.array(pitch)
 
 
 def pitch_of(ways):
-    """Of which nearly all ways along an axis are multiples; or None."""
+    """The length of which nearly all steps along an axis are multiples; or None."""
     ways = np.sort(ways[ways > 1e-9 * ways.max(initial=0)])
     if len(ways) == 0:
         return None
     pitch = ways[len(ways) // 20]
-    for reach in (1.5, 4, 16, 64):      # from one step to many: the more, the better it is known
+    for reach in (1.5, 4, 16, 64):      # from one step to many: longer steps determine it better
         near = ways[ways < reach * pitch]
         number = np.rint(near / pitch)
         if not number.any():
@@ -205,7 +205,7 @@ def pitch_of(ways):
 
 
 def retraced(polygon, pixel):
-    """An outline with its staircase made straight; None where it has none. pixel: see `lattice`."""
+    """An outline with its staircase straightened; None if it has none. pixel: see `lattice`."""
     points = np.asarray(polygon.exterior.coords)
     ring = np.rint((points - points[0]) / pixel)
     way = np.abs(np.diff(ring, axis=0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What bergtow outlines says: the map, the plane, every change, the floes; as lines and as a record."""
+"""Output of bergtow outlines: the map, the plane, every change, the floes; as lines of text and as a record."""
 import math
 
 import numpy as np
@@ -7,9 +7,9 @@ import numpy as np
 from bergtow.maps.plane import name_of
 from bergtow.maps.repair import KINDS
 
-#: what the concentration refers to
+#: the area that the concentration refers to
 IMAGED, BOX, HULL = "what was imaged of", "the box of", "the hull of the outlines, within"
-CLASSES = 8     # of the size distribution, each sqrt(2) wide or wider
+CLASSES = 8     # of the size distribution, each by a factor of sqrt(2) wide or wider
 
 
 def area(value):
@@ -34,7 +34,7 @@ def map_lines(found, crs, said=None):
 
 
 def plane_lines(plane, distortion, bend):
-    """distortion: Plane.distortion; bend: how far edges that are straight on the map are not so in the plane, m."""
+    """distortion: Plane.distortion; bend: by how much edges that are straight on the map bend in the plane, m."""
     if "length_error" not in distortion:
         x, y = plane.centre
         return [f"plane: metres as they are, about {x:.10g}, {y:.10g}; farthest vertex "
@@ -58,7 +58,7 @@ def plane_lines(plane, distortion, bend):
 
 
 def change_lines(book):
-    """A line for each kind of change."""
+    """One line for each kind of change."""
     lines = []
     for kind in (k for k in KINDS if k in book):
         c = book[kind]
@@ -74,9 +74,9 @@ def change_lines(book):
 
 
 def numbers(floes, rectangle, ground, refers_to, share):
-    """Numbers of all floes together. rectangle: (x0, x1, y0, y1) along the axes; ground, refers_to: the area that the
-    concentration refers to, m² and in words; share: of the rectangle that was imaged, or else lies in the hull of the
-    outlines."""
+    """Statistics of all floes. rectangle: (x0, x1, y0, y1) along the axes; ground, refers_to: the area that the
+    concentration refers to, in m² and in words; share: the part of the rectangle that was imaged, or that lies in the
+    hull of the outlines."""
     areas = np.array([f.polygon.area for f in floes])
     size = np.sqrt(4 * areas / np.pi)
     convex = sum(f.polygon.convex_hull.area <= f.polygon.area * (1 + 1e-9) for f in floes)
@@ -93,7 +93,7 @@ def numbers(floes, rectangle, ground, refers_to, share):
 
 
 def distribution(size, areas):
-    """[(from, to, floes, share of the ice)] in classes of equal ratio."""
+    """[(from, to, floes, share of the ice)] in classes of constant ratio."""
     low, high = size.min(), size.max() * (1 + 1e-12)
     n = int(min(CLASSES, max(1, math.ceil(2 * math.log2(high / low)))))
     edges = low * (high / low) ** (np.arange(n + 1) / n)
@@ -124,7 +124,7 @@ def floe_lines(numbers):
 
 
 def case_lines(path, numbers, heading, margin, latitude=None):
-    """Lines for a case that reads the file: in the geographic frame x is north. latitude: of the centre, deg."""
+    """Lines for a case that reads the file. In the geographic frame x points north. latitude: of the centre, deg."""
     x0, x1, y0, y1 = numbers["rectangle_m"]
     low = np.minimum(numbers["reach_m"][:2], (x0, y0)) - margin
     high = np.maximum(numbers["reach_m"][2:], (x1, y1)) + margin
@@ -132,7 +132,7 @@ def case_lines(path, numbers, heading, margin, latitude=None):
         low, high, x0, x1, y0, y1 = low[::-1], high[::-1], y0, y1, x0, x1
     low, size = np.floor(low), np.ceil(high) - np.floor(low)
     frame, bays = "geographic" if heading is None else "basin", numbers["convex"] < numbers["floes"]
-    digits = max(1, 3 - math.floor(math.log10(min(x1 - x0, y1 - y0))))  # the region to a thousandth
+    digits = max(1, 3 - math.floor(math.log10(min(x1 - x0, y1 - y0))))  # the region rounded to a thousandth
     return ["in a case beside it:",
             f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
             f"width: {size[1]:.0f} m" + (", ends: wall, sides: wall}" if heading is None else "}"),

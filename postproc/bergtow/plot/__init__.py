@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Pictures and films, each a Figure of matplotlib."""
+"""Pictures and films, each a matplotlib Figure."""

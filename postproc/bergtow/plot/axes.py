@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What pictures of an ensemble share: the numbers that were varied, labels, headline."""
+"""Elements shared by pictures of an ensemble: the varied numbers, labels, headline."""
 from bergtow.plot import style
 from bergtow.result.members import reading, short_key
 
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def numeric(e):
-    """Keys of numbers that were varied among the members that are used."""
+    """Numeric keys that vary among the members in use."""
     return [k for k, v in e.parameters.items() if v.dtype != object and len(set(v[e.used].tolist())) > 1]
 
 
@@ -36,7 +36,7 @@ def of(e, rows):
 
 
 def wants_log(values):
-    """True where values are positive and span more than a decade and a half."""
+    """True if the values are positive and span more than a decade and a half."""
     values = np.asarray(values, dtype=float)
     values = values[np.isfinite(values)]
     return bool(len(values) and values.min() > 0 and values.max() > 30 * values.min())

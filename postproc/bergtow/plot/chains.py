@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Force chains: the contact forces of one step as lines through the ice, as wide as they are strong.
+"""Force chains: the contact forces of one step as lines through the ice, with widths that show the force.
 
 The contacts come from `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`. A line goes from the centroid of one floe
-over the contact point to that of the other, or ends at the contact point on a large body or a wall. Force = normal
-impulse / time step, the points of one pair of floes together.
+through the contact point to that of the other, or ends at the contact point on a large body or a wall. Force = normal
+impulse / time step, with the contact points of one pair of floes combined.
 """
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +20,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm
 
 WIDEST = 5.0   # points
-DECADES = 2.5  # below the largest force, over which lines are drawn
+DECADES = 2.5  # decades below the largest force for which lines are drawn
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Contacts:
 
 
 def read(path):
-    """The Contacts of a dumped step. Errors: RunError."""
+    """The Contacts of a dumped step. Raises RunError."""
     try:
         with h5py.File(path, "r") as f:
             if "places" not in f or "solution" not in f:
@@ -45,7 +45,7 @@ def read(path):
             places = f["places"]
             dt = float(places.attrs["dt"])
             impulse, normal = f["solution/r"][()].reshape(-1, 2), places["normal"][()]
-            # Floes that lie over each other have a contact of their own, which has no normal.
+            # Floes that lie over each other have a separate kind of contact, without a normal.
             drawn = np.isnan(f["disc"][()]) if "disc" in f else np.ones(len(impulse), bool)
             return Contacts(float(places.attrs["time"]), places["body"][()][drawn], normal[drawn],
                             places["lever"][()].reshape(-1, 2, 2)[drawn], impulse[drawn, 0] / dt, places["pose"][()])
@@ -58,8 +58,8 @@ def read(path):
 
 
 def pairs(c):
-    """Contacts of one pair of bodies taken together: (body [m, 2], lever [m, 2, 2] at the pressure centre, force [m]);
-    those without force are left out."""
+    """The contacts of each pair of bodies combined: (body [m, 2], lever [m, 2, 2] at the centre of pressure, force
+    [m]); pairs without force are left out."""
     some = c.force > 0
     body, lever, force = c.body[some], c.lever[some], c.force[some]
     unique, which = np.unique(body, axis=0, return_inverse=True)
@@ -71,7 +71,7 @@ def pairs(c):
 
 
 def segments(run, c):
-    """(lines [k, 2, 2] m, force [k] N): from a floe's centroid to the contact; none on the side of a body that is no
+    """(lines [k, 2, 2] m, force [k] N): from a floe's centroid to the contact; none on the side of a body that is not a
     floe."""
     body, lever, force = pairs(c)
     lines, values = [], []
@@ -97,8 +97,8 @@ def outlines(run, c):
 
 
 def with_images(run, shapes):
-    """(copies of shapes [n, 2] m, the number of each) that reach into the domain: what crosses a periodic end comes in
-    at the other."""
+    """(copies of shapes [n, 2] m, the index of each) that reach into the domain: a shape that crosses a periodic end
+    also appears at the other."""
     (x0, x1, y0, y1), (px, py) = run.box, run.period
     out, which = [], []
     for shift in ((i * px, j * py) for i in ((-1, 0, 1) if px else (0,)) for j in ((-1, 0, 1) if py else (0,))):
@@ -111,8 +111,8 @@ def with_images(run, shapes):
 
 
 def view(run, lines, bodies, whole):
-    """(x0, x1, y0, y1) m: the domain, or as much of it as the towed body and the forces need, a tenth of its shorter
-    side around them."""
+    """(x0, x1, y0, y1) m: the domain, or the part of it around the towed body and the forces, with a margin of a tenth
+    of its shorter side."""
     x0, x1, y0, y1 = run.box
     points = [lines.reshape(-1, 2)] + ([bodies[run.towed]] if run.towed is not None else [])
     points = np.concatenate(points)
@@ -124,8 +124,8 @@ def view(run, lines, bodies, whole):
 
 
 def joined(run, c):
-    """The same with the pieces of floes behind the floes, as a run has them, NaN where they are not there yet; a dump
-    has them behind the bodies. Errors: RunError."""
+    """The contacts with pieces of floes directly behind the floes, as a run stores them, NaN before they exist; a dump
+    stores them behind the bodies. Raises RunError."""
     n, bodies = run.n_start, len(run.bodies)
     pieces = len(c.pose) - n - bodies
     if not 0 <= pieces <= run.n_pieces:

@@ -1,30 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""The design tow force of each condition with its interval, beside the mean and the largest that was simulated; and the
-line tension where there is a line."""
+"""The design tow force of each condition with its interval, beside the mean and the largest simulated value; and the
+line tension if there is a line."""
 from bergtow.plot import style
 from bergtow.result.at_least import AtLeast
 from bergtow.stats import design_value as statement
 
 import numpy as np
 
-LIMIT = 4.0  #: upper ends of intervals are cut at so many times the largest value
+LIMIT = 4.0  #: upper ends of intervals are cut off at this multiple of the largest value
 
 
 def _one_number(conditions, numeric):
-    """The only key that differs between conditions, where it is a number; None otherwise."""
+    """The only key that differs between conditions, if it is numeric; otherwise None."""
     varied = [k for k in conditions[0]["values"] if len({c["values"][k] for c in conditions}) > 1]
     return varied[0] if len(varied) == 1 and varied[0] in numeric else None
 
 
 def _places(conditions, key):
-    """Places of the conditions on the axis, and half the distance of marks that stand side by side."""
+    """Positions of the conditions on the axis, and half the distance between marks that stand side by side."""
     x = np.array([c["values"][key] for c in conditions]) if key else np.arange(len(conditions), dtype=float)
     least = np.diff(np.unique(x)).min() if len(x) > 1 else 1.0
     return x, 0.08 * least
 
 
 def _draw(axes, x, some, factor, top, colour, label):
-    """Diamonds with intervals, those that reach beyond the picture with an arrow."""
+    """Draw diamonds with intervals; an arrow marks an interval that extends beyond the picture."""
     at = [k for k, d in enumerate(some) if d and "value" in d]
     if not at:
         return
@@ -39,8 +39,8 @@ def _draw(axes, x, some, factor, top, colour, label):
 
 
 def draw(conditions, numeric, axis_label, times):
-    """The figure; None where nothing is towed. numeric: keys whose values are numbers; axis_label: key -> words; times:
-    key -> factor of the numbers on the axis."""
+    """The figure; None if nothing is towed. numeric: keys whose values are numbers; axis_label: key -> words; times:
+    key -> factor for the numbers on the axis."""
     tows = [c["design"]["tow"] for c in conditions]
     if not any(tows):
         return None

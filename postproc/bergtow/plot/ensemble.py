@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of an ensemble, those that its study supports.
+"""The pictures of an ensemble that its study allows.
 
-    sweep-KEY.png     mean ice resistance against a number that was varied, a panel for each combination of the
-                      others: every field, mean with 95 %, median, doubts; the estimates beside concentration, the
-                      law V^2 beside speed. A Latin hypercube: one panel, every member (plot/sweep.py)
-    returns-LOAD.png  level of each load that is exceeded once in a time, a line a condition, with the fitted tail and
+    sweep-KEY.png     mean ice resistance against a varied number, one panel for each combination of the
+                      others: every field, mean with 95 %, median, doubts; the estimates against concentration, the
+                      law V^2 against speed. A Latin hypercube: one panel, every member (plot/sweep.py)
+    returns-LOAD.png  return level of each load against return time, one line per condition, with the fitted tail and
                       the design value
-    exceedance.png    how often a peak of a collision is exceeded, a line a condition, with the fitted tail
+    exceedance.png    rate at which collision peaks are exceeded, one line per condition, with the fitted tail
     map.png           mean and its relative uncertainty over two numbers of a grid
-    variants.png      what each variant does to the mean, against the first one (plot/variants.py)
+    variants.png      change in the mean from the first variant to each of the others (plot/variants.py)
     sensitivity.png   Sobol indices and partial rank correlations
 """
 import argparse
@@ -32,8 +32,8 @@ from matplotlib.colors import LogNorm
 
 
 def draw_map(e, first, second):
-    """Figure of two heat maps over two parameters of a grid: mean of the means of the conditions of a cell, which
-    differ in the other parameters, and half the 95 % interval over it."""
+    """Figure of two heat maps over two parameters of a grid: the mean in each cell, averaged over the conditions that
+    differ in the other parameters, and half the 95 % interval divided by it."""
     conditions = [c for c in e.conditions() if len(c.finished)]
     xs, ys = (sorted({c.values[k] for c in conditions}) for k in (first, second))
     mean, width, least = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
@@ -84,7 +84,7 @@ def draw_map(e, first, second):
 
 
 def draw_indices(axes, names, indices):
-    """Bars of first-order and total Sobol indices."""
+    """Draw bars of first-order and total Sobol indices."""
     for k, name in enumerate(names):
         for what, shift, colour, label in (("first", 0.17, style.ICE, "first order"),
                                            ("total", -0.17, style.TOW, "total")) if name in indices else ():
@@ -96,8 +96,8 @@ def draw_indices(axes, names, indices):
 
 
 def draw_sensitivity(e, x):
-    """Figure of Sobol indices, of the mean and of its logarithm where they are given, beside partial rank correlations;
-    None where there is neither."""
+    """Figure of Sobol indices, of the mean and also of its logarithm if given, beside partial rank correlations; None
+    if there are neither."""
     ranks = x.get("ranks", {})
     given = [(words, x[key])
              for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm"))
@@ -137,13 +137,13 @@ def draw_sensitivity(e, x):
 
 
 def conditions_with_loads(e, options):
-    """What draw_returns needs of the conditions."""
+    """The data of the conditions that draw_returns needs."""
     return [{"label": c.label, "loads": loads.statistics(e, c.finished, options)} for c in e.conditions()]
 
 
 def pictures(e, options, conditions):
-    """(name, function that draws it) of the pictures that the study supports. conditions: with "label" and "loads", and
-    "extremes" if it is known, as bergtow statistics has them."""
+    """(name, function that draws it) of the pictures that the study allows. conditions: with "label" and "loads", and
+    "extremes" if known, in the layout of bergtow statistics."""
     keys = numeric(e)
     names = dict.fromkeys(name for c in conditions for name, x in c["loads"].items()
                           if "refused" not in x["over_threshold"])

@@ -9,11 +9,11 @@ from bergtow.result.run import Run
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-LETTER, TICK = 0.083, 0.48  # room that a letter of a panel's title and a number on its axis take, inches
+LETTER, TICK = 0.083, 0.48  # space for a letter of a panel's title and for a number on its axis, inches
 
 
 def frames_to_show(run, times):
-    """[(label, frame)]: the frames nearest to the times asked for, else first, half of the tow, last."""
+    """[(label, frame)]: the frames nearest to the times given; by default first, half of the tow, last."""
     if not run.n_frames:
         raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
     if times:
@@ -24,7 +24,7 @@ def frames_to_show(run, times):
 
 
 def body_place(run, frame):
-    """(x, y) of the towed body, m: of the series, since frames are wrapped into a periodic domain."""
+    """(x, y) of the towed body, m, from the series: frames are wrapped into a periodic domain."""
     if {"body_x", "body_y"} <= set(run.series_names) and len(run["time"]):
         at = run.frame_times[frame]
         sample = int(np.searchsorted(run["time"], at * (1 - 1e-9)))
@@ -34,7 +34,7 @@ def body_place(run, frame):
 
 
 def panel_words(run, label, frame, follow):
-    """The title of a panel: label, time, and the place of the body in a view that follows it."""
+    """The title of a panel: label, time, and the position of the body if the view follows it."""
     words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
     if label:
         words.insert(0, label)
@@ -46,10 +46,10 @@ def panel_words(run, label, frame, follow):
 
 
 def layout(n, view, turned, lines):
-    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation); lines: of a title
+    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation). lines: of a title
     between narrow panels.
 
-    Wide views stand one below the other, others side by side; sizes follow from the view, so nothing is left blank.
+    Wide views are stacked, others stand side by side; sizes follow from the view, so no space is left blank.
     """
     wide, high = view[1] - view[0], view[3] - view[2]
     if turned:

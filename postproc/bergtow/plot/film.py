@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A film of a run: the ice field above, the ice resistance up to the moment below. MP4 through ffmpeg, GIF through
-Pillow.
+"""A film of a run: the ice field above, the ice resistance up to the current time below. MP4 through ffmpeg, GIF
+through Pillow.
 
-Parts that do not move are drawn once; per frame only floes, bodies and the moving parts of the curve are drawn over it
-(a full redraw spends most of its time on text and ticks).
+Static parts are drawn once; for each frame only floes, bodies and the moving parts of the curve are drawn over them (a
+full redraw spends most of its time on text and ticks).
 """
 import subprocess
 import tempfile
@@ -22,7 +22,7 @@ from PIL import Image
 
 
 class Film:
-    """The figure of a film. pixels(frame) gives the picture of a frame."""
+    """The figure of a film. pixels(frame) returns the image of a frame."""
 
     def __init__(self, run, frames, kind="speed", width=1280, window="auto"):
         self.run = run
@@ -42,7 +42,7 @@ class Film:
             field_w, field_h = 5.6 * wide / high, 5.6
         panel_w = max(field_w, 6.2)
         size = (left + panel_w + right, head + field_h + between + curve + foot)
-        # Both sides even in pixels: the common video format halves the resolution of colour.
+        # Both sides must be even numbers of pixels: the common video format halves the colour resolution.
         px = (width // 2 * 2, int(round(width * size[1] / size[0] / 2)) * 2)
         dpi = px[0] / size[0]
         size = (size[0], px[1] / dpi)
@@ -73,7 +73,7 @@ class Film:
         self.ground = self.figure.canvas.copy_from_bbox(self.figure.bbox)
 
     def _draw_curve(self):
-        """Ice resistance against time; of a field without towed body, the kinetic energy."""
+        """Plot the ice resistance against time; for a field without a towed body, the kinetic energy."""
         run, axes, self.time = self.run, self.curve, self.run["time"]
         if not len(self.time):
             raise RunError(run.result, "holds no samples", "the run ended before its first sample: run it for longer")
@@ -120,7 +120,7 @@ class Film:
 
 
 def write_mp4(film, frames, fps, path):
-    """Send the pictures to ffmpeg. Errors: RunError."""
+    """Send the images to ffmpeg. Raises RunError."""
     width, height = film.size
     call = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}",
             "-r", str(fps), "-i", "-", "-an", "-c:v", "libx264", "-preset", "fast", "-crf", "20", "-pix_fmt", "yuv420p",
@@ -135,7 +135,7 @@ def write_mp4(film, frames, fps, path):
                 coder.stdin.write(film.pixels(frame))
             coder.stdin.close()
         except BrokenPipeError:
-            pass  # ffmpeg says why
+            pass  # ffmpeg gives the reason
         finally:
             if coder.poll() is None and not coder.stdin.closed:
                 coder.terminate()
@@ -147,9 +147,10 @@ def write_mp4(film, frames, fps, path):
 
 
 def write_gif(film, frames, fps, path):
-    """One palette of 255 colours for the whole film, from four of its frames; no dithering, which would flicker.
+    """Write a GIF with one palette of 255 colours, taken from four frames, for the whole film; no dithering, which
+    would flicker.
 
-    Pixels that stay as they are carry the 256th index, transparent: their long runs take next to no room.
+    Pixels that do not change get the 256th index, transparent: their long runs need almost no space.
     """
     picked = [
         film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forces of a run against time, with the mean over its window; on request, how the solver fared."""
+"""Forces of a run against time, with the mean over its window; on request, the solver's diagnostics."""
 import textwrap
 
 from bergtow import arguments, writing
@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 
 def running_mean(x, width):
-    """Mean of x [n] over the width samples about each one; NaN near the ends, where the window does not fit."""
+    """Mean of x [n] over the width samples around each one; NaN near the ends, where the window does not fit."""
     n, reach = len(x), max(width, 1) // 2
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(x))])
     count = np.concatenate([[0], np.cumsum(np.isfinite(x))])
@@ -35,11 +35,11 @@ def smoothing(run):
     length = 0.0 if run.towed is None else np.ptp(run.bodies[run.towed].vertices[:, 0])
     wish = length / speed if speed > 0 and length > 0 else (time[-1] - time[0]) / 50
     samples = int(np.clip(wish / step, min(10, len(time) // 4), max(len(time) // 20, 1)))
-    return samples, (2 * (max(samples, 1) // 2) + 1) * step  # as many as running_mean takes
+    return samples, (2 * (max(samples, 1) // 2) + 1) * step  # as many samples as running_mean uses
 
 
 def _clip_peaks(axes, raw, smooth, marks, factor, top):
-    """Limit the axis to where the running mean and the marks are; samples above it are named, not drawn."""
+    """Limit the axis to the running mean and the marks; larger samples are noted in text, not drawn."""
     finite = raw[np.isfinite(raw)]
     if not len(finite):
         return
@@ -56,7 +56,7 @@ def _clip_peaks(axes, raw, smooth, marks, factor, top):
 
 
 def draw_ice(axes, run, factor, unit, top=None):
-    """Ice resistance: samples, running mean, mean with its band, reference."""
+    """Plot the ice resistance: samples, running mean, mean with its band, reference."""
     time, ice = run["time"], run["ice_resistance"]
     samples, seconds = smoothing(run)
     smooth = running_mean(ice, samples)
@@ -102,7 +102,7 @@ def draw_ice(axes, run, factor, unit, top=None):
 
 
 def mark_window(axes, run):
-    """Shade the window of the means; hatched where the tow is not steady in it."""
+    """Shade the averaging window; hatched if the tow is not steady in it."""
     if run.window:
         steady = run.verdict[0] in ("steady", "not judged")
         axes.axvspan(*run.window,
@@ -117,8 +117,8 @@ def mark_window(axes, run):
 def draw_balance(axes, run, factor, unit):
     """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + ... + inertia.
 
-    Which they are, and in which order, the file says. Beside the first two, the tow and the ice, a force is drawn where
-    it reaches a hundredth of the tow, both as running means: a jam of one step would hide all others.
+    The file gives the forces and their order. The first two, tow and ice, are always drawn. Another force is drawn if
+    its running mean reaches a hundredth of that of the tow: in single steps, a jam would hide all other forces.
     """
     samples, _ = smoothing(run)
     mark_window(axes, run)
@@ -140,12 +140,12 @@ def draw_balance(axes, run, factor, unit):
 
 
 def findings(run):
-    """One line with the means of the window."""
+    """One line with the means over the window."""
     mean, low, high = run.interval("ice_resistance")
     words = []
     if np.isfinite(mean):
         factor, unit = style.scale([mean], "N")
-        if np.isfinite(low) and high > low:  # all with the two digits that the interval leaves
+        if np.isfinite(low) and high > low:  # all with the two digits that the interval justifies
             decimals = len(style.short((high - low) / 2 / factor, 2).partition(".")[2])
             words.append(
                 f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: "
@@ -165,7 +165,7 @@ def findings(run):
 
 
 def doubts(run):
-    """The first two warnings of the summary, each in one line."""
+    """The first two warnings of the summary, each on one line."""
     warnings = [warning["text"] for warning in run.warnings]
     lines = [style.plain(textwrap.shorten(f"warning: {w}", 145, placeholder=" ...")) for w in warnings[:2]]
     if len(warnings) > 2:
@@ -175,7 +175,7 @@ def doubts(run):
 
 
 def draw(run, top=None):
-    """The figure of the forces; top: upper end of the axes, N (default: from the data)."""
+    """The figure of the forces. top: upper end of the axes, N (default: from the data)."""
     if run.towed is None:
         raise RunError(run.result, "has no towed body, so there is no force to draw", "look at the field instead")
     if not len(run["time"]):
@@ -212,7 +212,7 @@ def draw(run, top=None):
 
 
 def draw_diagnostics(run):
-    """The solver in every sample: contacts, sweeps, residual, overlap, and series registered beside them."""
+    """Plot the solver's diagnostics in every sample: contacts, sweeps, residual, overlap, other registered series."""
     rows = [(name, run.label(name), style.PANELS[k % len(style.PANELS)])
             for k, name in enumerate(run.by_role("diagnostic"))]
     if not rows:
@@ -226,7 +226,7 @@ def draw_diagnostics(run):
         axes.set_ylabel(label + (f" ({unit})" if unit not in ("", "1") else ""))
         axes.yaxis.set_major_locator(MaxNLocator(4))
         positive = values[values > 0]
-        # of residual and overlap decades are of interest
+        # for residual and overlap, decades matter
         if run.attribute(name, "merge") == "largest of the steps" and len(positive):
             style.logarithmic(axes.yaxis)
             axes.set_ylim(bottom=max(positive.min(), 1e-6 * positive.max()) / 1.5)

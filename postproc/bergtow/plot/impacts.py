@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loads around the hull by panel, and how often the peak of a collision is exceeded."""
+"""Loads around the hull by panel, and the exceedance of collision peaks."""
 from bergtow import arguments, writing
 from bergtow.errors import RunError
 from bergtow.plot import style
@@ -14,7 +14,7 @@ MEAN, LARGEST, PEAK = style.ICE, style.TOW, style.INERTIA
 
 
 def along_hull(run):
-    """For each panel its outline on the hull [k, 2] m: its two ends and the corners of the waterline between them."""
+    """The outline of each panel on the hull [k, 2] m: its two ends and the corners of the waterline between them."""
     panels, hull = run.panels, run.bodies[run.towed].vertices
     corners = np.vstack([hull, hull[:1]])
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
@@ -35,8 +35,8 @@ def along_hull(run):
 
 
 def bars(outlines, values, scale):
-    """Polygons that stand on the panels, values * scale high, m. Corners of the hull are mitred by the direction from
-    the centroid."""
+    """Polygons on the panels, with the height values * scale, m. At corners of the hull they are mitred along the
+    direction from the centroid."""
     shapes = []
     for line, value in zip(outlines, values):
         outward = line / np.hypot(*line.T)[:, None]
@@ -45,13 +45,13 @@ def bars(outlines, values, scale):
 
 
 def _turn(points, run):
-    """Body frame to the page: as it is in the basin's frame, bow up in the geographic one."""
+    """From the body frame to the page: unchanged in the basin frame, bow up in the geographic frame."""
     points = np.asarray(points, dtype=float)
     return points[..., ::-1] if run.geographic else points
 
 
 def draw_hull(axes, run, values, colour, label):
-    """Bars of the values around the hull, and rings to read them by."""
+    """Draw bars of the values around the hull, and rings as a scale."""
     hull = run.bodies[run.towed].vertices
     size = np.hypot(*hull.T).max()
     values = np.nan_to_num(np.asarray(values, dtype=float))
@@ -91,7 +91,7 @@ def draw_hull(axes, run, values, colour, label):
 
 
 def _round(top):
-    """A step that makes two to four rings up to top."""
+    """A step that gives two to four rings up to top."""
     if top <= 0:
         return 1.0
     base = 10 ** np.floor(np.log10(top))
@@ -99,7 +99,7 @@ def _round(top):
 
 
 def exceedance(peaks, hours):
-    """(peaks N, rate per hour): F_k, largest first, is reached or exceeded k times in the run."""
+    """(peaks N, rate per hour): F_k, in descending order, is reached or exceeded k times in the run."""
     ordered = np.sort(peaks)[::-1]
     return ordered, np.arange(1, len(ordered) + 1) / hours
 
@@ -140,7 +140,7 @@ def draw_exceedance(axes, run):
 
 
 def _start(panels, name):
-    """The largest before the window, in words, where the file tells it and there is one."""
+    """The largest value before the window, in words, if the file has one."""
     before = np.max(panels.get(f"start_{name}", 0.0))
     return f"\nin the start before the window {style.quantity(before, 'N')}" if before > 0 else ""
 
@@ -158,7 +158,7 @@ def draw(run):
     grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.855, bottom=0.09, hspace=0.26, wspace=0.16)
     window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(
         panels["from"]) else "no window"
-    least = "at least the " if run.at_least else ""  # panels count nothing in steps without a solution
+    least = "at least the " if run.at_least else ""  # panels count nothing in steps without a converged solution
     draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"{least}mean load by panel, {window}")
     draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST,
               f"{least}largest load in a step (impulse / time step)" + _start(panels, "max_load"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How often a load, or the peak of a collision, is exceeded in the conditions of an ensemble: a line a condition."""
+"""Exceedance of loads, or of collision peaks, in the conditions of an ensemble: one line per condition."""
 from bergtow.plot import style
 from bergtow.plot.axes import headline, wants_log
 from bergtow.stats import extreme as stat_extreme
@@ -12,15 +12,15 @@ CYCLE = ("#0072b2", "#d55e00", "#009e73", "#8c6bb1", "#b8860b", "#56b4e9", "#4d4
 
 
 def key_beside(figure, axes, notes, step, some):
-    """Legend and notes at the right of the axes; step: one in so many of some conditions is shown."""
+    """Put legend and notes to the right of the axes. step: one in this many of the conditions in `some` is shown."""
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
     notes = notes + [f"one in {step} of {len(some)} conditions is shown"] * (step > 1)
     figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
 
 
 def draw_exceedance(e, options, tails=None):
-    """Figure of the exceedance of peaks, a line a condition, the GPD tail over it; None where there are no peaks.
-    tails: fitted tails by the index of their condition, where they are known."""
+    """Figure of the exceedance of peaks, one line per condition, overlaid with the GPD tail; None if there are no
+    peaks. tails: the known fitted tails, by the index of their condition."""
     some = [c for c in e.conditions() if len(c.finished)]
     step = max(1, -(-len(some) // MOST_LINES))
     figure, axes = style.subplots(figsize=(9.2, 5.4))
@@ -66,13 +66,13 @@ def draw_exceedance(e, options, tails=None):
 
 
 def tail(f, hours):
-    """Levels of return times by the fitted tail of peaks over a threshold."""
+    """Levels at return times, from the tail fitted to peaks over a threshold."""
     return f["threshold"] + f["scale"] * stat_extreme.growth(f["shape"], np.maximum(f["rate_per_hour"] * hours, 1.0))
 
 
 def draw_return_line(axes, x, label, colour, factor, beside):
-    """Maxima of clusters at their empirical return times, the fitted tail, the design value `beside` its return
-    time."""
+    """Draw maxima of clusters at their empirical return times, the fitted tail, and the design value `beside` its
+    return time."""
     f = x["over_threshold"]
     axes.plot(x["hours"] / np.arange(1, len(f["maxima"]) + 1), f["maxima"] / factor, ".", color=colour, markersize=4,
               alpha=0.6)
@@ -91,12 +91,12 @@ def draw_return_line(axes, x, label, colour, factor, beside):
 
 
 def by(conversions):
-    """The meaning of a collision's peak in words, for the conditions of one picture."""
+    """How collision peaks are defined, in words, for the conditions of one picture."""
     return next(iter(conversions)) if len(conversions) == 1 else "each condition by its own impact.conversion"
 
 
 def meaning(some):
-    """The meaning of a load's value in words: its collisions and time scale, for the conditions of one picture."""
+    """The definition of a load's value in words: its collisions and time scale, for the conditions of one picture."""
     conversions = {x["conversion"] for x in some if x["conversion"]}
     scales = sorted(x["time_scale_s"] for x in some)
     over = f"{scales[0]:.3g}" if scales[-1] < 1.001 * scales[0] else f"{scales[0]:.3g} to {scales[-1]:.3g}"
@@ -104,14 +104,14 @@ def meaning(some):
 
 
 def draw_returns(e, conditions, name):
-    """Figure of the return levels of a load; None where no condition has a tail."""
+    """Figure of the return levels of a load; None if no condition has a tail."""
     some = [c for c in conditions if name in c["loads"] and "refused" not in c["loads"][name]["over_threshold"]]
     if not some:
         return None
     step = max(1, -(-len(some) // MOST_LINES))
     shown, first = some[::step], some[0]["loads"][name]
     designs = [d for d in (c["loads"][name]["design"] for c in shown) if "refused" not in d]
-    # where a tow is shorter than clusters are apart there is no design value
+    # no design value if a tow is shorter than the separation of clusters
     values = [d["value"] for d in designs] or [max(c["loads"][name]["over_threshold"]["maxima"]) for c in shown]
     factor, unit = style.scale([np.median(values)], first["units"])
     figure, axes = style.subplots(figsize=(9.2, 5.4))
@@ -151,7 +151,7 @@ def draw_returns(e, conditions, name):
 
 
 def draw_above(e, conditions, name):
-    """Figure of the share of the time that a load is above a level, with its 95 % over fields; None where no condition
+    """Figure of the share of time that a load exceeds a level, with its 95 % interval over fields; None if no condition
     has the load."""
     some = [c for c in conditions if name in c["loads"]]
     if not some:

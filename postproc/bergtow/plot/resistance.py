@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Mean ice resistance of one or several runs against the concentration, beside the estimates; the same as a table, and
-in words.
+"""Mean ice resistance of one or several runs against the concentration, with the estimates; also as a table and in
+words.
 
-Runs of one concentration (other seeds) are drawn one by one, with their mean and its 95 % interval over them, and stand
-in the table as their mean.
+Runs at the same concentration (with different seeds) are drawn individually, with their mean and its 95 % interval; the
+table gives their mean.
 """
 import sys
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from bergtow.table import quantity, scale, short
 
 import numpy as np
 
-SAME = 0.02  # share by which the curves of runs in one picture may differ
+SAME = 0.02  # relative difference allowed between the curves of runs in one picture
 
 
 @dataclass
@@ -28,21 +28,21 @@ class Point:
 
     path: Path
     title: str
-    asked: float          #: ice.concentration, or as made where the case does not say
-    concentration: float  #: as made
-    mean: float           #: N, AtLeast where steps of its window have no solution
-    se: float             #: standard error of the mean, N, NaN where the run gives none
-    low: float            #: 95 % interval of the mean, N, NaN where the run gives none
+    asked: float          #: ice.concentration, or the actual one if the case does not give it
+    concentration: float  #: actual
+    mean: float           #: N, AtLeast if steps of its window have no solution
+    se: float             #: standard error of the mean, N, NaN if the run gives none
+    low: float            #: 95 % interval of the mean, N, NaN if the run gives none
     high: float
-    steady: bool          #: the window is that of a steady tow
-    change: float         #: of the ice resistance over the window, N, NaN where the run does not say
-    reference: float      #: N, measured, NaN without one
-    unconverged: float    #: share of the steps
+    steady: bool          #: whether the tow is steady in the window
+    change: float         #: change of the ice resistance over the window, N, NaN if the run does not give it
+    reference: float      #: measured value, N, NaN without one
+    unconverged: float    #: share of steps that did not converge
     warnings: int
     estimates: dict       #: {name: Estimate}
     case: dict            #: {key: text}
-    state: str            #: hash of the end, "" where the run does not say
-    conditions: dict      #: of the estimates: thickness_m, width_m, ..., and "curves"
+    state: str            #: hash of the final state, "" if the run does not give it
+    conditions: dict      #: inputs of the estimates: thickness_m, width_m, ..., and "curves"
 
     @property
     def of_ice(self):
@@ -51,7 +51,7 @@ class Point:
 
 
 def read(path):
-    """The point of a run's folder."""
+    """Read the point from a run's folder."""
     with Run(path) as run:
         estimates = run.summary.get("estimates")
         if not isinstance(estimates, dict) or "curves" not in estimates:
@@ -86,17 +86,17 @@ def read(path):
 
 
 def curve(point, name):
-    """(concentration [n], force [n] N, NaN where there is none) of an estimate, for the conditions of a run."""
+    """(concentration [n], force [n] N, NaN where undefined) of an estimate, for the conditions of a run."""
     curves = point.conditions["curves"]
     return np.array(curves["concentration"], dtype=float), np.array([np.nan if f is None else f for f in curves[name]],
                                                                     dtype=float)
 
 
 def check_alike(points):
-    """One set of curves must do for all runs. Errors: RunError naming the first two that differ."""
+    """One set of curves must suit all runs. Raises RunError naming the first two that differ."""
     first = points[0]
     for other in points[1:]:
-        # the size of floes as made varies
+        # the actual floe size varies
         for name in (n for n, e in first.of_ice.items() if not e.uses_floe_size and n in other.of_ice):
             a, b = curve(first, name)[1], curve(other, name)[1]
             if not np.array_equal(np.isnan(a), np.isnan(b)) or not np.allclose(a, b, rtol=SAME, atol=0, equal_nan=True):
@@ -111,8 +111,8 @@ def check_alike(points):
 
 
 def once(points):
-    """The points without runs that end in the same state as one before: the same run again, or ice that no seed
-    changes."""
+    """The points without runs that end in the same state as an earlier one: the run was repeated, or the seed does not
+    change the ice."""
     seen, out = set(), []
     for p in points:
         if p.state and p.state in seen:
@@ -125,10 +125,10 @@ def once(points):
 
 
 def rows(points):
-    """One row a concentration: (asked, number of runs, how many steady, mean, drift of all (stat_drift.of), standard
-    error, 95 % interval, ratio and force of each estimate, worst share of steps missed).
+    """One row per concentration: (asked, number of runs, how many steady, mean, combined drift (stat_drift.of),
+    standard error, 95 % interval, ratio and force of each estimate, largest share of steps that did not converge).
 
-    Of several runs: mean of the means, error and interval from their scatter. Of one: its own.
+    For several runs: mean of the means, error and interval from their scatter. For one run: its own values.
     """
     out = []
     for asked in sorted({p.asked for p in points}):
@@ -157,9 +157,8 @@ def rows(points):
 
 
 def table(points):
-    """The rows as a Markdown table: forces in N; in brackets simulated / estimate, where the run is held
-    against it (it is meant for the conditions and knows the concentration); * where the estimate is not meant for the
-    conditions."""
+    """The rows as a Markdown table, forces in N. Brackets give simulated / estimate for an estimate that is meant for
+    these conditions and depends on the concentration; * marks an estimate that is not meant for the conditions."""
     names = points[0].of_ice
     head = [
         "ice, %", "runs", "simulated, N", "standard error, N", *(e.label for e in names.values()),
@@ -183,8 +182,8 @@ def table(points):
 
 
 def words(points):
-    """The rows as sentences: the force that the ice of each concentration adds, with the estimates valid for it; at
-    last the drag in open water."""
+    """The rows as sentences: the added force from ice at each concentration, with the estimates valid for it; finally
+    the open-water drag."""
     def of(estimates, row):
         return "; ".join(f"{e.label} {quantity(row['forces'][name], 'N')}" for name, e in estimates.items()
                          if row["valid"].get(name) and np.isfinite(row["forces"][name]))
@@ -213,7 +212,7 @@ def words(points):
 
 
 def draw_estimates(axes, points, factor):
-    """Curves: solid where an estimate is valid, thin and dotted elsewhere; a band for an estimate that gives a
+    """Draw curves: solid where an estimate is valid, thin and dotted elsewhere; a band for an estimate that gives a
     range."""
     first = points[0]
     valid = first.conditions["curves"]["valid_range"]
@@ -246,7 +245,7 @@ def draw_estimates(axes, points, factor):
 
 
 def limits(points, log):
-    """Lower and upper end of the force axis, N: the runs, and the estimates that are valid for them."""
+    """Lower and upper end of the force axis, N, from the runs and the estimates that are valid for them."""
     seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)] + [r["high"] for r in rows(points)]
     for p in points:
         for e in p.of_ice.values():
@@ -264,8 +263,8 @@ def limits(points, log):
 
 
 def draw_runs(axes, points, factor, low, log):
-    """The runs, each with its interval where it is alone at its concentration, means of several with theirs, and what
-    was measured; returns how many have no place in the picture."""
+    """Draw the runs, each with its interval if it is the only one at its concentration, the means of several runs with
+    theirs, and the measured values; return how many lie outside the picture."""
     averaged = [r for r in rows(points) if r["runs"] > 1]
     alone = np.array([not any(p.asked == r["concentration"] for r in averaged) for p in points])
     a = np.array([p.concentration for p in points])
@@ -326,7 +325,7 @@ def draw_runs(axes, points, factor, low, log):
 
 
 def write_around(figure, points, lost, hidden):
-    """Heading and notes. lost: legends of curves beyond the axes; hidden: runs beyond the axes."""
+    """Write heading and notes. lost: legends of curves outside the axes; hidden: runs outside the axes."""
     e = points[0].conditions
     figure.text(
         0.02,

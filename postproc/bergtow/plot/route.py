@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Routes on the map: the ice as the planner saw it, areas to keep out of, the ways of the body and of the vessel."""
+"""Routes on the map: the ice as the planner saw it, no-go areas, the tracks of the body and of the vessel."""
 from bergtow.plot import style
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap
 
-#: of routes, told apart with any colour vision
+#: line colours of routes, distinguishable with any colour vision
 LINES = (style.TOW, style.DRAG, "#e69f00", style.INERTIA, "#56b4e9", "#cc79a7")
 COVER = LinearSegmentedColormap.from_list("cover", [style.WATER, "#5d8fb5", "#d3e6f1", "#fbfdfe"])
 
 
 def figure(title, words, place, extent, cover, cover_extent, outlines, no_go, routes, bold, goal):
-    """The map. routes: candidates (label, track [m, 2] of the body, tug [k, 2] or None, straight, name), bold: the name
-    of one of them or None; cover [ny, nx] within cover_extent (x0, x1, y0, y1)."""
+    """Draw the map. routes: candidates (label, track [m, 2] of the body, tug [k, 2] or None, straight, name); bold: the
+    name of one of them or None; cover [ny, nx] within cover_extent (x0, x1, y0, y1)."""
     flat = place.map
     (left, low), (right, high) = flat([extent[:2], extent[2:]])
     width = 9.0

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The ice field of one frame on one axes: water, floes, towed body, walls; shared by bergtow plot-field and bergtow
+"""The ice field of one frame on one set of axes: water, floes, towed body, walls; for bergtow plot-field and bergtow
 film.
+
 Orientation. The basin frame is drawn as it is: x to the right, y upwards. The geographic frame (x north, y east) is
 drawn as a map: the horizontal axis is y, the vertical axis is x.
 
@@ -23,7 +24,7 @@ COLOURS = ("speed", "force", "thickness", "generation")
 
 
 class Colouring:
-    """The quantity by which floes are coloured: values of a frame, colour map, limits over the frames shown, label."""
+    """The quantity that colours the floes: values of a frame, colour map, limits over the frames shown, label."""
 
     def __init__(self, run, kind, frames):
         self.run, self.kind = run, kind
@@ -35,10 +36,10 @@ class Colouring:
             low, high = 0.0, max(1.0, float(run.generation.max(initial=0)))
         elif kind == "thickness":
             low, high = float(samples.min()), float(samples.max())
-            if high - low < 1e-9 * high:  # one thickness: the white end of the map
+            if high - low < 1e-9 * high:  # uniform thickness: use the white end of the map
                 low, high = 0.0, high
         else:
-            # A few collisions are far above the rest; a scale to the maximum would show everything else as at rest.
+            # A few collisions are far above the rest; on a scale up to the maximum everything else would seem at rest.
             moving = samples[samples > 0]
             high = float(np.percentile(moving, 99)) if len(moving) else 1.0
             low = 0.0
@@ -67,7 +68,7 @@ class Colouring:
         return self._raw(frame) / self.factor
 
     def bar(self, figure, mappable, cax, orientation="vertical"):
-        """The colour bar on the axes cax."""
+        """Draw the colour bar on the axes cax."""
         bar = figure.colorbar(mappable, cax=cax, orientation=orientation, extend=self.extend,
                               extendfrac=0.03, label=self.label)
         bar.outline.set(linewidth=0.6, edgecolor=style.FAINT)
@@ -83,7 +84,7 @@ class Colouring:
 
 
 def _round_steps(top):
-    """Four or five round numbers from 0 to top that are spread out on a square-root scale."""
+    """Four or five round numbers from 0 to top, well separated on a square-root scale."""
     ticks = {0.0}
     for fraction in (0.05, 0.2, 0.5, 1.0):
         step = 10 ** np.floor(np.log10(top * fraction))
@@ -92,7 +93,7 @@ def _round_steps(top):
 
 
 def tow_heading(run, time=0.0):
-    """Unit vector (x, y) of the leg of the towing end at a time, or None for a body that drifts."""
+    """Unit vector (x, y) of the current leg of the towing end, or None for a drifting body."""
     if run.towed is None or run.case.get("tow.mode") == "none":
         return None
     passed = sum(e["kind"] == "waypoint" and e["time_s"] <= time for e in run.events)
@@ -117,14 +118,14 @@ def view_whole(run):
 
 
 def needs_window(run):
-    """Whether the domain is too long, or the body too small in it, for a picture of the whole."""
+    """Is the domain too long, or the body too small in it, for a picture of the whole?"""
     x0, x1, y0, y1 = run.box
     long, short = max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0)
     return run.towed is not None and (long > 12 * short or long > 60 * body_size(run))
 
 
 def view_body(run):
-    """A window about the body, relative to it: 20 bodies long or more, 9 wide or the domain, more behind than ahead."""
+    """A window that follows the body: 20 bodies long or more, 9 wide, or the domain's size; more behind than ahead."""
     x0, x1, y0, y1 = run.box
     size, heading = body_size(run), tow_heading(run)
     heading = np.array([1.0, 0.0]) if heading is None else heading
@@ -135,7 +136,7 @@ def view_body(run):
     reach[along] = min(max(reach[along], 3.4 * reach[across]), (x1 - x0, y1 - y0)[along])
     shift = -0.15 * heading * reach
     left, right = shift[0] - reach[0] / 2, shift[0] + reach[0] / 2
-    if run.case.get("domain.ends") == "moving":  # what lies beyond it is the ice of its other end
+    if run.case.get("domain.ends") == "moving":  # ice beyond that distance comes from the other end of the domain
         ahead = run.value("domain.ahead", (x1 - x0) / 2)
         behind = x1 - x0 - ahead
         left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right,
@@ -144,8 +145,8 @@ def view_body(run):
 
 
 def tow_line(run, frame, position):
-    """[n, 2] m: hull, towing end and, with two branches, hull again, of a towed body at a position; the end alone where
-    all have broken.
+    """[n, 2] m: hull, towing end and, with two branches, hull again, for a towed body at a position; only the towing
+    end if all branches have broken.
 
     None without a line.
     """
@@ -169,18 +170,17 @@ def tow_line(run, frame, position):
 
 
 class Scene:
-    """Artists of the ice field on an axes.
+    """Artists of the ice field on one set of axes.
 
-    view       (x0, x1, y0, y1) m
-    follow     the view is relative to the towed body, and so are the axes
-    animated   artists are left out of the figure's own drawing (for blitting)
+    view       (x0, x1, y0, y1) m follow     the view and the axes are relative to the towed body animated   artists are
+    left out of the figure's own drawing (for blitting)
     """
 
     def __init__(self, axes, run, colouring, view, follow=False, animated=False):
         self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
         x0, x1, y0, y1 = run.box
         self._turn = run.geographic
-        # what lies within half a period of it is shown
+        # everything within half a period of it is shown
         self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2
         view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
@@ -198,7 +198,7 @@ class Scene:
         axes.set_xlabel(names[0])
         axes.set_ylabel(names[1])
 
-        # Walls continue without end along a periodic direction; a view about the body may look over the seam.
+        # Walls are endless along a periodic direction; a view that follows the body may extend across the seam.
         px, py = run.period if follow else (0.0, 0.0)
         self._images = [
             np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))
@@ -216,12 +216,12 @@ class Scene:
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
         self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
                                      linewidths=float(np.clip(0.035 * floe_pt, 0.1, 0.6)), zorder=2, **kept)
-        self.rafted = False  #: does the frame that is shown have floes over each other?
+        self.rafted = False  #: do floes in the current frame lie over each other?
         self._rafted = PolyCollection([], facecolors=style.RAFTED, linewidths=0, zorder=2.5, **kept)
         self._rafts = run.value("ice.rafting.kappa", 0) > 0
         for collection in (self._floes, self._rafted):
             collection.set_rasterized(run.n_floes > style.MANY / 6)
-        self.cracked = False  #: have floes split since the frame before the one that is shown?
+        self.cracked = False  #: have floes split since the frame before the current one?
         self._cracks = LineCollection([], colors=style.CRACK, linewidths=float(np.clip(0.12 * floe_pt, 0.8, 2.0)),
                                       zorder=2.7, **kept)
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
@@ -238,7 +238,7 @@ class Scene:
                               linewidth=1.0, zorder=7, visible=False, **kept)
         self._heading = tow_heading(run)
         if run.case.get("tow.mode") == "line":
-            self._heading = None  # the line itself shows it
+            self._heading = None  # the line itself shows the direction
         self._arrow.set_visible(self._heading is not None)
         self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
         edges = [] if follow else self._edges(**kept)
@@ -264,11 +264,11 @@ class Scene:
         return self._floes
 
     def _flat(self, xy):
-        """World coordinates [..., 2] to (horizontal, vertical) of the picture."""
+        """Convert world coordinates [..., 2] to (horizontal, vertical) of the picture."""
         return xy[..., ::-1] if self._turn else xy
 
     def show(self, frame):
-        """Put the artists where the frame has them."""
+        """Update the artists to a frame."""
         run = self.run
         if not run.n_frames:
             raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
@@ -303,8 +303,8 @@ class Scene:
             self._show_arrow(position - origin, bodies[run.towed] - origin)
 
     def _new_cracks(self, frame, centre):
-        """[K, 2, 2] m, ends of the cracks since the frame before, where they opened. Older ones have gone with their
-        pieces, as gaps between them."""
+        """[K, 2, 2] m, ends of the cracks that opened since the previous frame, at the positions where they opened.
+        Older cracks show as gaps between the pieces, which have drifted."""
         run = self.run
         frame %= run.n_frames
         after, until = run.frame_times[frame - 1] if frame else -np.inf, run.frame_times[frame]
@@ -314,7 +314,7 @@ class Scene:
         return cracks + (run.wrap(middle, centre) - middle)[:, None]
 
     def _edges(self, **kept):
-        """Dashed lines along the edges of the domain that are open or periodic."""
+        """Dashed lines along the open or periodic edges of the domain."""
         a, b, c, d = self._corners
         lines = []
         if self.run.case.get("domain.ends") in ("open", "periodic", "moving"):
@@ -325,13 +325,13 @@ class Scene:
                        clip_on=False, **kept) for line in lines]
 
     def _unbounded(self, corners):
-        """The water, without end along periodic directions."""
+        """The water, extended without end along periodic directions."""
         grow = np.where(np.array(self.run.period) > 0, 1e3, 1.0)
         middle = corners.mean(axis=0)
         return middle + (corners - middle) * grow
 
     def _show_track(self, frame, origin):
-        """The way the body has come, broken where it left one end of a periodic domain for the other."""
+        """Draw the track of the body so far, interrupted where it crossed a periodic end of the domain."""
         run = self.run
         if "body_x" not in run or "body_y" not in run:
             return
@@ -352,14 +352,14 @@ class Scene:
         self._track.set_data(*self._flat(way - origin).T)
 
     def _show_line(self, frame, position):
-        """The tow line from the hull to its towing end, a square; two branches meet there; none that has broken."""
+        """Draw the line from the hull to its towing end, a square, where two branches meet; omit broken branches."""
         points = tow_line(self.run, frame, position)
         if points is not None:
-            self._line.set_markevery([min(1, len(points) - 1)])  # the end alone where all branches have broken
+            self._line.set_markevery([min(1, len(points) - 1)])  # only the towing end if all branches have broken
             self._line.set_data(*self._flat(points).T)
 
     def _show_arrow(self, position, outline):
-        """An arrow ahead of the body, along the tow."""
+        """Draw an arrow ahead of the body, along the tow."""
         u = self._heading
         n = np.array([-u[1], u[0]])
         ahead = position + u * (((outline - position) @ u).max() + 0.22 * self._arrow_length)

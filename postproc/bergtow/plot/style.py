@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""One look for all pictures: fonts, sizes, colours, and the words of titles.
+"""One style for all pictures: fonts, sizes, colours, and the wording of titles.
 
-Line colours are those of Okabe & Ito (2008), told apart with any colour vision. Maps of floes rise in lightness
-contrast against the water, so that they also read in grey.
+Line colours are those of Okabe & Ito (2008), distinguishable with any colour vision. The colour maps of floes increase
+in lightness contrast against the water, so that they can also be read in greyscale.
 """
 import textwrap
 from contextlib import contextmanager
@@ -35,39 +35,39 @@ DRAG = "#009e73"      # drag
 INERTIA = "#8c6bb1"   # inertia
 CORIOLIS = "#b8860b"  # Coriolis force
 TILT = "#4d4d4d"      # force of the sea-surface tilt
-#: lines of a balance of forces in the order of the file: colour, width, dashes; those of registered forces follow
+#: lines of a force balance in the order of the file: colour, width, dashes; registered forces follow
 BALANCE = ((TOW, 2.8, None), (ICE, 1.3, None), (DRAG, 1.6, (6, 2)), (CORIOLIS, 1.6, (5, 1.5, 1, 1.5)), (TILT, 1.6, (1,
                                                                                                                     1)),
            (INERTIA, 1.6, (2, 1.5)), ("#c2417c", 1.6, (4, 1)), ("#1b4f9c", 1.6, (3, 1, 1, 1)), ("#7a5b00", 1.6, (7, 1)))
-#: panels one below the other, and curves of estimates, in the order of the file
+#: stacked panels, and curves of estimates, in the order of the file
 PANELS = (ICE, TOW, DRAG, INERTIA)
 ESTIMATES = (TOW, DRAG, INERTIA, "#56b4e9", "#e69f00", "#cc79a7", "#1b4f9c", "#7a5b00", "#4d4d4d")
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 
-#: what lies on ice and water, which look the same on a dark page
+#: marks on ice and water, which look the same on a dark page
 HALO = "#fefefe"
 ON_DARK, ON_LIGHT = "#fefefe", "#1d2732"
 JAM = "#c1121f"
-#: {colour: its replacement on a dark page}; all others stay the same there
+#: {colour: its replacement on a dark page}; all other colours stay the same there
 DARK = {
     PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
     ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
     JAM: "#ff6b6b", "#c2417c": "#f078ac", "#1b4f9c": "#6f9fe8", "#7a5b00": "#cfa63a", RAFTED: "#d45fb4"
 }
 
-#: floes by speed: resting ice is white, moving ice turns to vermilion
+#: floes by speed: ice at rest is white, moving ice turns vermilion
 SPEED_MAP = LinearSegmentedColormap.from_list("speed", ["#eaf3f8", "#f6dfae", "#f2a541", "#dd5f1b", "#a62a0c"])
-#: floes by contact force: unloaded ice is white, loaded ice turns to purple
+#: floes by contact force: unloaded ice is white, loaded ice turns purple
 FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#eaf3f8", "#e8bfd9", "#d877b3", "#ab2f86", "#6a0f5b"])
-#: floes by thickness: thin ice is grey-blue, thick ice is white, as from an aircraft
+#: floes by thickness: thin ice is grey-blue, thick ice is white, as seen from an aircraft
 THICKNESS_MAP = LinearSegmentedColormap.from_list("thickness", ["#5d8fb5", "#9cc3dc", "#d3e6f1", "#fbfdfe"])
 
-#: the tow in words by its mode, and the relative difference of speed made good and ordered speed that is not mentioned
+#: words for the tow by its mode; a relative difference of speed made good from ordered speed too small to mention
 TOWED_BY, SLOWER = {"line": " on a line", "thrust": " by a vessel"}, 0.05
 
 DPI = 150
-MANY = 20000  #: samples, or corners of floes, from which on a vector drawing holds them as a picture
+MANY = 20000  #: samples, or floe vertices, above which a vector drawing embeds them as an image
 
 LOOK = {
     "font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
@@ -84,7 +84,7 @@ LOOK = {
 
 @contextmanager
 def look():
-    """Settings of matplotlib from a figure's beginning until it is saved; those of the calling program come back."""
+    """Apply our matplotlib settings while a figure is made and saved, then restore those of the calling program."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(LOOK)
@@ -92,12 +92,12 @@ def look():
 
 
 def subplots(rows=1, columns=1, *, figsize, **more):
-    """(Figure, axes), as pyplot.subplots, which would keep the figure and choose a backend for all of the program."""
+    """(Figure, axes), like pyplot.subplots, which would keep the figure and choose a backend for the whole program."""
     figure = Figure(figsize=figsize)
     return figure, figure.subplots(rows, columns, **more)
 
 
-# for pictures; tables have them without matplotlib
+# used in pictures; tables use them without matplotlib
 scale, short, quantity = text_table.scale, text_table.short, text_table.quantity
 
 
@@ -109,7 +109,7 @@ def conditions(run):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
         words.append(f"{run.n_start} floes")
-        # floes of their own thickness
+        # floes may have individual thicknesses
         if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):
             words.append(f"{np.mean(run.thickness[:run.n_start]):.3g} m thick")
         elif np.isfinite(run.value("ice.thickness")):
@@ -124,7 +124,7 @@ def conditions(run):
 
 
 def plain(text):
-    """Text of a case as one line that matplotlib draws as it is."""
+    """Text from a case as one line that matplotlib draws literally."""
     return " ".join(str(text).split()).replace("$", r"\$")
 
 
@@ -134,8 +134,8 @@ def title(run):
 
 
 class LogTicks(Locator):
-    """Labelled ticks of a logarithmic axis: decades; if fewer than three are in sight, also their 3, or 2 and 5, or
-    most digits; over a shorter range evenly spaced ticks."""
+    """Labelled ticks of a logarithmic axis: decades; if fewer than three are visible, also 3, or 2 and 5, or most
+    digits; over a shorter range evenly spaced ticks."""
 
     CHOICES = ((1, ), (1, 3), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7))
     MOST = 8
@@ -167,13 +167,13 @@ class TimesTicks(MaxNLocator):
 
 
 def times(axis, factor):
-    """Label an axis with `factor` times its values: 0.6 as 60 of %."""
+    """Label an axis with `factor` times its values: 0.6 as 60 for %."""
     axis.set_major_locator(TimesTicks(factor))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.6g}"))
 
 
 def logarithmic(*axis):
-    """Scale, ticks and labels of a logarithmic axis (axes.xaxis or axes.yaxis)."""
+    """Set scale, ticks and labels of a logarithmic axis (axes.xaxis or axes.yaxis)."""
     for one in axis:
         getattr(one.axes, f"set_{one.axis_name}scale")("log")
         one.set_major_locator(LogTicks())
@@ -182,12 +182,12 @@ def logarithmic(*axis):
 
 
 def level_of(axes):
-    """The transform of a level across the picture (axhline), whose y alone is data."""
+    """The transform of a horizontal level across the picture (axhline), where only y is in data coordinates."""
     return axes.get_yaxis_transform(which="grid")
 
 
 def in_sight(axes, line):
-    """Is any part of a line, whose numbers are data of the axes, within their limits? A level is one by its y."""
+    """Is any part of a line, given in data coordinates, within the limits of the axes? For a level only y counts."""
     x, y = (np.asarray(v, dtype=float) for v in line.get_data())
     (left, right), (low, high) = sorted(axes.get_xlim()), sorted(axes.get_ylim())
     if line.get_transform() == level_of(axes):
@@ -203,8 +203,8 @@ def in_sight(axes, line):
 
 
 def legend_of(axes):
-    """(handles, labels) of the artists in sight, and the labels without any in sight. Limits must be set. The first
-    line in sight stands for all lines with its label."""
+    """(handles, labels) of the visible artists, and the labels without any visible artist. Limits must be set. The
+    first visible line represents all lines with its label."""
     shown, all_labels = {}, {}
     for handle, label in zip(*axes.get_legend_handles_labels()):
         all_labels[label] = None
@@ -215,9 +215,9 @@ def legend_of(axes):
 
 
 def head(figure, words, below, left=0.02, kept=0):
-    """Two lines at the head of a figure, at fixed distances from its top; kept: inches that the second leaves free."""
+    """Two lines at the top of a figure, at fixed distances from its edge; kept: inches that the second leaves free."""
     width, height = figure.get_size_inches()
-    # a letter is on average less than 0.6 of the font size wide: nothing is cut off
+    # letters are on average narrower than 0.6 of the font size, so the title is not cut off
     size = min(13.5, 72 * (width - 0.4) / (0.6 * len(words)))
     figure.text(left, 1 - 0.14 / height, words, va="top", fontsize=size, fontweight="bold")
     small = min(10.5, 72 * (width - 0.4 - kept) / (0.52 * max(1, len(below))))
@@ -225,5 +225,5 @@ def head(figure, words, below, left=0.02, kept=0):
 
 
 def headline(figure, run, subject, left=0.02, kept=0):
-    """Title and conditions at the head of a figure."""
+    """Put title and conditions at the top of a figure."""
     head(figure, f"{title(run)}: {subject}", conditions(run), left, kept)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Resistance against a number that an ensemble varies: every field, its mean with 95 %, median and doubts; the
-estimates beside the concentration, the law V^2 beside the speed. Of a Latin hypercube every member.
+"""Resistance against a number that an ensemble varies: every field, its mean with 95 %, median and doubts; estimates
+against concentration, the law V^2 against speed. For a Latin hypercube, every member.
 """
 import textwrap
 
@@ -18,7 +18,7 @@ MOST_PANELS = 6
 
 
 def groups(e, key):
-    """Conditions with members, in groups that differ in `key` alone: [(words for the others, [Condition])]."""
+    """Conditions with members, in groups that differ only in `key`: [(words for the others, [Condition])]."""
     found = {}
     for c in e.conditions():
         if len(c.finished):
@@ -30,7 +30,7 @@ def groups(e, key):
 
 
 def width_of(x, log):
-    """Half a width, in x, in which the dots of a condition are spread."""
+    """Half the width, in x, over which the dots of a condition are spread."""
     x = np.unique(x)
     if len(x) < 2:
         return 0.02
@@ -38,12 +38,12 @@ def width_of(x, log):
 
 
 def spread(x, n, half, log):
-    """n places about x, side by side, so that dots of one condition can be told apart."""
+    """n positions around x, side by side, so that the dots of one condition do not overlap."""
     at = np.linspace(-half, half, n) if n > 1 else np.zeros(1)
     return x * np.exp(at) if log else x + at
 
 
-#: how a member is drawn: its mark, and what it means
+#: how a member is drawn: its marker, and the meaning
 MARKS = {
     "sound": ({"marker": "o", "markersize": 3.6, "markeredgewidth": 0, "color": style.ICE, "alpha": 0.35}, "{}"),
     "doubtful": ({"marker": "o", "markersize": 4.2, "markeredgewidth": 0.9, "color": style.ICE, "alpha": 0.6,
@@ -54,7 +54,7 @@ MARKS = {
 
 
 def mark_of(e, m):
-    """Key of MARKS. A warning of another kind is no doubt about a mean."""
+    """Key of MARKS. Warnings of other kinds do not cast doubt on a mean."""
     doubts = e.doubts(m)
     return "jammed" if "jammed" in doubts else "doubtful" if doubts - {"other"} else "sound"
 
@@ -75,7 +75,7 @@ def members_legend(e, word):
 
 
 def draw_fields(axes, e, some, key, factor, log_x):
-    """Members, the mean with its 95 % interval and band, and the median."""
+    """Draw the members, the mean with its 95 % interval and band, and the median."""
     x = np.array([c.values[key] for c in some])
     half = width_of(x, log_x)
     means = [of(e, c.finished) for c in some]
@@ -126,7 +126,7 @@ def fields_legend(e):
 
 
 def force_limits(e, some_groups, log):
-    """Ends of the force axis, N: every field, the intervals, and the estimates that are meant for the conditions."""
+    """Ends of the force axis, N: every field, the intervals, and the estimates meant for the conditions."""
     seen = [v for _, some in some_groups for c in some for v in of(e, c.finished)]
     tops = [stat_mean.t_interval(of(e, c.finished))[1] for _, some in some_groups for c in some]
     seen += [v for v in tops if np.isfinite(v)]
@@ -144,7 +144,7 @@ def force_limits(e, some_groups, log):
 
 def power_law(x, means):
     """(exponent, low, high, factor) of mean = factor x^exponent over fields: regression of ln mean on ln x, 95 %; None
-    where it makes no sense."""
+    if undefined."""
     lx = np.concatenate([np.full(len(y), np.log(v)) for v, y in zip(x, means)])
     y = np.concatenate(means)
     if len(set(lx)) < 2 or len(y) < 4 or y.min() <= 0:
@@ -158,7 +158,7 @@ def power_law(x, means):
 
 
 def draw_speed(axes, e, some, key, factor):
-    """The law V² through the geometric mean of the fields, and the exponent that fits."""
+    """Draw the law V² through the geometric mean of the fields, and the fitted exponent."""
     x = np.array([c.values[key] for c in some])
     means = [of(e, c.finished) for c in some]
     law = power_law(x, means)
@@ -183,8 +183,8 @@ def draw_speed(axes, e, some, key, factor):
 
 
 def draw_estimates(axes, e, some, key, factor):
-    """The estimates of each condition, at the speed that its fields made good, as the mean of its fields; dotted where
-    they are not meant for it. A curve for one speed would be wrong of tows that are slower in more ice."""
+    """Draw the estimates of each condition, averaged over its fields at the speed that each made good; dotted where
+    they are not meant for the condition. A curve for a single speed would be wrong if tows are slower in more ice."""
     x, k = np.array([c.values[key] for c in some]), 0
     for name, estimate in e.estimates.items():
         force, valid = (np.array([e.summary.get(f"estimates_{name}_{what}", np.full(e.n, np.nan))[c.finished].mean()
@@ -210,7 +210,7 @@ def draw_sweep(e, key):
     values = np.array([c.values[key] for _, some in shown for c in some])
     log_x = key == "tow.speed" and values.min() > 0
     forces = [v for _, some in shown for c in some for v in of(e, c.finished)]
-    log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero has no place on a logarithmic axis
+    log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero cannot be shown on a logarithmic axis
     low, high = force_limits(e, shown, log_y)
     factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
     figure, grid = style.subplots(rows,
@@ -237,7 +237,7 @@ def draw_sweep(e, key):
     if not log_x:
         style.times(grid.flat[0].xaxis, reading(key, e.units[key])[0])
         margin = 0.06 * (values.max() - values.min())
-        grid.flat[0].set_xlim(values.min() - margin, values.max() + margin)  # fields stand beside their value
+        grid.flat[0].set_xlim(values.min() - margin, values.max() + margin)  # fields are spread about their value
     for axes in grid.flat[:len(shown)]:
         handles, labels, away = style.legend_of(axes)
         extra |= {label: handle for handle, label in zip(handles, labels) if label not in extra}
@@ -280,8 +280,8 @@ def draw_sweep(e, key):
 
 
 def draw_scatter(e, key):
-    """Figure of a Latin hypercube: every member against one parameter, and the mean in bins of an equal number of
-    conditions with 95 %; of the means of conditions, whose fields are not independent (ensemble.sample)."""
+    """Figure of a Latin hypercube: every member against one parameter, and the mean with 95 % in bins of equally many
+    conditions. The bins use means of conditions, whose fields are not independent (ensemble.sample)."""
     rows = e.used
     x, y = e.parameters[key][rows], of(e, rows)
     log_y = wants_log(y)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What each assumption does to the mean: the variants of a study against its first one, as a tornado.
+"""The effect of each assumption on the mean: variants of a study compared with the first one, as a tornado chart.
 
-    variants.png      a panel for each combination of the other values that were varied; a bar a variant, as long as the
+    variants.png      one panel for each combination of the other varied values; one bar per variant shows the
                       change of the mean in per cent of that of the first variant, with its 95 % interval (t). Fields
-                      that two variants have in common (fields: common) are compared one by one, other means by
-                      Welch's t. Below: the means themselves
+                      that two variants share (fields: common) are compared in pairs, other means by Welch's t.
+                      Below: the means themselves
 """
 import numpy as np
 import scipy
@@ -17,14 +17,14 @@ KEY = "variant"
 
 
 def relative_change(means, base, paired):
-    """Change of the mean in per cent of that of `base`, and the half width of its 95 % interval; both NaN where one of
-    them has fewer than two fields. means, base: {repeat: mean of that field}."""
+    """Change of the mean in per cent of that of `base`, and the half width of its 95 % interval; both NaN if either has
+    fewer than two fields. means, base: {repeat: mean of that field}."""
     if paired:
         both = sorted(set(means) & set(base))
         if len(both) < 2:
             return np.nan, np.nan
         of, to = (np.array([x[k] for k in both]) for x in (means, base))
-        # d(a/b) by the first order of the quotient: each field's share in the ratio of the means.
+        # d(a/b) to first order: each field's contribution to the ratio of the means.
         ratio = of.mean() / to.mean()
         shares = (of - ratio * to) / to.mean()
         low, high = stat_mean.t_interval(shares)
@@ -63,12 +63,12 @@ def panels(e):
 
 
 def draw(e, headline):
-    """The figure, or None where the study has no variants with a first one to compare with."""
+    """The figure, or None if the study has no variants with a first one to compare with."""
     some = panels(e) if KEY in e.parameters else []
     if not some:
         return None
     names = list(dict.fromkeys(name for *_, changes in some for name, *_ in changes))
-    # The longest bar on top, by the largest change in any panel.
+    # Longest bar on top, by the largest change in any panel.
     reach = {n: max((abs(c) for *_, changes in some for m, _, c, _ in changes if m == n and np.isfinite(c)), default=0)
              for n in names}
     names.sort(key=lambda n: reach[n])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The report of a run or of an ensemble, as a page and as PDF."""
+"""The report of a run or of an ensemble, as a web page and as PDF."""

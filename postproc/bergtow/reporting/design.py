@@ -1,23 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""From a case or a study to the answer of what a tow asks for, and to its report as a page and as PDF.
+"""From a case or a study to the requirements of a tow, and to their report as a web page and as PDF.
 
     bergtow design CASE.yml -o DIR --vessel "110 t"   DIR/design.yml, the ensemble, answer.json, report.html, report.pdf
-    bergtow design STUDY.yml -o DIR                   the same of a study, with the fields that it asks for
+    bergtow design STUDY.yml -o DIR                   the same for a study, with its own number of fields
 
-Of a case a study is made: of its concentration, or of several, and of several speeds where they are asked for, with as
-many fields of each as the budget allows. A tow at another speed goes as far as that of the case. Two fields of each
-condition are run, then as many as fit into what is left, by the time which these took; members go field by field, so
-conditions have equally many, and should the time run out all the same, the fields that are complete in every condition
-are taken. Members are independent: one process of one thread a core. The same call goes on where an earlier one ended.
+For a case a study is written: of its concentration, or of several, and of several speeds if requested, with as many
+fields of each as the budget allows. A tow at another speed covers the same distance as that of the case. First two
+fields of each condition are run. The time they take decides how many more fit into the rest of the budget. Members run
+field by field, so that all conditions have equally many; if time runs out nevertheless, the fields that are complete in
+every condition are used. Members are independent: one single-threaded process per core. Repeating the same call
+continues where an earlier one ended. No round of fields, run of a load case or replay is started if, at the pace
+measured so far, it would not finish within the budget. At most CASES_SHARE of the budget is reserved for the runs of
+load cases and ranges (study/load_cases.py, assumed.py), which use the hardest condition at the requested speed. A row
+that the budget does not reach has no load, and the table states this.
 
-Nothing begins that by the pace measured so far does not end within the budget: no round of fields, no run of a load
-case, no replay. Of the budget CASES_SHARE at most is kept for the runs of load cases and ranges
-(study/load_cases.py, assumed.py), which are of the hardest condition at the speed that is asked for. A row that the
-budget does not reach has no load, and says so.
-
-Where the domain of the case is too narrow for a concentration by the rule of `bergtow check`, that condition gets the
-width that the rule asks for: a load that rests on the periodic images of the body is none to design for. Walls are part
-of the question, and are left where they are.
+If the domain of the case is too narrow for a concentration by the rule of `bergtow check`, that condition gets the
+width that the rule requires: a load that the periodic images of the body help to carry must not be used for design.
+Walls are part of the question, and are left where they are.
 """
 import argparse
 import math
@@ -51,49 +50,49 @@ import yaml
 
 BUDGET = 14.0                # min
 MOST_FIELDS = 40
-RESERVE = 30.0, 10.0         # s of the budget for pages, and for the statistics of each condition
-MARGIN = 0.95                # of what is left is given to fields
-FIRST = 2                    # fields by which it is measured how long one takes: they keep two cores busy
+RESERVE = 30.0, 10.0         # s of the budget for writing the report, and for the statistics of each condition
+MARGIN = 0.95                # share of the remaining time that is given to fields
+FIRST = 2                    # fields that measure the time per field: they keep two cores busy
 REPLAY_FRAMES = 120
 SECTIONS = "run", "domain", "ice", "tow", "output"
 UNITS = {"ice.thickness": "m", "air.wind_x": "m/s", "air.wind_y": "m/s"}
-BENDS = math.radians(1), math.radians(150)  # of the course change: what a body on a line can follow, assumed
-FEW = 5                      # fields below which nothing is known of the scatter between them
-CASES_SHARE, CASE_RUNS = 0.4, 34  # of the budget for load cases and ranges, at most, and how many runs these are
-SLOWER = 1.6                 # a run / the program's own estimate of it: where the first fields are still to come
-PAIRED, OF_A_CASE = 4, 2     # fields: paired with those of the case as it is, and of other load cases
+BENDS = math.radians(1), math.radians(150)  # of the course change: the bend that a body on a line can follow, assumed
+FEW = 5                      # with fewer fields the scatter between them is unknown
+CASES_SHARE, CASE_RUNS = 0.4, 34  # largest share of the budget for load cases and ranges, and their number of runs
+SLOWER = 1.6                 # time of a run / the program's estimate, before the first fields have been measured
+PAIRED, OF_A_CASE = 4, 2     # fields: paired with those of the unchanged case, and of other load cases
 
 
 @dataclass
 class Work:
-    """One call: program, folder, options, and the end of the budget by time.monotonic()."""
+    """One call: program, folder, options, and the end of its budget as time.monotonic()."""
 
     program: Path
     folder: Path
-    given: list              #: --set of the user's
+    given: list              #: --set options of the user
     jobs: int
     end: float               #: inf without a budget
     quiet: bool
-    began: float             #: of the call
-    core: float = 0.0        #: s of a core that a run takes by the program's estimate
-    last: float = math.inf   #: end of all runs, load cases and replay among them
-    member: float = 0.0      #: s that a run of the ensemble takes, as measured
-    replay: float = 0.0      #: s that are kept for the replay
+    began: float             #: start of the call
+    core: float = 0.0        #: core seconds per run by the program's estimate
+    last: float = math.inf   #: end of all runs, including load cases and replay
+    member: float = 0.0      #: measured time of a run of the ensemble, s
+    replay: float = 0.0      #: time reserved for the replay, s
 
     def left(self):
         return self.end - time.monotonic()
 
     def ensemble(self, study):
-        """Run the members that are not there yet. True when all have settled. Errors: RunError."""
+        """Run the members that have not been run. True when all have settled. Raises RunError."""
         settled, said = run_members(self.program, study, self.folder, self.given, self.jobs, self.left(), self.quiet)
-        # at the limit the fields stop and the call does not; failed members are named again when all are gathered
+        # at the limit the fields stop but the call continues; failed members are named again when all are gathered
         sys.stderr.writelines(f"bergtow: {message}\n" for message in said if settled or message.warning)
         return settled
 
 
 def title_of(case, name, values):
     title = says(case, "run", "title")
-    if values:  # that of the case alone is not that of the study
+    if values:  # the concentration in the title of the case is not that of the study
         title = re.sub(r"\b\d+(\.\d+)?\s*% (?=(\w+ ){0,2}ice\b)", "", str(title or ""))
     words = f"ice concentration {100 * min(values):g} to {100 * max(values):g} %" if len(values) > 1 else \
         f"ice concentration {100 * values[0]:g} %" if values else ""
@@ -101,7 +100,7 @@ def title_of(case, name, values):
 
 
 def widths(work, a, case):
-    """{concentration: domain.width as text} for those that need a wider domain than the case has. Errors: RunError."""
+    """{concentration: domain.width as text} where a wider domain than that of the case is needed. Raises RunError."""
     if a.keep_width or domain_width.stays(case, [text.split("=")[0].strip() for text in a.set]):
         return {}
     found = {c: domain_width.needed(work.program, a.file, [*a.set, f"ice.concentration={c!r}"])
@@ -110,8 +109,8 @@ def widths(work, a, case):
 
 
 def at_speeds(a, found):
-    """({text of a speed: keys that go with it} of the study, empty for one speed). found: answer.case_numbers(). A tow
-    at another speed goes as far as that of the case, and its window begins as far on. Errors: RunError."""
+    """{text of a speed: keys set with it} for the study, empty for one speed. found: answer.case_numbers(). A tow at
+    another speed goes the same distance as in the case, and its window begins at the same distance. Raises RunError."""
     own = found["speed"]
     some = sorted({own, *a.speeds})
     if len(some) == 1 or not a.speeds:
@@ -129,8 +128,8 @@ def at_speeds(a, found):
 
 
 def varied(a, found):
-    """{key: {text of a value: keys that go with it}} of thicknesses and winds beside those of the case. Winds are from
-    ahead; where the tow is along no axis both of their components change. found: answer.case_numbers()."""
+    """{key: {text of a value: keys set with it}} for thicknesses and winds in addition to those of the case. Winds blow
+    from ahead; if the tow is not along an axis, both of their components change. found: answer.case_numbers()."""
     out, case = {}, found["case"]
     if a.thicknesses:
         some = {answer.case_value(case, "ice.thickness"), *a.thicknesses}
@@ -147,7 +146,7 @@ def varied(a, found):
 
 
 def write_study(a, case, repeats, wider):
-    """The study of a case: DIR/design.yml. wider: domain.width by concentration, as of widths. Errors: RunError."""
+    """Write the study of a case, DIR/design.yml. wider: domain.width by concentration, see widths. Raises RunError."""
     values = [] if reads_ice(case) else a.concentrations or []
     study = {
         "title": a.title or title_of(case, a.file.stem, values),
@@ -171,8 +170,8 @@ def write_study(a, case, repeats, wider):
 
 
 def fields_settled(folder):
-    """Fields that have finished or failed in every condition, from the first on; 0 where nothing is there. One that
-    failed is not left out: a field that jams is none that can be done without."""
+    """Number of fields, counted from the first, that have finished or failed in every condition; 0 if there are none. A
+    failed field is not skipped: a field that jams must not be left out."""
     try:
         e = Members(folder)
     except RunError:
@@ -182,7 +181,7 @@ def fields_settled(folder):
 
 
 def seconds_a_field(e):
-    """Wall time of one field of all conditions, by the members that are there."""
+    """Wall time of one field of all conditions, from the finished members."""
     took = {}
     for m in np.flatnonzero(e.status == FINISHED):
         with Run(e.folder(m)) as run:
@@ -191,8 +190,8 @@ def seconds_a_field(e):
 
 
 def more_fields(left, member, n, most, conditions, jobs):
-    """Fields that n are followed by in `left` s, and the seconds that are kept for a replay, which takes no longer than
-    a member: none, until there are FEW."""
+    """How many fields to add to n in `left` s, and the seconds reserved for a replay, which takes no longer than a
+    member; nothing is reserved until there are FEW fields."""
     def fit(seconds):
         return answer.fields_in(MARGIN * seconds, member, conditions, jobs)
     beside, few = min(fit(left - member), most - n), min(fit(left), min(FEW, most) - n)
@@ -200,7 +199,7 @@ def more_fields(left, member, n, most, conditions, jobs):
 
 
 def run_case(work, a, case):
-    """Fields of a case as the budget allows. Errors: RunError."""
+    """Run as many fields of a case as the budget allows. Raises RunError."""
     if reads_ice(case) and a.fields > 1:
         print("the ice is read, and no seed changes it: one field is run, which says nothing of the scatter between "
               "fields")
@@ -219,12 +218,12 @@ def run_case(work, a, case):
                        "on", SIGNAL)
     e = Members(a.output)
     conditions = len(e.conditions())
-    def took(fields):  # s a member, with all that is not the run itself
+    def took(fields):  # s per member, including overheads
         return (time.monotonic() - start) / math.ceil(fields * conditions / work.jobs) if fields > 0 else 0.0
     member = max(seconds_a_field(e) / conditions, took(n - settled) if whole_round else 0.0)
     print(f"a field of all conditions takes {member * conditions:.0f} s of a core")
     end = set_ends(work, a, conditions, member)
-    while whole_round and member > 0 and n < a.fields:  # at 0 all have failed
+    while whole_round and member > 0 and n < a.fields:  # 0 means that all have failed
         more, kept = more_fields(end - time.monotonic(), member, n, a.fields, conditions, work.jobs)
         work.replay = 0.0 if a.no_replay or reads_ice(case) else kept
         if more < 1:
@@ -249,7 +248,7 @@ def run_case(work, a, case):
 
 
 def hardest(e):
-    """The first field of the condition with the largest mean tow force, None without one."""
+    """The first field of the condition with the largest mean tow force; None if there is none."""
     force = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))
     there = [m for m in np.flatnonzero((e.status == FINISHED) & np.isfinite(force)) if e.folder(m).is_dir()]
     if not there:
@@ -260,7 +259,7 @@ def hardest(e):
 
 
 def make_replay(work, a, left):
-    """One tow once more, with frames: DIR/replay.html. It has the same state to the last bit."""
+    """Run one tow again, with frames: DIR/replay.html. Its final state is the same to the last bit."""
     e = Members(a.output)
     m = hardest(e)
     if m is None:
@@ -289,7 +288,7 @@ def make_replay(work, a, left):
 
 
 def beside(work, a, row, t):
-    """(load cases without the steady one, ramp, ranges, how many runs): of a condition. Errors: RunError."""
+    """(load cases except the steady one, ramp, ranges, number of runs) for a condition. Raises RunError."""
     ice = row["values"].get("ice.concentration")
     given = list(a.set)
     if ice is not None:
@@ -310,8 +309,8 @@ def beside(work, a, row, t):
             if not a.quiet:
                 print(words, flush=True)
         cases, ramp = [], None
-        towed = t.speed > 0  # or held
-        # first what is in the design value, the cheapest first; the head sea, several times as dear, last if assumed
+        towed = t.speed > 0  # otherwise held in place
+        # first the cases in the design value, cheapest first; the head sea, far more expensive, last if assumed
         given = a.head_current is not None or a.head_wind is not None
         if towed:
             cases.append(load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius))
@@ -325,12 +324,12 @@ def beside(work, a, row, t):
 
 
 def named(a, case):
-    """(vessel, line) of the call, or of the case. Errors: BergtowError."""
+    """(vessel, line) from the call or the case. Raises BergtowError."""
     return gear.vessel(a.vessel, case, a.vessels), gear.line(a.line, case, a.lines, a.line_length)
 
 
 def answer_of(work, a, plan, began):
-    """answer.json of what the folder holds, and the answer. Errors: RunError."""
+    """answer.json for the contents of the folder, and the answer. Raises RunError."""
     spent = time.monotonic()
     e = Members(a.output)
     rows = answer.conditions(e)
@@ -367,19 +366,19 @@ speed = measure("m/s", words="not above zero; give speeds as in \"0.8 kn,1 kn\" 
 
 
 def factor(text):
-    """A safety factor, which lowers no load."""
+    """A safety factor, which must not lower a load."""
     if 0 < (value := above_zero(text)) < 1:
         raise argparse.ArgumentTypeError(f"{text} is below 1; give breaking load / tension, as 2 or 3")
     return value
 
 
 def several(kind):
-    """Type of an option with several values, in order."""
+    """Argparse type for an option with several values, sorted."""
     return lambda text: sorted({kind(part) for part in text.split(",")})
 
 
 def speeds(text):
-    """"0.8 kn,1 kn", or "0.8 kn:1.4 kn:4", four from the one to the other: [m/s]"""
+    """"0.8 kn,1 kn", or "0.8 kn:1.4 kn:4" for four speeds from the first to the second: [m/s]"""
     if text.count(":") == 2:
         first, last, n = text.split(":")
         if not n.strip().isdecimal() or int(n) < 2:
@@ -449,8 +448,8 @@ def options(p):
 
 
 def set_ends(work, a, conditions, member=None):
-    """When fields are to end: work.end, and all runs: work.last, by time.monotonic(). member: s of a run as measured;
-    where the program is slower than it estimates, so are the pages."""
+    """Set when fields must end (work.end) and when all runs must end (work.last), as time.monotonic(). member: measured
+    time of a run, s; if the program is slower than its estimate, more time is reserved for the pages."""
     estimated = SLOWER * work.core
     slower = max(1.0, member / estimated) if member and estimated > 0 else 1.0
     reserve = slower * (RESERVE[0] + RESERVE[1] * conditions)
@@ -461,8 +460,8 @@ def set_ends(work, a, conditions, member=None):
 
 
 def sets_of_study(a, asked):
-    """--set of the user's for the study, without the keys that it has by at_speeds(), varied() or, unless they are
-    asked for, as its concentration: there the values of --set stand already."""
+    """The user's --set options for the study, except keys that at_speeds() or varied() set and, unless concentrations
+    are given, ice.concentration: in these cases the study already contains the values of --set."""
     some = [*a.by_speed.values(), *(keys for of in a.varied.values() for keys in of.values())]
     there = {*a.varied, *(key for keys in some for key in keys)}
     there |= {"tow.speed"} if a.by_speed else set()
@@ -471,7 +470,7 @@ def sets_of_study(a, asked):
 
 
 def planned(a, case, found, began):
-    """(Work of the fields, plan): what a value takes and what the budget gives, said before the first run. Errors:
+    """(Work of the fields, plan): print, before the first run, the cost per value and what the budget allows. Raises
     RunError."""
     own, asked = answer.case_value(found["case"], "ice.concentration", 0.0), a.concentrations
     a.concentrations = a.concentrations or ([] if reads_ice(case) else [own])
@@ -489,7 +488,7 @@ def planned(a, case, found, began):
 
 def perform(a):
     a.output, began = a.output or Path("out") / f"design-{a.file.stem}", time.monotonic()
-    contents(a.file)  # there, and what can be read
+    contents(a.file)  # fail now if it is missing or cannot be read
     study = is_study(a.file)
     if a.budget is None and not study:
         a.budget = BUDGET
@@ -500,7 +499,7 @@ def perform(a):
     for name in ["answer.json", *made] + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         writing.may_write(a.output / name, a.force)
     found = None if study else answer.case_numbers(program_path(), a.file, a.set)
-    named(a, found["case"] if found else {})  # refused now, and not after the runs
+    named(a, found["case"] if found else {})  # reject it now, not after the runs
     a.assumed = assumed.read(a.ranges) if a.ranges else assumed.RANGES
     a.output.mkdir(parents=True, exist_ok=True)
     if study:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a document needs beside its numbers, of a marine warranty surveyor's questions: limits of operation, a check by
-hand, the evidence there is, sources, symbols, standards. Blocks as those of reporting/ensemble.py."""
+"""What a report needs besides its numbers to answer the questions of a marine warranty surveyor: operational limits, a
+hand calculation, the validation evidence, sources, symbols, standards. Blocks are those of reporting/ensemble.py."""
 import numpy as np
 
 from bergtow.result import findings
@@ -8,7 +8,7 @@ from bergtow.result.origins import short as in_short
 from bergtow.table import number, quantity
 from bergtow.text import loads as loads_text
 
-#: what has been held against observations: case, what was observed, verdict; cases/validation/README.md has it in full
+#: comparisons with observations: case, observation, verdict; cases/validation/README.md gives them in full
 EVIDENCE = (
     ("arching of blocks at a gap", "no arch below block/gap 0.10, as observed; at 0.10 some, contrary to the "
      "observations; above, a critical concentration that falls as a power, as observed; two sizes: not shown"),
@@ -28,7 +28,7 @@ STANDARDS = ("No rule of a standard or of a class society is applied, and none w
              "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
              "that one, and efficiencies of the vessel, are those that the user named. Whoever approves the tow "
              "chooses standard, factors and weather window.")
-#: keys of what limits an operation, with its name; the first that is known says what was simulated
+#: keys that limit an operation, with their names; the first known one describes what was simulated
 LIMITING = (("concentration of the ice", ("ice.concentration", )), ("thickness of the ice", ("ice.thickness", )),
             ("size of the floes", ("ice.size", )), ("speed of the tow", ("tow.speed", )),
             ("wind", ("air.wind_x", "air.wind_y")), ("current", ("water.current_x", "water.current_y")),
@@ -44,8 +44,8 @@ def table(head, rows):
 
 
 def load(c):
-    """The load of a condition that a limit is held against: the upper end of its interval, its design value, or the
-    largest simulated; None without any."""
+    """The load of a condition that is compared with a limit: the upper end of its interval, its design value, or the
+    largest simulated value; None if there is none."""
     d = c["design"]["tow"]
     if d is None:
         return None
@@ -54,8 +54,8 @@ def load(c):
 
 
 def pull_of(cases, answer):
-    """(N, what it is) of the pull that limits are held against: the least that the vessel of the answer has at a speed
-    asked for, or the bollard pull of the case, of which less is left at speed; NaN where no vessel is named."""
+    """(N, description) of the pull that limits are compared with: the vessel's least pull at the requested speeds, from
+    the answer, or else the bollard pull of the case, part of which is lost at speed; NaN if no vessel is named."""
     at_speed = [x["has_n"] for x in (answer or {}).get("speeds", []) if x.get("has_n")]
     if at_speed:
         return float(min(at_speed)), "what the vessel pulls at the speed asked for"
@@ -64,7 +64,7 @@ def pull_of(cases, answer):
 
 
 def held(s, pull, what):
-    """In words, which of the conditions a vessel holds by its pull."""
+    """In words, which of the conditions a vessel can hold with its pull."""
     places = {"within": [], "the largest simulated, a lower bound, within": [], "above": []}
     for c in s["conditions"]:
         if (n := load(c)) is not None:
@@ -75,7 +75,7 @@ def held(s, pull, what):
 
 
 def operation(s, cases, values, answer):
-    """Blocks of the limits of operation."""
+    """Blocks of the operational limits."""
     text = {v.key: in_short(v.value) for v in values}
     (pull, what), rows = pull_of(cases, answer), []
     head_sea = next((c for c in (answer or {}).get("load_cases", []) if c["id"] == "case.head_sea"), None)
@@ -107,8 +107,8 @@ def _row(what, by_hand, n, simulated):
 
 
 def by_hand(run):
-    """Rows of a calculation by hand with the numbers of one run: drag of the water, momentum of the ice that the body
-    meets, and their sum."""
+    """Rows of a hand calculation with the numbers of one run: water drag, momentum of the ice that the body meets, and
+    their sum."""
     e = run.summary.get("estimates") or {}
     width, speed = (e.get(k) if e.get(k) is not None else np.nan for k in ("width_m", "water_speed_m_s"))
     draft, form, water = (run.value(k) for k in ("body.draft", "body.drag.water_form", "water.density"))
@@ -129,7 +129,7 @@ def by_hand(run):
 
 
 def check(run, estimates):
-    """Blocks of the independent check. run: first field of the condition that governs, or None; estimates: rows of
+    """Blocks of the independent check. run: first field of the governing condition, or None; estimates: rows of
     reporting/run.py."""
     if run is None:
         return [lines("No member can be read.")]
@@ -153,7 +153,7 @@ def evidence():
 
 
 def sources(values, estimates):
-    """Blocks of references, symbols and standards. values: of the case with their origin."""
+    """Blocks of references, symbols and standards. values: those of the case with their origin."""
     found = {}
     for v in values:
         if v.kind == "source":
@@ -172,6 +172,6 @@ def sources(values, estimates):
 
 
 def answer_beside(folder):
-    """answer.json of bergtow design; None where there is none."""
+    """answer.json of bergtow design; None if there is none."""
     found = findings.read("answer", folder)
     return found if isinstance(found, dict) and "sentence" in found else None

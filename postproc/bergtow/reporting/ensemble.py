@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The contents of the report of an ensemble: the tables of bergtow statistics, the pictures of bergtow plot-ensemble,
-and every member with its doubts.
+"""The contents of an ensemble's report: the tables of bergtow statistics, the pictures of bergtow plot-ensemble, and
+every member with its doubts.
 
-The tables come from text/ensemble.py, so that the page, the terminal and the README of a study say the same.
+The tables come from text/ensemble.py, so that the page, the terminal and the README of a study agree.
 """
 import argparse
 import os
@@ -31,25 +31,25 @@ from bergtow.text import loads as loads_text
 
 import numpy as np
 
-#: keys that no result follows from
 TONNE_FORCE = 9806.65  # N
+#: keys that do not affect any result
 PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
-#: keys of the computation, not of the tow: their origin stands in the appendix, what they change under convergence
+#: keys of the numerical method, not of the tow: the appendix gives their origin, and convergence their effect
 NUMERICAL = ("solver.", "run.", "impact.", "estimate.", "ice.seed", "ice.shake", "body.x", "body.y")
-#: keys that decide the force, and stand among the assumptions wherever their values are from
+#: keys that govern the force; they are listed among the assumptions wherever their values come from
 DECIDE = ("ice.size", "tow.speed", "body.drag.water_form", "water.current_x", "water.current_y", "air.wind_x",
           "air.wind_y")
 STATUS = {FINISHED: "finished", FAILED: "failed"}
 
 
 def unbroken(text):
-    """With a percent sign that stays on the line of its number."""
+    """The text with percent signs kept on the line of their numbers."""
     return text.replace(" %", "\u00a0%")
 
 
 def blocks(parts):
-    """Parts of bergtow/table.py as blocks of a page: {"kind": "table", "head", "rows"}, with the column to the left
-    whose equal cells are one, and {"kind": "text", "lines", "warnings"} of lines that follow each other."""
+    """Convert parts of bergtow/table.py to blocks of a page: {"kind": "table", "head", "rows"}, with the left column
+    whose equal cells are merged, and {"kind": "text", "lines", "warnings"} for consecutive lines."""
     out = []
     for part in parts:
         if isinstance(part, text_table.Table):
@@ -64,8 +64,8 @@ def blocks(parts):
     return out
 
 
-MARGIN = 1.05  # times the largest value simulated: a lower design value leaves little room for loads not seen
-#: marks behind a design value, and their footnotes
+MARGIN = 1.05  # times the largest simulated value: a lower design value leaves little room for unseen loads
+#: marks after a design value, and their footnotes
 FOOTNOTES = {
     "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
     "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few, or farther apart "
@@ -75,13 +75,13 @@ FOOTNOTES = {
 
 
 def marks(d):
-    """Those of FOOTNOTES that a design value carries."""
+    """The marks of FOOTNOTES that apply to a design value."""
     carried = {"*": d["beyond_data"], "†": d["model"] == "GEV", "‡": d["value"] < MARGIN * d["largest"]}
     return "".join(mark for mark, there in carried.items() if there)
 
 
 def design_row(c):
-    """Cells of a condition in the answer."""
+    """Cells of a condition in the answer's table."""
     tow, tension = c["design"]["tow"], c["design"]["tension"]
     if tow is None:
         return [unbroken(c["label"]), "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
@@ -96,9 +96,9 @@ def design_row(c):
 
 
 def answer(e, s, cases, results, told=None):
-    """Blocks of the first chapter: the statement, the table, the figure where there is more than one condition, line
-    and vessel, what it holds for. cases: those of statement.cases(); results: those of other commands, as
-    results_beside() has them; told: answer.json of bergtow design, which knows vessel, line and ranges."""
+    """Blocks of the first chapter: the statement, the table, the figure if there is more than one condition, line and
+    vessel, the scope. cases: from statement.cases(); results: of other commands, from results_beside(); told:
+    answer.json of bergtow design, which has vessel, line and ranges."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
             "largest simulated", "in the start", "fields", "hours"]
@@ -129,14 +129,14 @@ def answer(e, s, cases, results, told=None):
 
 
 def governing(s):
-    """The condition with the largest design value in a sentence, also in tonnes-force, the unit of vessel ratings."""
+    """A sentence with the condition of the largest design value, also in tonnes-force, the unit of vessel ratings."""
     some = [c for c in s["conditions"] if c["design"]["tow"] and "value" in c["design"]["tow"]]
     if not some:
         return "No condition has a design tow force."
     c = max(some, key=lambda c: c["design"]["tow"]["value"])
     d = c["design"]["tow"]
     def both(x, least=-np.inf):
-        """A force and the same number in tonnes-force."""
+        """A force, followed by its value in tonnes-force."""
         x = text_table.designed(x, least)
         return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
             "without bound"
@@ -150,7 +150,7 @@ def governing(s):
 
 
 def without_value(s, value):
-    """A sentence on the conditions that have no design tow force, "" where all have one."""
+    """A sentence on the conditions that have no design tow force; "" if all have one."""
     rest = [c for c in s["conditions"] if not (c["design"]["tow"] and "value" in c["design"]["tow"])]
     if not rest:
         return ""
@@ -162,7 +162,7 @@ def without_value(s, value):
 
 
 def kind_of(warning):
-    """The code of a warning with the names among its values, of keys or series: its numbers make no other kind."""
+    """The code of a warning with any names (of keys, series) among its values; numbers do not distinguish kinds."""
     return " ".join([warning["code"], *(v for v in warning["values"].values() if isinstance(v, str))])
 
 
@@ -186,7 +186,7 @@ def members(e, s):
 
 
 def by_condition(s):
-    """Blocks of a table with a row for each condition, in place of one for each of its members."""
+    """Blocks of a table with one row per condition, instead of one per member."""
     rows = []
     for c in s["conditions"]:
         r, m = c["resistance"], c["members"]
@@ -198,7 +198,7 @@ def by_condition(s):
 
 
 def kinds_of_warnings(some):
-    """Warnings of one kind as one, in the words of the first with the number of members: rows of members()."""
+    """Merge warnings of one kind, with the words of the first and the number of members: from the rows of members()."""
     found = {}
     for row in some:
         for kind, text in reversed(row["kinds"].items()):
@@ -207,7 +207,7 @@ def kinds_of_warnings(some):
 
 
 def study_text(e):
-    """The study as it was given, or as the file has it."""
+    """The study as the user wrote it, or else as ensemble.h5 holds it."""
     try:
         return (e.path / "study.yml").read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
@@ -215,7 +215,7 @@ def study_text(e):
 
 
 def provenance(e):
-    """Rows of the first member that can be read."""
+    """Rows for the first member that can be read."""
     for m in np.flatnonzero(e.status == FINISHED):
         try:
             with Run(e.folder(m)) as run:
@@ -227,7 +227,7 @@ def provenance(e):
 
 
 def caption(name):
-    """Words for a picture of bergtow plot-ensemble by its name, "sweep-ice-concentration"."""
+    """Caption for a picture of bergtow plot-ensemble by its name, "sweep-ice-concentration"."""
     if name.startswith("sweep-"):
         return "Mean ice resistance against " + short_key(name[6:].replace("-", ".", 1))
     if name.startswith("above-"):
@@ -241,12 +241,12 @@ def caption(name):
 
 
 def pictures(e, options, s):
-    """{name: picture} of those of bergtow plot-ensemble that the study supports."""
+    """{name: picture} for the pictures of bergtow plot-ensemble that the study allows."""
     drawn = plot_ensemble.pictures(e, options, s["conditions"])
     return {name: p for name, p in ((name, report_run.picture(name, caption(name), draw)) for name, draw in drawn) if p}
 
 
-#: chapters of the tables of text/ensemble.py: heading, tables, beginnings of the names of the pictures behind each
+#: chapters for the tables of text/ensemble.py: heading, tables, name prefixes of the pictures after each
 CHAPTERS = (("Loads", (("Loads", ()), ("Quantiles of loads", ("above", )), ("Return levels of loads", ("returns", )),
                        ("Peaks of collisions", ("exceedance", )))),
             ("Mean ice resistance",
@@ -268,13 +268,13 @@ def parts(found, drawn):
 
 
 def of_part(name, part):
-    """(heading, blocks) of a chapter of study/analysis.py."""
+    """(heading, blocks) for a chapter of study/analysis.py."""
     figure = part.get("figure")
     drawn = report_run.picture(name, part["heading"], figure) if figure else None
     return part["heading"], blocks(part["parts"]) + ([drawn] if drawn else [])
 
 
-#: text in place of a chapter that has not been made
+#: text that replaces a chapter without results
 NOT_STUDIED = {
     "converge": "Not studied: whether the result depends on width and length of the domain, time step, tolerance and "
                 "start is not known. bergtow converge CASE.yml examines it.",
@@ -284,22 +284,22 @@ NOT_STUDIED = {
 
 
 def doubt(name, found, folder, texts):
-    """Why the result of a command does not belong to these members (texts: compared.cases of them), or no longer to the
-    ensemble in its folder; "" if it does."""
+    """Why the result of a command does not belong to these members (texts: compared.cases of them), or no longer
+    belongs to the ensemble in its folder; "" if it does."""
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
     if name == "converge" and (at := compared.alone(found, texts)):
         return f"studied at {at} alone: of the other tows of this report it says nothing"
     try:
         why = compared.stale(found, Members(folder)) if name == "budget" else ""
-    except RunError:  # the folder holds the result alone
+    except RunError:  # the folder holds only the result
         return ""
     return f"out of date, {why}: call bergtow budget again" if why else ""
 
 
 def results_beside(e, also):
-    """{name: result of a command of study/analysis.py, with "doubt"}, from the first folder that has it: that of the
-    ensemble, then those of `also`."""
+    """{name: result of a command of study/analysis.py, with "doubt"}, from the first folder that contains it: that of
+    the ensemble, then those of `also`."""
     texts, out = compared.cases(e), {}
     for name in analysis.KINDS:
         for folder in (e.path, *also):
@@ -311,7 +311,7 @@ def results_beside(e, also):
 
 
 def beside(results, told=None):
-    """Chapters of the results of other commands; convergence and budget are named even where nothing was studied."""
+    """Chapters for the results of other commands; convergence and budget are mentioned even if neither was studied."""
     out = []
     for name, (heading, _) in analysis.KINDS.items():
         if name in results:
@@ -322,7 +322,7 @@ def beside(results, told=None):
 
 
 def first_runs(e, s):
-    """[(condition of the statistics, its values with their origin, the case as key: text, attributes)] of the first
+    """[(condition of the statistics, its values with their origin, the case as {key: text}, attributes)] for the first
     member of each condition that can be read."""
     out = []
     for c, of in zip(s["conditions"], e.conditions()):
@@ -337,7 +337,7 @@ def first_runs(e, s):
 
 
 def varied(e, runs):
-    """Values of all conditions, those of first_runs(); of a parameter its range, of what else differs between
+    """Values of all conditions, from first_runs(): for a parameter its range; for anything else that differs between
     conditions, each value and each origin with its conditions."""
     words = {"ice.seed": "varied", "run.title": "that of the study, with condition and field"}
     for key, some in e.parameters.items():
@@ -356,8 +356,8 @@ def varied(e, runs):
 
 
 def ranges(results, told):
-    """{key: (range, its source)} of the values that the uncertainty budget varied, or that the answer of bergtow design
-    has; there a separate table has the sources."""
+    """{key: (range, its source)} for the values that the uncertainty budget varied, or for the ranges of bergtow
+    design, whose sources are in a separate table."""
     out = {r["key"]: (f"{r['low']} to {r['high']}", "") for r in (told or {}).get("assumed", [])}
     for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"
@@ -365,7 +365,7 @@ def ranges(results, told):
 
 
 def of_answer(found):
-    """(sentence, [(heading, blocks)]) of the answer of bergtow design; ("", []) without one."""
+    """(sentence, [(heading, blocks)]) from the answer of bergtow design; ("", []) without one."""
     if found is None:
         return "", []
     from bergtow.text import answer as answer_text
@@ -378,7 +378,7 @@ def governs(s):
 
 
 def independent_check(e, s):
-    """(blocks of the check, rows of the estimates) of the first field of the condition that governs."""
+    """(blocks of the check, rows of the estimates) for the first field of the governing condition."""
     c = governs(s)
     rows = next(of.members for of in e.conditions() if of.index == c["index"])
     for m in rows[e.status[rows] == FINISHED]:
@@ -392,15 +392,15 @@ def independent_check(e, s):
 
 
 def replays(e, place):
-    """[(words, path from the page)] of the replays that are there."""
+    """[(words, path relative to the page)] for the replays that exist."""
     some = [e.path / "replay.html", *sorted(e.path.glob("members/*/report.html"))]
     return [(p.parent.name if p.name == "report.html" else "replay of one tow",
              os.path.relpath(p, place.parent)) for p in some if p.is_file()]
 
 
 def context(folder, place=None, given=None, also=()):
-    """Everything that page/ensemble.html sets. place: where the page is to stand; given: {client, ...} in place of
-    those of the case; also: further folders with the results of other scripts. Errors: RunError."""
+    """The template variables of page/ensemble.html. place: where the page will be written; given: {client, ...},
+    replaces the values of the case; also: further folders with results of other commands. Raises RunError."""
     e, options = Members(folder), argparse.Namespace(**OPTIONS)
     s = ensemble.statistics(e, options)
     if s["holes"]:
@@ -419,7 +419,7 @@ def context(folder, place=None, given=None, also=()):
     sentence, tables = of_answer(told)
     checked, estimates = independent_check(e, s)
     drawn = pictures(e, options, s)
-    if len(s["conditions"]) < 2:  # a chart of one point
+    if len(s["conditions"]) < 2:  # the chart would have a single point
         drawn = {name: p for name, p in drawn.items() if not name.startswith(("sweep", "map", "variants"))}
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How the numbers of a report were computed, and their limits: method, model and limits in words, each sentence chosen
-by the simulated cases."""
+"""How the numbers of a report were computed, and their limits: method, model and limits in words. The simulated cases
+determine each sentence."""
 import numpy as np
 
 from bergtow.result import compared
@@ -24,7 +24,7 @@ def _span(values, text=lambda v: f"{v:.3g}"):
 
 
 def _fields(s, cases):
-    """Of which ice the tows are, "" where some read it."""
+    """The ice fields of the tows, in words; "" if some read theirs from a file."""
     if any(source_of_ice(case.texts) for _, case in cases):
         return ""
     seeds = {m["seed"] for m in s["members"]}
@@ -78,13 +78,13 @@ def method(s, cases):
 
 
 def _span_of(cases, key):
-    """"10", or "5 to 17": the values above zero that a key has in these cases."""
+    """"10", or "5 to 17": the range of positive values of a key in these cases."""
     values = {case_value(case.texts, key, 0.0): case.texts.get(key, "") for _, case in cases}
     return _span([v for v in values if v > 0] or [0.0], lambda v: values.get(v, "0"))
 
 
 def _ice(case, toughness, kappa, pressure):
-    """What floes do; toughness, kappa, pressure: of all cases, so that those of another value are no other sentence."""
+    """How floes behave. toughness, kappa, pressure: spans over all cases, so that one sentence covers them."""
     splits, rafts, crushes = (case_value(case.texts, key, 0.0) > 0 for key in KEYS)
     here = ", and here they are dense enough to jam." if case.jams else "."
     if case.rigid and not splits:
@@ -124,8 +124,8 @@ def _vessel(case):
 
 
 def limits(cases, vessel=False):
-    """Sentences on the limits of the model, the gravest first; a limit that does not hold for all cases names its
-    conditions. cases: those of statement.cases(); vessel: is a vessel judged?"""
+    """Sentences on the limits of the model, most serious first; a limit that does not apply to all cases names its
+    conditions. cases: from statement.cases(); vessel: is a vessel assessed?"""
     out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if not cases:
@@ -162,7 +162,7 @@ def _pull(case):
 
 
 def holds(cases):
-    """Rows (what, value) on the line and the vessel, for the answer; cases: those of statement.cases()."""
+    """Rows (what, value) on the line and the vessel, for the answer; cases: from statement.cases()."""
     if not cases:
         return []
     def row(what, say):
@@ -178,7 +178,7 @@ def holds(cases):
 
 
 def _limit(found, c):
-    """Where the limit of a condition lies, with what keeps it from being resolved."""
+    """The limit of a condition, and what keeps it from being resolved."""
     ends = [capability_text.value(found, c[k]) for k in ("makes_it", "does_not") if c[k] is not None]
     if c["resolved"] and len(ends) < 2:
         return c["why"]
@@ -188,7 +188,7 @@ def _limit(found, c):
 
 
 def _capability(found):
-    """(what, value) of a capability.json, a row a condition."""
+    """(what, value) from a capability.json, one row per condition."""
     key = found["search"].rpartition(".")[2].replace("_", " ")
     for c in found["conditions"]:
         at = _limit(found, c) + (f" ({found['doubt']})" if found.get("doubt") else "")
@@ -200,9 +200,9 @@ def _capability(found):
 
 
 def _convergence(found, e):
-    """One line on converge.json for the values of the case: quantities that matter, that do not, that stayed open, and
-    that were compared at other values only. A quantity has one verdict: if the time step of the case is 2 s, that of 2
-    s against 1 s, and not that of 1 s against 0.5 s as well."""
+    """One line on converge.json for the values of the case: quantities that matter, that do not matter, that remained
+    open, and that were only compared at other values. A quantity has one verdict: if the time step of the case is 2 s,
+    it is that of 2 s against 1 s, and not also that of 1 s against 0.5 s."""
     texts = compared.cases(e)
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
@@ -216,7 +216,7 @@ def _convergence(found, e):
 
 
 def beyond(results, e):
-    """Rows (what, value) of the results of other commands, for the answer; results: {name: found}. e: Ensemble."""
+    """Rows (what, value) from the results of other commands, for the answer; results: {name: found}. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(

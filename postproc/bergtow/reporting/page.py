@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The report of a run, or of an ensemble, as one HTML page that needs nothing else: numbers, pictures, replay of the
-ice field, provenance.
+"""The report of a run or an ensemble as one self-contained HTML page: numbers, pictures, replay of the ice field,
+provenance.
 
-The page loads nothing: styles, script, pictures and data stand in it, and its content security policy forbids all else,
-so that it can be mailed, archived and opened offline. Text from case files is escaped by the template engine.
+The page loads nothing: styles, script, pictures and data are embedded, and its content security policy forbids all
+else. So it can be mailed, archived and opened offline. The template engine escapes text from case files.
 """
 import base64
 import hashlib
@@ -25,11 +25,11 @@ import jinja2
 PAGE = Path(__file__).resolve().parent / "page"
 #: columns of members.csv
 MEMBER = "name", "condition", "seed", "status", "mean_ice_resistance_n", "low_95_n", "high_95_n", "doubts"
-MOST_OF_TITLE = 80  #: letters in the running head
+MOST_OF_TITLE = 80  #: characters in the running head
 
 
 def templates():
-    """The template engine; a name that is missing in the context is an error, not an empty text."""
+    """The template engine. A name that is missing from the context is an error, not an empty text."""
     engine = jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE), autoescape=True,
                                 undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     engine.filters["by_name"] = by_name
@@ -37,7 +37,7 @@ def templates():
 
 
 def by_name(rows):
-    """[(first cell, rows)] of a table, where a first cell that is empty or repeated belongs to the row above."""
+    """[(first cell, rows)] of a table; a row whose first cell is empty or repeated belongs to the row above."""
     out = []
     for row in rows:
         if not out or row[0] not in ("", out[-1][0]):
@@ -47,20 +47,20 @@ def by_name(rows):
 
 
 def script():
-    """The replay's script, as one function."""
+    """The replay's script, wrapped in one function."""
     parts = [(PAGE / name).read_text(encoding="utf-8") for name in ("replay.js", "raster.js", "replay_controls.js")]
     return "(() => {\n" + "\n".join(parts) + "})();\n"
 
 
 def policy(code):
-    """Content security policy: no network at all, the one script by its hash."""
+    """Content security policy: no network access, and only the one script, identified by its hash."""
     digest = base64.b64encode(hashlib.sha256(code.encode("utf-8")).digest()).decode("ascii")
     return (f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
             "base-uri 'none'; form-action 'none'")
 
 
 def quoted(text):
-    """A string of CSS: what is no plain letter is written by its number, so that it ends neither string nor style."""
+    """A CSS string. All but plain letters and digits are escaped, so that they end neither string nor style."""
     return '"' + "".join(c if c.isalnum() and c.isascii() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
 
 
@@ -125,10 +125,10 @@ def perform(a):
 
 
 def pages(folder, paths, given, also, size, compressed):
-    """({path: text}, members) of the report of a folder, as HTML or, for a PDF, as it is printed. Errors: RunError."""
-    # the second alone: it has only just begun
+    """({path: text}, members) for the report of a folder, as HTML or, for a PDF, in print layout. Raises RunError."""
+    # study.resolved.yml alone: the ensemble has only just begun
     if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
-        from bergtow.reporting import ensemble as report_ensemble  # not for a run: it loads the statistics
+        from bergtow.reporting import ensemble as report_ensemble  # not needed for a run: it loads the statistics
         analysis.also(also)
         template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, also)
     else:
@@ -146,8 +146,8 @@ def is_pdf(path):
 
 
 def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True, force=False):
-    """The report of a folder in one or more files. given: {name: text or None} of the title block; also: folders of
-    analyses; size: MB of the replay's data. Errors: RunError."""
+    """Write the report of a folder to one or more files. given: {name: text or None} for the title block; also: folders
+    with analyses; size: MB of the replay's data. Raises RunError."""
     given = dict.fromkeys(TITLE_BLOCK) | (given or {})
     with progress.doing(paths[0].name):
         made, members = pages(folder, paths, given, also, size, compressed)
@@ -155,7 +155,7 @@ def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True,
         if is_pdf(path):
             with progress.doing(path.name):
                 pdf.write(text, path, force)
-            if members:  # on paper a condition has one row
+            if members:  # on paper a condition has only one row
                 writing.write_csv([{k: m[k] for k in MEMBER} for m in members], path.with_name("members.csv"), force)
         else:
             writing.write_text(text, path, force)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A page as PDF, by headless Chromium.
+"""A page as PDF, through headless Chromium.
 
-WeasyPrint 57 (Debian 12) was tried on the same pages: the same number of pages, heads and page numbers, a tenth of the
-size; but it took four times as long, knows no variables in SVG (figures were black) and no tags, by which a reader
-for the blind finds its way. Chromium is needed for the tests anyway. Page numbers and running heads are boxes in the
-margin of the page, which Chromium has from version 131 on.
+WeasyPrint 57 (Debian 12) was tried on the same pages. It made the same number of pages, heads and page numbers in files
+a tenth of the size. But it took four times as long, does not support variables in SVG (figures were black) and writes
+no tags, which screen readers need. Chromium is needed for the tests anyway. Page numbers and running heads are boxes in
+the page margin, which Chromium supports from version 131.
 """
 import os
 import re
@@ -23,7 +23,7 @@ INSTEAD = "or write a .html and print it from a browser"
 
 
 def browser():
-    """Path of a Chromium that will do. Errors: RunError."""
+    """Path of a suitable Chromium. Raises RunError."""
     path = next(filter(None, map(shutil.which, NAMES)), None)
     if path is None:
         raise RunError("chromium", "not installed, and a PDF is made by it", f"apt-get install chromium, {INSTEAD}")
@@ -36,7 +36,7 @@ def browser():
 
 
 def write(html, path, force):
-    """Write the page as PDF. Errors: RunError."""
+    """Write the page as PDF. Raises RunError."""
     program = browser()
     with writing.written(path, force) as new, tempfile.TemporaryDirectory() as folder:
         page, made = Path(folder) / "page.html", Path(folder) / "page.pdf"
@@ -44,7 +44,7 @@ def write(html, path, force):
         call = [program, "--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--disable-extensions",
                 "--disable-background-networking", "--no-first-run", "--no-pdf-header-footer",
                 f"--user-data-dir={folder}/profile", f"--print-to-pdf={made}", page.as_uri()]
-        if os.geteuid() == 0:  # its sandbox does not run as root; the page is our own, and may load nothing
+        if os.geteuid() == 0:  # its sandbox does not run as root; the page is ours, and may not load anything
             call.insert(1, "--no-sandbox")
         try:
             done = subprocess.run(call, capture_output=True, text=True, timeout=PATIENCE)
@@ -53,5 +53,5 @@ def write(html, path, force):
         if done.returncode or not made.exists():
             said = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
             raise RunError(program, f"made no PDF ({said})", INSTEAD[3:])
-        # a comment behind the end of the file, which readers skip
+        # a comment after the end-of-file mark, which readers ignore
         new.write_bytes(made.read_bytes() + f"\n%{writing.MARK}\n".encode())

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The frames of a run as the data of the replay in its report: chosen, rounded, packed.
+"""The frames of a run as data for the replay in its report: selected, rounded, packed.
 
-Positions, yaw, speed and contact force of the floes are kept as 16-bit numbers:
+Positions, yaw, speed and contact force of the floes are stored as 16-bit numbers:
     x = low + step q          step: 1/65535 of the range (1/65536 of the period along a periodic direction)
     yaw = 2π q / 65536
     value = top (q / 65535)²  relative step 2 / q: fine where small, for speed and force
-Each is stored as the difference to the frame before, modulo 65536, low bytes first and high bytes after them, deflated,
-in base64: ice at rest costs next to nothing. postproc/page/replay.js undoes this.
+Each is stored as the difference from the previous frame, modulo 65536, low bytes first, then high bytes, deflated, in
+base64: ice at rest takes almost no space. postproc/page/replay.js decodes this.
 
 Rejected: 32-bit floats (twice the size, and five digits more than a screen shows); a film (no zoom, no values); images
 of floes as SVG (a hundred times the size).
@@ -21,17 +21,17 @@ from bergtow.plot import style
 from bergtow.plot.force import running_mean, smoothing
 from bergtow.plot.scene import Colouring, body_size, needs_window, tow_heading, tow_line, view_body
 
-#: bytes of the replay within the page, unless told otherwise: with outlines and pictures of much ice, 6 MB, a page of
-#: 15 MB, which can be mailed
+#: default size of the replay within the page, bytes: with outlines and pictures of much ice, 6 MB, the page has 15 MB
+#: and can be mailed
 LIMIT = 8e6
-RAW_LIMIT = 120e6       #: bytes unpacked, which a browser has to hold, and four times as much this program
-LEAST_FRAMES = 40      #: fewer are not worth a replay: rather are floes left out
+RAW_LIMIT = 120e6       #: unpacked bytes that a browser must hold; this program needs four times as much
+LEAST_FRAMES = 40      #: fewer frames do not make a replay; floes are left out instead
 BUCKETS = 1500         #: points of a force curve
 TRACK = 1000           #: points of the body's track
 
 
 def pack(array, compress=True):
-    """Base64 text of an array's little-endian bytes, deflated or not."""
+    """Base64 text of an array's little-endian bytes, optionally deflated."""
     raw = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<"), copy=False).tobytes()
     return base64.b64encode(zlib.compress(raw, 6) if compress else raw).decode("ascii")
 
@@ -43,16 +43,16 @@ def pack_frames(q, compress=True):
 
 
 def thinned(n, most):
-    """Indices of at most `most` of n frames, evenly spread, the first and the last among them."""
+    """Indices of at most `most` of n frames, evenly spaced, including the first and the last."""
     if n <= most:
         return np.arange(n)
     return np.unique(np.rint(np.linspace(0, n - 1, max(int(most), 2))).astype(int))
 
 
 def read_frames(run, frames, floes):
-    """(x, y, yaw, speed, force), each [T, N], of some floes in some frames; positions wrapped into the domain. And
-    lives [N, 2]: the first frame, as an index into frames, that has the floe, and the first one after it without the
-    floe. In frames without it a floe has the numbers of the nearest frame with it."""
+    """(x, y, yaw, speed, force), each [T, N], of some floes in some frames, with positions wrapped into the domain.
+    Also lives [N, 2]: as indices into frames, the first frame that contains the floe, and the first one after it that
+    does not. In frames without it a floe has the numbers of the nearest frame that contains it."""
     out = np.empty((5, len(frames), len(floes)))
     lives = np.tile([0, len(frames)], (len(floes), 1))
     for k, frame in enumerate(frames):
@@ -74,7 +74,7 @@ def read_frames(run, frames, floes):
 
 
 def quantise(x, low, high, period):
-    """(q uint16, low, step): x = low + step q. Over a period the last number is followed by the first."""
+    """(q uint16, low, step): x = low + step q. With a period, the number after the last is the first."""
     levels = 65536 if period else 65535
     step = (high - low) / levels or 1.0
     return (np.rint((x - low) / step).astype(np.int64) % 65536).astype(np.uint16), low, step
@@ -87,8 +87,8 @@ def quantise_root(x):
 
 
 def nearest_floes(run, frames, n):
-    """Ids of the n floes that come nearest to the towed body in some frames (without one: of the n largest), in
-    order."""
+    """Ids, in order, of the n floes that come nearest to the towed body in some frames (without a towed body: of the n
+    largest)."""
     if run.towed is None:
         return np.sort(np.argsort(-run.area, kind="stable")[:n])
     least = np.full(run.n_floes, np.inf)
@@ -101,10 +101,8 @@ def nearest_floes(run, frames, n):
 class Replay:
     """The replay of a run.
 
-    head    dict for JSON: everything but the large arrays
-    blobs   {name: base64 text}
-    notes sentences on omissions and rounding
-    Errors: RunError.
+    head    dict for JSON: everything except the large arrays blobs   {name: base64 text} notes   sentences on omissions
+    and rounding Raises RunError.
     """
 
     def __init__(self, run, limit=LIMIT, compress=True):
@@ -133,7 +131,7 @@ class Replay:
         return sum(len(text) for text in self.blobs.values())
 
     def _fit(self, limit):
-        """Frames and floes that the limits leave room for; packs them."""
+        """Choose frames and floes that fit within the limits, and pack them."""
         run = self.run
         floes = np.arange(run.n_floes)
         room = RAW_LIMIT if self.compress else 0.75 * limit
@@ -200,7 +198,7 @@ class Replay:
         self.blobs["lives"] = pack(self.lives.astype(np.uint32), self.compress)
 
     def _colourings(self, frames):
-        """Quantities by which floes can be coloured: label, upper and lower limit in SI, power of the scale, 64
+        """Quantities that can colour the floes: label, upper and lower limit in SI units, power of the scale, 64
         colours; the same as in the pictures."""
         run, out = self.run, []
         kinds = [("speed", "speed"), ("force", "contact force")]
@@ -218,11 +216,11 @@ class Replay:
         return out
 
     def _samples(self, frames):
-        """Index of the sample of the series at each frame; -1 before the first."""
+        """Index of the series sample at each frame; -1 before the first."""
         return np.searchsorted(self.run["time"], self.run.frame_times[frames] * (1 + 1e-9), side="right") - 1
 
     def _unwrap(self, pose, frames):
-        """Poses [T, 3] of the towed body, wrapped in the file, to where series body_x and body_y have it; in place."""
+        """Unwrap, in place, poses [T, 3] of the towed body to agree with the series body_x and body_y."""
         run, sample = self.run, self._samples(frames)
         for axis, name in enumerate(("body_x", "body_y")):
             if run.period[axis] and name in run:
@@ -230,7 +228,7 @@ class Replay:
                 pose[:, axis] += run.period[axis] * np.round((at - pose[:, axis]) / run.period[axis])
 
     def _bodies(self, frames):
-        """Bodies that are no floes, their poses, and what belongs to the towed one."""
+        """Bodies other than floes, their poses, and data of the towed body."""
         run = self.run
         poses = np.array([run.body_pose(f) for f in frames])
         if run.towed is not None:
@@ -265,7 +263,7 @@ class Replay:
 
 
 def _digits(values):
-    """Numbers for JSON to six digits, None where there is none."""
+    """Numbers for JSON to six digits, None if not finite."""
     return [float(f"{v:.6g}") if np.isfinite(v) else None for v in values]
 
 

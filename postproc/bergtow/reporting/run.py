@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The contents of the report of one run: numbers in words, tables, pictures. reporting/page/run.html is its
-template."""
+"""The contents of a run's report: numbers in words, tables, pictures. Its template is reporting/page/run.html."""
 import re
 from dataclasses import replace
 
@@ -18,7 +17,7 @@ from bergtow.result.at_least import AtLeast
 
 import numpy as np
 
-#: keys that the page shows in the open; all others are in the folded table
+#: keys that the page shows directly; all others are in the collapsed table
 KEY_VALUES = {
     "Ice": [
         "ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law",
@@ -43,17 +42,17 @@ KEY_VALUES = {
         "impact.duration", "impact.pressure"
     ],
 }
-MOST_EVENTS = 40  #: of the table; a tow may have thousands of way-points
-UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
+MOST_EVENTS = 40  #: rows in the table; a tow may have thousands of waypoints
+UNSET = {"body.mass": "0 kg"}  #: values that mean "derived from other keys"
 
 
 def force(value):
-    """A force in words, a dash where there is none."""
+    """A force in words, a dash if there is none."""
     return style.quantity(value, "N") if value is not None and np.isfinite(value) else "–"
 
 
 def with_interval(mean, low, high):
-    """(mean, 95 % interval) of a force in words, to the digits that the interval leaves."""
+    """(mean, 95 % interval) of a force in words, with the digits that the interval justifies."""
     if np.isfinite([mean, low, high]).all() and 0 <= high - low < 2e-6 * abs(mean):
         return force(mean), "no scatter" if high > low else "–"
     return text_table.stated(mean, low, high, "N")
@@ -65,8 +64,8 @@ def share(value):
 
 
 def picture(name, title, draw):
-    """A figure as {"kind", "name", "title", "svg"}; {"kind", "name", "title", "why"} where there is nothing to draw;
-    None where it says so itself."""
+    """A figure as {"kind", "name", "title", "svg"}; {"kind", "name", "title", "why"} if draw() raises RunError; None if
+    it returns None."""
     out = {"kind": "figure", "name": name, "title": title}
     with progress.doing(f"picture: {title}"):
         try:
@@ -77,7 +76,7 @@ def picture(name, title, draw):
 
 
 def pictures(run):
-    """The pictures that the scripts of postproc/ draw of a run."""
+    """The pictures of a run that the scripts of postproc/ draw."""
     out = [
         picture("field", "Ice field before, during and after", lambda: plot_field.draw(run)),
         picture("loaded", "Contact force on the floes", lambda: plot_field.draw(run, "force"))
@@ -101,13 +100,13 @@ def start_peak(run, key="start_peak_line_tension_n"):
 
 
 def ice_start_peak(run):
-    """The same of the ice resistance, where that is larger than any in the window."""
+    """The same for the ice resistance, if it exceeds all values in the window."""
     key = "window.series.ice_resistance.start_peak_n"
     return start_peak(run, key) if run.number(key) > run.number("peak_ice_resistance_n") else ""
 
 
 def figures(run):
-    """The few numbers at the head of the page: (label, number, text below it)."""
+    """The few numbers at the top of the page: (label, number, text below it)."""
     if run.towed is None:
         return []
     n = run.number
@@ -137,7 +136,7 @@ def figures(run):
 
 
 def forces(run):
-    """Rows (quantity, value, interval, remark) of the window."""
+    """Rows (quantity, value, interval, remark) over the window."""
     if run.towed is None:
         return []
     n, rows = run.number, []
@@ -191,7 +190,7 @@ def estimates(run):
 
 
 def impacts(run):
-    """Collisions with the body: {"conversion", "rows", "exceedance"}, None where they were not told apart."""
+    """Collisions with the body: {"conversion", "rows", "exceedance"}, None if they were not recorded separately."""
     i = run.summary.get("impacts")
     if not isinstance(i, dict):
         return None
@@ -225,7 +224,7 @@ def impacts(run):
 
 
 def quality(run):
-    """Rows (what, value, remark) on how far the numbers can be trusted: window, balances, solver."""
+    """Rows (what, value, remark) that show how reliable the numbers are: window, balances, solver."""
     n, rows = run.number, []
     if run.window:
         rule = {"given": "begin given in the case",
@@ -281,9 +280,9 @@ def quality(run):
 
 
 def events(run):
-    """(rows of what happened, how many there were in all)."""
+    """(rows of events, their total number)."""
     units = {"line_broken": "N", "adrift": "m/s", "waypoint": "m"}
-    some = sorted(run.events, key=lambda e: e["kind"] == "waypoint")[:MOST_EVENTS]  # a line that broke before corners
+    some = sorted(run.events, key=lambda e: e["kind"] == "waypoint")[:MOST_EVENTS]  # a broken line comes before corners
     rows = [(f"{e['time_s']:g} s", e["kind"].replace("_", " "), str(e["subject"]),
              f"{style.short(e['value'])} {units.get(e['kind'], '')}".strip() if e["value"] is not None else "")
             for e in sorted(some, key=lambda e: e["time_s"])]
@@ -291,7 +290,7 @@ def events(run):
 
 
 def provenance(run):
-    """Rows (what, value) of how the run came about."""
+    """Rows (what, value) on how the run was made."""
     a = run.attributes
     rows = [("program",
              f"{a.get('program', 'bergtow')} {a.get('version', '')}, revision {a.get('revision', 'unknown')}"),
@@ -304,7 +303,7 @@ def provenance(run):
 
 
 def stamp(run):
-    """One line that tells this run from every other."""
+    """One line that identifies this run uniquely."""
     a = run.attributes
     return (f"bergtow {a.get('version', '')} (revision {a.get('revision', 'unknown')}), "
             f"started {a.get('start_time', 'at an unknown time')}, "
@@ -312,7 +311,7 @@ def stamp(run):
 
 
 def key_values(run, values):
-    """{heading: [Value]}: the values that tell one run from another."""
+    """{heading: [Value]}: the values that distinguish runs."""
     by_key, out = {v.key: v for v in values}, {}
     for heading, keys in KEY_VALUES.items():
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
@@ -325,12 +324,12 @@ def key_values(run, values):
 
 
 def breakable(text):
-    """A title in one line."""
+    """A title on one line."""
     return re.sub(r"\s+", " ", str(text)).strip()
 
 
 def context(run, limit=LIMIT, compress=True, given=None):
-    """Everything that page/run.html sets. Errors: RunError."""
+    """The template variables of page/run.html. Raises RunError."""
     values = [replace(v, value=report_case.short(v.value)) for v in report_case.values(run)]
     with progress.doing(f"replay of {run.n_frames} frames"):
         replay = Replay(run, limit, compress) if run.n_frames else None

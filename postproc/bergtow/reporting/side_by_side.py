@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One page with the reports of two runs beside each other, each with its replay; it needs nothing else."""
+"""One self-contained page with the reports of two runs side by side, each with its replay."""
 from html import escape
 from pathlib import Path
 
@@ -16,7 +16,7 @@ iframe { width: 100%; height: 88vh; border: 1px solid #dfe5ea; } img { max-width
 
 def write(title, words, picture, runs, path, force, size=8.0):
     """words: text below the title; picture: PNG as base64, or ""; runs: [(heading, folder)]; size: MB of each replay.
-    Errors: RunError."""
+    Raises RunError."""
     given = dict.fromkeys(TITLE_BLOCK)
     sections = []
     for heading, folder in runs:

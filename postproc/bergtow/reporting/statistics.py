@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The command statistics: the tables of an ensemble, printed; statistics.csv (a row a condition) and statistics.json
-(everything) go into its folder.
+"""The command statistics: print the tables of an ensemble, and write statistics.csv (one row per condition) and
+statistics.json (everything) to its folder.
 
-Where members of the study are in no number (they wait, failed, are not sound, or have no mean), all is written, they
-are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
+If members of the study are missing from the numbers (they wait, failed, are not sound, or have no mean), everything is
+written, they are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
 """
 from pathlib import Path
 
@@ -18,7 +18,7 @@ import numpy as np
 
 
 def load_columns(c, names):
-    """Columns of the loads; the unit ends their names, as in summary.json."""
+    """Columns of the loads; their names end with the unit, as in summary.json."""
     out = {}
     for name, units in names.items():
         x = c["loads"].get(name)
@@ -39,7 +39,7 @@ def load_columns(c, names):
 
 
 def csv_row(c, load_names):
-    """Flat columns of a condition; forces in N."""
+    """Columns of a condition, without nesting; forces in N."""
     r = c["resistance"]
     row = {
         "condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"],
@@ -63,7 +63,7 @@ def csv_row(c, load_names):
 
 
 def write(s, folder, force):
-    """statistics.json and statistics.csv in the folder. Errors: RunError."""
+    """Write statistics.json and statistics.csv to the folder. Raises RunError."""
     names = {name: x["units"] for c in s["conditions"] for name, x in c["loads"].items()}
     writing.write_json(s, folder / "statistics.json", force)
     writing.write_csv([csv_row(c, names) for c in s["conditions"]], folder / "statistics.csv", force)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What runs and ensembles have left: the one reader of their files, and what follows from these alone."""
+"""Results of runs and ensembles: the only reader of their files, and quantities derived from the files alone."""

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Loads with a known lower bound only, since some of their steps have no solution: numbers that print as "at least".
+"""Loads with only a lower bound, because some of their steps have no solution: numbers that print as "at least".
 
-In such a step the load has no bound (docs/theory.md, locked bodies). The last load before it stands in its place, so
-a mean, a peak, a quantile or a share of the time above a level is a lower bound. It has no interval, since nothing
-bounds it from above, and what measures scatter is no number.
+In such a step the load has no bound (docs/theory.md, locked bodies). The last load before it takes its place, so a
+mean, a peak, a quantile or a share of time above a level is a lower bound. It has no interval, because it has no upper
+bound, and measures of scatter are undefined.
 
-Every page takes its numbers from the summary of a run or from the statistics of a condition. There, once, the loads
-become AtLeast, and whatever formats one of them prints the two words. Rejected: a mark that each page sets by itself,
-which the next page forgets.
+Every page takes its numbers from the summary of a run or from the statistics of a condition. The loads become AtLeast
+there, in one place, and any function that formats one prints the two words. Rejected: a mark that each page sets
+itself, and that the next page forgets.
 """
 import re
 
 import numpy as np
 
-#: numbers of summary.json by path: the loads of ice, the numbers compared with them, and the measures of their scatter
+#: numbers of summary.json by path: the ice loads, the numbers compared with them, and the measures of their scatter
 LOADS = re.compile(r"(mean|p95|p99|peak)_ice_resistance_n|window\.series\.ice_resistance\.(mean|peak|start_peak)_n|"
                    r"window\.series\.ice_resistance\.quarters_n\.|"
                    r"impacts\..*_n|reference\.ratio|estimates\..*\.simulated_over_estimate")
@@ -25,7 +25,7 @@ NONE = (np.nan, np.nan)  # no interval
 
 
 class AtLeast(float):
-    """A number that is at least this; share: of the steps behind it whose load has no bound, NaN where not known."""
+    """A number that is a lower bound; share: of its steps whose load has no bound, NaN if unknown."""
 
     def __new__(cls, value, share=np.nan):
         number = super().__new__(cls, value)
@@ -45,23 +45,23 @@ class AtLeast(float):
 
 
 def of(value, some):
-    """A mean of some numbers, or their largest: at least that where one of them is a lower bound."""
+    """The mean or the largest of some numbers: a lower bound if one of them is."""
     shares = [x.share for x in some if isinstance(x, AtLeast)]
     return AtLeast(value, sum(shares) / len(some)) if shares else value
 
 
-#: code of the failure of a run that guard.no_solution ended
+#: failure code of a run that guard.no_solution ended
 ENDED = "no_solution"
 
 
 def words(share):
-    """The note for such numbers, once a page."""
+    """The note on such numbers, once per page."""
     return f"in {100 * share:.2g} % of the steps the load has no bound"
 
 
 def summary(found):
-    """A summary.json as it is read: in a window with steps whose load has no bound its loads are AtLeast, and scatter
-    is None. The tow force is a load of the ice where the speed is prescribed; on a line the line bounds it."""
+    """Mark a summary.json: if the window has steps whose load has no bound, its loads become AtLeast and scatter None.
+    The tow force counts as an ice load if the speed is prescribed; in a tow on a line, the line bounds it."""
     window = found.get("window")
     share = (window if isinstance(window, dict) else {}).get("no_load_share")
     if not isinstance(share, float) or not share > 0:
@@ -113,8 +113,8 @@ def _panels(p, share):
 
 
 def condition(c, why, share, bounded):
-    """The statistics of a condition as lower bounds: those of its loads but `bounded`, names of those that a line
-    bounds. why: the reason given in place of a tail."""
+    """The statistics of a condition as lower bounds, except those of `bounded`, the loads that a line bounds. why: the
+    reason given instead of a tail."""
     refused = {"refused": why}
     extremes = c["extremes"] if "refused" in c["extremes"] else c["extremes"] | {
         "collisions_per_hour": _number(c["extremes"]["collisions_per_hour"], share),

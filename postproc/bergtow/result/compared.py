@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Use converge.json for another study: only its rows for the values that this study runs with, and not for the other
+"""Apply converge.json to another study: use only its rows for the values that the study runs with, not those for other
 values that were tried.
 
 A row compares one value of a quantity with the next, its `from` with its `to`, and the next row begins where it ends.
@@ -13,18 +13,18 @@ from bergtow.errors import RunError
 from bergtow.result.members import FINISHED
 from bergtow.result.run import Run, case_value
 
-#: {quantity of bergtow converge: the key that is its value}
+#: {quantity of bergtow converge: its key}
 KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length", "dt": "run.dt",
         "tolerance": "solver.tolerance", "window": "output.window_start"}
-WINDOW = 0.01  # of its length: ends of a window fall on steps
-#: what makes another case of it; not where the domain lies, which goes with its size
+WINDOW = 0.01  # relative to its length: ends of a window fall on steps
+#: keys that make a different case; not the position of the domain, which changes with its size
 PHYSICAL = ("ice.", "body.", "tow.", "water.", "air.", "lead.", "domain.ends", "domain.sides", "domain.wall_")
 PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "ice.extent.x_min",
           "ice.extent.x_max", "ice.extent.y_min", "ice.extent.y_max", "body.x", "body.y", "tow.ramp")
 
 
 def cases(e):
-    """[{key: text}] of the members of an ensemble that can be read."""
+    """[{key: text}] of those members of an ensemble that can be read."""
     out = []
     for m in e.used:
         try:
@@ -36,7 +36,7 @@ def cases(e):
 
 
 def _one(values, slack):
-    """The value that all have, None where they differ, or none is known."""
+    """The value common to all; None if they differ or none is known."""
     values = np.array(values, dtype=float)
     if not len(values) or not np.isfinite(values).all() or np.ptp(values) > slack * np.abs(values).max():
         return None
@@ -44,8 +44,8 @@ def _one(values, slack):
 
 
 def values(e, texts):
-    """{quantity: the value that all members have, None where they differ or it is not known}; of the window its two
-    ends, s, or None. texts: those of cases()."""
+    """{quantity: the value common to all members, None if they differ or it is unknown}; for the window its two ends,
+    s, or None. texts: from cases()."""
     out = {name: _one([case_value(text, key) for text in texts], 1e-9) for name, key in KEYS.items()}
     ends = [_one([e.number(f"window_{end}_s", m) for m in e.used], WINDOW) for end in ("start", "end")]
     return out | {"window": None if None in ends else tuple(ends)}
@@ -63,15 +63,15 @@ def _begins(row, value):
 
 
 def chain(rows, name, value):
-    """Rows of a quantity from this value on, [] where no row begins there. A row without values, where nothing could be
-    compared, speaks of the case whatever its value."""
+    """Rows of a quantity starting from this value; [] if no row begins there. A row without values, where nothing could
+    be compared, applies to the case whatever its value."""
     some = [row for row in rows if row["name"] == name]
     begin = next((k for k, row in enumerate(some) if _begins(row, value)), len(some))
     return some[begin:] or [row for row in some if "from" not in row]
 
 
 def verdicts(rows, own):
-    """{quantity that was compared: "matters", "none" or "open" at the study's own value, "elsewhere" where that was not
+    """{compared quantity: "matters", "none" or "open" at the study's own value, "elsewhere" if that value was not
     compared}."""
     out = {}
     for name in dict.fromkeys(row["name"] for row in rows if row["name"] in KEYS):
@@ -81,7 +81,7 @@ def verdicts(rows, own):
 
 
 def _differ(a, b):
-    """Are two values of a key different? Of files the names count, since folders move."""
+    """Are two values of a key different? For files only the names count, since folders move."""
     x, y = (case_value({"": text}, "") for text in (a, b))
     if np.isfinite([x, y]).all():
         return not np.isclose(x, y, rtol=1e-9, atol=1e-12)
@@ -89,8 +89,8 @@ def _differ(a, b):
 
 
 def unlike(a, b, but=()):
-    """(key, its text in a, in b) of what makes another case of b: keys that both have, `but` these. Where neither has a
-    lead, its extent, which follows from the tow, makes none."""
+    """(key, its text in a, in b) of differences that make b a different case: keys that both have, except `but`. If
+    neither has a lead, its extent, which follows from the tow, does not count."""
     physical = PHYSICAL
     if a.get("lead.mode") == b.get("lead.mode") == "none":
         physical = tuple(key for key in PHYSICAL if key != "lead.")
@@ -101,12 +101,12 @@ def unlike(a, b, but=()):
 
 
 def common(texts):
-    """{key: text} of what all these cases have alike."""
+    """{key: text} that all these cases have in common."""
     return {k: v for k, v in (texts[0] if texts else {}).items() if all(t.get(k) == v for t in texts)}
 
 
 def state(e):
-    """Of which study, and of how many members that had finished: {"study", "finished"}."""
+    """Identify the study, and the number of its finished members: {"study", "finished"}."""
     return {"study": hashlib.sha256(e.study.encode()).hexdigest(), "finished": int(np.sum(e.status == FINISHED))}
 
 
@@ -120,7 +120,7 @@ def stale(found, e):
 
 
 def _physical_values(found, texts):
-    """(key, its text in the result, its texts in the members' cases) of the keys that make another case."""
+    """(key, its text in the result, its texts in the members' cases) for the keys that make a different case."""
     for key, value in (found.get("values") or {}).items():
         some = list(dict.fromkeys(text[key] for text in texts if key in text))
         if some and key.startswith(PHYSICAL) and key not in PLACES:
@@ -128,7 +128,7 @@ def _physical_values(found, texts):
 
 
 def _among(value, some):
-    """Is a value one of these, or between the least and the largest of numbers?"""
+    """Is a value one of these, or between the least and the largest of them if they are numbers?"""
     numbers = np.array([case_value({"": text}, "") for text in some])
     x = case_value({"": value}, "")
     between = np.isfinite([x, *numbers]).all() and numbers.min() <= x <= numbers.max()
@@ -136,8 +136,8 @@ def _among(value, some):
 
 
 def misfit(found, texts):
-    """Why a result belongs to another case than the members (texts of cases()): a key of the ice, the body, the tow,
-    water or air has a value that none of them has. "" if it belongs to them, or does not name its case."""
+    """Why a result belongs to a different case than the members (texts of cases()): a key of the ice, the body, the
+    tow, water or air has a value that none of them has. "" if it belongs to them, or does not name its case."""
     for key, value, some in _physical_values(found, texts):
         if not _among(value, some):
             return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"
@@ -145,7 +145,7 @@ def misfit(found, texts):
 
 
 def alone(found, texts):
-    """The values of a result where the members have several: "ice.concentration 0.8"; "" if the members have no
+    """The values of a result for which the members have several: "ice.concentration 0.8"; "" if the members have no
     others."""
     return ", ".join(f"{key} {value}" for key, value, some in _physical_values(found, texts)
                      if any(_differ(value, text) for text in some))

@@ -5,7 +5,7 @@ from bergtow.result.run import Run
 
 
 def entries(group, prefix=""):
-    """(dotted name, text) of everything in nested groups; the curves of the estimates are left out."""
+    """(dotted name, text) for everything in nested groups, except the curves of the estimates."""
     for key, value in group.items():
         if isinstance(value, dict):
             if key != "curves":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Result folders of runs: the summary, and result.h5 as an xarray.Dataset that is read when it is used."""
+"""Result folders of runs: the summary, and result.h5 as an xarray.Dataset that is read lazily."""
 from __future__ import annotations
 
 import functools
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Result:
-    """The folder that a run has left."""
+    """The output folder of a run."""
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
@@ -48,7 +48,7 @@ class Result:
         return f"<bergtow.Result {self.folder}>"
 
     def __str__(self) -> str:
-        """What print() shows: the numbers that a notebook shows, one a line."""
+        """The text for print(): the numbers that a notebook shows, one per line."""
         if not (self.folder / "summary.json").exists():
             return f"{self.folder}: has no summary: the run has not ended"
         return "\n".join([f"{self.folder}", *(f"  {name}: {html.unescape(text)}" for name, text in
@@ -104,13 +104,13 @@ def _stored_class() -> Any:
             self.dtype = dataset.dtype
 
         def __deepcopy__(self, memo: Any) -> Any:
-            return self  # it only reads
+            return self  # a copy is not needed: it only reads
 
         def __reduce__(self) -> Any:
             return _stored_again, (self.dataset.file.filename, self.dataset.name, self.column, self.part)
 
         def __getitem__(self, key: Any) -> Any:
-            if any(getattr(k, "size", 1) == 0 for k in key.tuple):  # which HDF5 does not know
+            if any(getattr(k, "size", 1) == 0 for k in key.tuple):  # HDF5 does not support empty indices
                 nothing = np.broadcast_to(np.zeros((), self.dtype), self.shape)
                 return indexing.NumpyIndexingAdapter(nothing)[key]
             return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER_1VECTOR,
@@ -122,7 +122,7 @@ def _stored_class() -> Any:
             return self.dataset[key if self.column is None else (*key, self.column)]
 
         def _moved(self, key: Any, part: slice) -> Any:
-            """An index into the part of the second axis, as one into the dataset."""
+            """Convert an index into the part of the second axis to an index into the dataset."""
             if isinstance(key, slice):
                 start, stop, step = key.indices(self.shape[1])
                 return slice(start + part.start, max(stop, 0) + part.start, step)
@@ -132,7 +132,7 @@ def _stored_class() -> Any:
 
 
 def _stored_again(path: str, name: str, column: int | None, part: slice | None) -> Any:
-    """One that was pickled; the file stays open as long as it is used."""
+    """An array after unpickling; the file stays open as long as it is in use."""
     return _stored_class()(_imported("h5py").File(path)[name], column, part)
 
 
@@ -143,7 +143,7 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
     return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(_stored_class()(dataset, column, part))
 
 
-#: groups of result.h5, and how the names of their variables begin
+#: groups of result.h5, and the prefixes of their variables
 _GROUPS = {"series": "", "floes": "floe_", "bodies": "other_body_", "impacts": "collision_", "panels": "panel_",
            "events": "event_", "splits": "split_", "pieces": "piece_"}
 #: dimensions by their scales in the file
@@ -154,7 +154,7 @@ _POSE = (("x", "m", "x of the centroid"), ("y", "m", "y of the centroid"), ("yaw
 
 
 def _dims(dataset: h5py.Dataset) -> tuple[str, ...] | None:
-    """Names of the dimensions of a dataset by its scales, None for a dataset without scales."""
+    """Names of the dimensions of a dataset, from its scales; None for a dataset without scales."""
     if all(len(axis) for axis in dataset.dims):
         scales = [axis[0].name for axis in dataset.dims]
         return tuple(_DIMENSIONS.get(name, name.lstrip("/")) for name in scales)
@@ -164,11 +164,11 @@ def _dims(dataset: h5py.Dataset) -> tuple[str, ...] | None:
 def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     """The result of a run as an xarray.Dataset.
 
-    Dimensions: time (entries of the series), frame, floe, other_body (the towed body, walls), collision, event, and
-    panel of the hull where the case has them. Series have their names; frames are floe_x, floe_y, floe_yaw, floe_speed,
+    Dimensions: time (samples of the series), frame, floe, other_body (the towed body, walls), collision, event, and
+    panel of the hull if the case has panels. Series keep their names; frames are floe_x, floe_y, floe_yaw, floe_speed,
     floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices come from the
-    groups of result.h5. Every variable has units, long_name and, where it has one, a label. Values are read from the
-    file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`. Errors:
+    groups of result.h5. Every variable has units, long_name and, where available, a label. Values are read from the
+    file on first use; close it like any Dataset. The attribute `summary` holds the text of summary.json. Raises
     BergtowError.
     """
     xarray, _ = _imported("xarray"), _imported("h5py")
@@ -212,7 +212,7 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
             for of, part in (("floe", slice(0, n)), ("other_body", slice(n, frames[name].shape[1]))):
                 dims = ("frame", of, "xy")[:frames[name].ndim]
                 put(f"{of}_{name}", dims, frames[name], None, part, long_name=meanings[name])
-        for name in frames:  # of pieces of floes that split, frame after frame
+        for name in frames:  # pieces of floes that split, concatenated over frames
             if name.startswith("piece") and (dims := _dims(frames[name])) is not None:
                 put(f"frame_{name}", dims, frames[name])
         if "line_points" in frames:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""What converge, budget and capability left."""
+"""Results of converge, budget and capability."""
 import json
 from pathlib import Path
 
 
 def read(name, place):
-    """The result of a command in a folder, or in a file of another name; None if there is none, or it cannot be
+    """The result of a command in a folder, or in a file with another name; None if it does not exist or cannot be
     read."""
     path = Path(place)
     try:

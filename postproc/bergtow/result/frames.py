@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Floes and bodies of a run, and where they are in its frames: the part of Run (result/run.py) that has outlines."""
+"""Floes and bodies of a run, and their positions in its frames: the part of Run (result/run.py) with outlines."""
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,7 +29,7 @@ def place(vertices, pose):
 
 
 class Frames:
-    """Of result.h5, by what Run reads from it: the file, its data sets, the domain and its period."""
+    """Frames of result.h5, using what Run reads from it: the file, its datasets, the domain and its period."""
 
     # ---- floes and bodies
 
@@ -45,7 +45,7 @@ class Frames:
 
     @cached_property
     def _floes(self):
-        """Outlines of the floes and of the pieces of floes that split, which are floes like any other."""
+        """Outlines of the floes, followed by those of the pieces of split floes, which are treated like any floe."""
         vertices, offsets = self._outlines("floes")
         if not self.n_pieces:
             return vertices, offsets
@@ -54,25 +54,25 @@ class Frames:
 
     @cached_property
     def n_pieces(self):
-        """Pieces of floes that split: the last so many of the floes. Poses and forces of a floe are NaN in frames in
-        which it is not there: before it was a piece, or after it has split."""
+        """Number of pieces of split floes, which are the last of the floes. Poses and forces of a floe are NaN in
+        frames where it does not exist: before it split off, or after it has split."""
         return len(self._file["pieces/area"]) if "pieces" in self._file else 0
 
     @property
     def n_start(self):
-        """Floes that were there from the start: the first so many of the floes."""
+        """Number of floes at the start, which are the first of the floes."""
         return self.n_floes - self.n_pieces
 
     @cached_property
     def splits(self):
         """Floes that split: dict of columns [S], "time" s, "parent", "generation", "mode", "ratio", "thickness" m, and
-        "crack" [S, 4] m, x and y of its ends; empty where floes do not split. Split k made the floes
-        n_start + 2 k and the one after it."""
+        "crack" [S, 4] m, x and y of its ends; empty if floes cannot split. Split k made the floes n_start + 2 k and the
+        one after it."""
         return {name: self._read(f"splits/{name}") for name in self._file.get("splits", ())}
 
     @property
     def generation(self):
-        """[N] how many splits in a row made each floe: 0 of those that were there from the start."""
+        """[N] number of successive splits that made each floe: 0 for those that existed at the start."""
         made = np.zeros(self.n_floes, int)
         if self.n_pieces:
             made[-self.n_pieces:] = np.repeat(self.splits["generation"], 2)
@@ -80,7 +80,7 @@ class Frames:
 
     @property
     def vertices(self):
-        """[V, 2] m, outlines of all floes one after the other, body frame."""
+        """[V, 2] m, concatenated outlines of all floes, body frame."""
         return self._floes[0]
 
     @property
@@ -106,7 +106,7 @@ class Frames:
 
     @cached_property
     def bodies(self):
-        """List of Body: whatever is not a floe, in the order of body_pose; empty when there is none."""
+        """List of Body: all bodies that are not floes, in the order of body_pose; may be empty."""
         if "bodies" not in self._file:
             return []
         vertices, offsets = self._outlines("bodies")
@@ -154,7 +154,7 @@ class Frames:
         return self._read("frames/piece_end", ndim=1)
 
     def _of_floes(self, name, frame, others=0):
-        """[N, ...] of the floes in a frame; others: bodies that follow the floes in the file."""
+        """[N, ...] for the floes in a frame; others: number of bodies that follow the floes in the file."""
         own = self.n_start
         data = self._frame(name, frame, own + others)[:own]
         if not self.n_pieces:
@@ -168,7 +168,7 @@ class Frames:
         return out
 
     def pose(self, frame):
-        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped); NaN for a floe that is absent."""
+        """[N, 3] x m, y m, yaw rad of the floes, as written (not wrapped); NaN for a floe that does not exist."""
         return self._of_floes("pose", frame)
 
     def body_pose(self, frame):
@@ -176,12 +176,12 @@ class Frames:
         return self._frame("body_pose", frame, len(self.bodies)) if self.bodies else np.zeros((0, 3))
 
     def contact_force(self, frame):
-        """[N] N, largest normal contact force on each floe in the step of the frame; NaN where that has no solution."""
+        """[N] N, largest normal contact force on each floe in the frame's step; NaN if the step has no solution."""
         return self._of_floes("contact_force", frame)
 
     def least_contact_force(self, frame):
-        """The same for pictures: that of the last frame before whose step has a solution stands in for NaN, 0 at the
-        start, as in series."""
+        """The same for pictures: NaN is replaced by the force in the last earlier frame whose step has a solution, or
+        by 0 at the start, as in series."""
         for k in range(frame % max(1, self.n_frames), -1, -1):
             force = self.contact_force(k)
             there = np.isfinite(self.pose(k)[:, 0]) if self.n_pieces else np.ones(len(force), bool)
@@ -195,13 +195,13 @@ class Frames:
 
     def body_speed(self, frame):
         """[B] m/s, speed of each body."""
-        own = self.n_start  # pieces are not in this data set
+        own = self.n_start  # this dataset does not contain pieces
         return self._frame("speed", frame, own + len(self.bodies))[own:]
 
     def wrap(self, xy, centre=None):
-        """Positions [n, 2] m moved by whole periods to within half a period of centre (default: of the domain).
+        """Shift positions [n, 2] m by whole periods to within half a period of centre (default: of the domain).
 
-        Directions that are not periodic are left alone, to the bit.
+        Components in non-periodic directions are returned unchanged, to the bit.
         """
         x0, x1, y0, y1 = self.box
         centre = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
@@ -221,12 +221,12 @@ class Frames:
 
     @cached_property
     def _padding(self):
-        """[N, M] index into vertices, outlines filled up to the longest one by repeating their last vertex."""
+        """[N, M] index into vertices; shorter outlines repeat their last vertex up to the length of the longest."""
         counts = np.diff(self.offsets)
         return self.offsets[:-1, None] + np.minimum(np.arange(counts.max(initial=1)), counts[:, None] - 1)
 
     def polygons(self, frame, centre=None):
-        """Floes of a frame in the world frame: list of N arrays [n_i, 2] m; wrapped as by wrap()."""
+        """Floes of a frame in the world frame: list of N arrays [n_i, 2] m, wrapped as in wrap()."""
         pose = self.pose(frame)
         pose[:, :2] = self.wrap(pose[:, :2], centre)
         return np.split(self._world(pose), self.offsets[1:-1]) if self.n_floes else []
@@ -234,8 +234,8 @@ class Frames:
     def polygon_array(self, frame, centre=None):
         """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]).
 
-        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. First come the floes that are
-        there, in order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
+        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. Existing floes come first, in
+        order; in a periodic domain, images follow for floes that extend over the edge of the wrapped domain.
         """
         pose = self.pose(frame)
         pose[:, :2] = self.wrap(pose[:, :2], centre)
@@ -259,7 +259,7 @@ class Frames:
     def body_polygons(self, frame, centre=None):
         """Bodies of a frame in the world frame: list of arrays [n, 2] m in the order of bodies.
 
-        The towed body is wrapped as by wrap(); walls and fixed bodies stand where the file puts them.
+        The towed body is wrapped as in wrap(); walls and fixed bodies keep their positions in the file.
         """
         pose = self.body_pose(frame)
         if self.towed is not None:

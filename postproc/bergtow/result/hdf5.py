@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files of HDF5 as the program writes them: opened with a message, values as those of Python."""
+"""Read HDF5 files that the program writes: clear messages on opening, and values as Python types."""
 import h5py
 import numpy as np
 
@@ -7,7 +7,7 @@ from bergtow.errors import RunError
 
 
 def opened(path, remedy):
-    """The file, read only. Errors: RunError."""
+    """Open the file, read only. Raises RunError."""
     try:
         return h5py.File(path, "r")
     except FileNotFoundError:
@@ -17,7 +17,7 @@ def opened(path, remedy):
 
 
 def plain(value):
-    """An attribute or a scalar as str, number or array."""
+    """An attribute or scalar as str, number or array."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bytes):

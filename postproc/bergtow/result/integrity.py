@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Are the files of runs and ensembles what the program left? Seals, and records of finished runs, by the library
-(bergtow/simulation.h: bt_seal_check, bt_record_check)."""
+"""Are the files of runs and ensembles as the program left them? The library checks seals and the records of finished
+runs (bergtow/simulation.h: bt_seal_check, bt_record_check)."""
 import os
 
 from bergtow import _library
@@ -8,7 +8,7 @@ from bergtow.errors import BergtowError
 
 
 def check_seal(path, kind):
-    """kind: "ensemble", "result", ... Errors: BergtowError."""
+    """kind: "ensemble", "result", ... Raises BergtowError."""
     _library.library().bt_seal_check(os.fsencode(path), kind.encode())
 
 

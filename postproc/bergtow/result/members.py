@@ -4,12 +4,12 @@
     e = Members("out/concentration")
     for c in e.conditions():                       # members of one combination of values
         print(c.label, e.mean[c.finished])
-    time, ice = e.series(m)                        # of member m, all of its run
+    time, ice = e.series(m)                        # of member m, over its whole run
     e.doubts(m)                                    # {"unconverged", "jammed", ...}
 
-ensemble.h5 holds all but collisions and most series; those are in the members' folders. It is read only
-under a sound seal, and a member whose files do not fit the record of its end (result/integrity.py) counts as waiting:
-it is in no number until `bergtow ensemble` has run it again. Errors: RunError.
+ensemble.h5 holds everything except collisions and most series, which are in the members' folders. It is only read if
+its seal is intact. A member whose files do not match the record of its end (result/integrity.py) counts as waiting: it
+enters no number until `bergtow ensemble` has run it again. Raises RunError.
 """
 import json
 from collections import defaultdict
@@ -27,11 +27,11 @@ from bergtow.result.hdf5 import opened, plain
 from bergtow.result.run import Run, least, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
-#: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean, since
-#: its loads shortly before that are the largest of all
+#: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean,
+#: because its loads shortly before that are the largest of all
 LEAST_TOW = 150.0
 
-#: kinds of doubt about a member, and what each means
+#: kinds of doubt about a member, with their meanings
 DOUBTS = {
     "unconverged": "steps met the limit of work before the tolerance",
     "unbounded": "the load of the body has no bound in some steps of its window: its means and peaks are lower bounds",
@@ -44,23 +44,23 @@ DOUBTS = {
     "other": "a warning of another kind",
 }
 
-#: codes of warnings about one of these; the grounds of a verdict are reasons, and not separate warnings
+#: codes of warnings already covered by these; the grounds of a verdict are reasons, not separate warnings
 TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped"}
 
-#: doubts that may exclude members: not "met little ice", which would exclude the small means
+#: doubts that may be used to exclude members: not "met little ice", which would exclude the small means
 EXCLUDABLE = sorted(set(DOUBTS) - {"few"})
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One combination of the values that were varied."""
+    """One combination of the varied values."""
 
     index: int            #: from 0
     values: dict          #: {key: number or text}
-    varied: list          #: of the keys those that differ between conditions, all where none does
+    varied: list          #: keys that differ between conditions; all keys if none differs
     units: dict           #: {key: unit}
     members: np.ndarray   #: rows of all its members
-    finished: np.ndarray  #: rows of those that finished with a mean and are not excluded
+    finished: np.ndarray  #: rows of those that finished with a mean and were not excluded
     failed: int
     waiting: int
     excluded: int
@@ -71,7 +71,7 @@ class Condition:
 
 
 def reading(key, unit):
-    """(factor, unit) for printing a key: a concentration in %, an angle in degrees; unit "" for a plain number."""
+    """(factor, unit) for printing a key: concentration in %, angles in degrees; unit "" for a plain number."""
     if key == "ice.concentration":
         return 100.0, "%"
     if unit in ("rad", "rad/s"):
@@ -80,7 +80,7 @@ def reading(key, unit):
 
 
 def worded(key, value, unit, digits=4):
-    """"concentration 60 %", "ice size 30 m": a value that was varied; unit: that of the value, "1" or "" for none."""
+    """"concentration 60 %", "ice size 30 m": a varied value in words; unit: that of the value, "1" or "" for none."""
     if isinstance(value, str):
         return f"{short_key(key)} {value}"
     factor, unit = reading(key, unit)
@@ -88,7 +88,7 @@ def worded(key, value, unit, digits=4):
 
 
 def short_key(key):
-    """Last part of a case key, in words: ice.friction is "ice friction", ice.concentration "concentration"."""
+    """Last part of a case key, in words: ice.friction becomes "ice friction", ice.concentration "concentration"."""
     section, _, name = key.rpartition(".")
     plain = name.replace("_", " ")
     return plain if name in ("concentration", "thickness") or section in ("", "run") else \
@@ -97,13 +97,13 @@ def short_key(key):
 
 @dataclass(frozen=True)
 class WithoutBound:
-    """Tows of a condition with steps without a solution, where the load has no bound, and tows that ended because of
-    them."""
+    """Tows of a condition with steps that have no solution, where the load has no bound, and tows that ended because of
+    such steps."""
 
-    share: float    #: mean over the tows that finished of the share of such steps in their windows
-    some: list      #: names of those that hold such steps
-    ended: list     #: names of those that guard.no_solution ended, which are in no number
-    tows: int       #: of both kinds, and of all others
+    share: float    #: share of such steps in the windows, averaged over the finished tows
+    some: list      #: names of tows with such steps
+    ended: list     #: names of tows that guard.no_solution ended, which enter no number
+    tows: int       #: number of tows of both kinds and of all others
 
     def __bool__(self):
         return bool(self.some or self.ended)
@@ -112,7 +112,7 @@ class WithoutBound:
         return self.words()
 
     def words(self, named=False):
-        """How many they are, and what share of the steps; named: with their names."""
+        """The number of such tows and the share of such steps; named: with their names."""
         some, ended = (f" ({listed(names)})" if named else "" for names in (self.some, self.ended))
         parts = [f"the load of the body has no bound in some steps of {len(self.some)} of {self.tows} tows{some}, "
                  f"{100 * self.share:.2g} % of the steps of all that finished"] * bool(self.some)
@@ -122,7 +122,7 @@ class WithoutBound:
 
 
 def _rows(f, group, columns):
-    """Rows of a table of ensemble.h5; a table without rows is not there."""
+    """Rows of a table of ensemble.h5. A table without rows does not exist in the file."""
     if group not in f:
         return zip()
     return zip(*(d.asstr()[()] if h5py.check_string_dtype(d.dtype) else d[()]
@@ -130,7 +130,7 @@ def _rows(f, group, columns):
 
 
 def listed(names, most=8):
-    """Names in a row, the first of many."""
+    """A list of names, cut off after the first few."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
@@ -194,14 +194,14 @@ class Members:
 
     @staticmethod
     def _notes(f, group):
-        """{row of the member: its warnings or reasons, as Run.warnings has them}"""
+        """{row of the member: its warnings or reasons, in the format of Run.warnings}"""
         out = defaultdict(list)
         for member, code, text, values in _rows(f, group, "member code text values"):
             out[int(member) - 1].append({"code": code, "text": text, "values": json.loads(values) or {}})
         return out
 
     def _unsound(self):
-        """{name: why} of members whose results are missing in part or damaged; from here on they wait."""
+        """{name: why} of members whose results are incomplete or damaged; from here on they count as waiting."""
         out = {
             self.name[m]: self.reason[m].strip()
             for m in np.flatnonzero(self.status == WAITING)
@@ -216,7 +216,7 @@ class Members:
         return out
 
     def number(self, key, m):
-        """A number of a member's summary, NaN where there is none."""
+        """A number from a member's summary, NaN if there is none."""
         return float(self.summary[key][m]) if key in self.summary else np.nan
 
     @cached_property
@@ -254,14 +254,14 @@ class Members:
         return (label or name.replace("_", " "), *rest)
 
     def series(self, m, name="ice_resistance"):
-        """(time s, values) of a series over a member's whole run; of steps without a load by result/run.py: least."""
+        """(time s, values) of a series over a member's whole run; steps without a load by least() of result/run.py."""
         time, x = (self._series[key][m] for key in ("time", name))
         there = np.isfinite(time)
         x = x[there]
         return time[there], least(x) if self.number("no_load_steps", m) > 0 else x
 
     def steady(self, m):
-        """Ice resistance over the window of a member's tow, N; empty where there is none."""
+        """Ice resistance over the window of a member's tow, N; empty without a window."""
         time, ice = self.series(m)
         start, end = self.window(m, time)
         return ice[within(time, start, end)] if np.isfinite([start, end]).all() else np.zeros(0)
@@ -269,29 +269,29 @@ class Members:
     # ---- the tow
 
     def adrift(self, m):
-        """From when on nothing tows the body of a member, s; inf where something does to the end."""
+        """The time from which nothing tows the body of a member, s; inf if it is towed to the end."""
         return min((v["time_s"] for v in self.events(m) if v["kind"] == "adrift"), default=np.inf)
 
     def cut(self, m):
-        """Does a member's tow end within the window that its summary names, or before it? Numbers of the summary over
-        the window are then not those of a tow."""
+        """Does a member's tow end before the end of the window in its summary? If so, the summary's numbers over the
+        window do not describe a tow."""
         return self.adrift(m) < self.number("window_end_s", m)
 
     def window(self, m, time):
-        """(start, end) of that window as long as something tows the body, s, for samples that end at `time`: the end of
-        the first that holds no step before it, and of the last; NaN where the summary names none."""
+        """(start, end) of the part of that window in which the body is towed, s, for samples that end at `time`: the
+        end of the first sample without any step before it, and of the last sample; NaN if the summary has no window."""
         start, end, dt = (self.number(key, m) for key in ("window_start_s", "window_end_s", "dt_s"))
         late = np.median(np.diff(time)) - dt if len(time) > 1 and np.isfinite(dt) else 0.0
         return start + late, min(end, self.adrift(m))
 
     def scaling(self, m):
-        """Time at full scale / time of a member: the root of its length scale."""
+        """Time at full scale / time of a member: the square root of the member's length scale."""
         scale = self.number("estimates_length_scale", m)
         return float(np.sqrt(scale)) if scale > 0 else 1.0
 
     @cached_property
     def mean(self):
-        """Mean ice resistance of each member's tow in its window [M], N; NaN where it has none."""
+        """Mean ice resistance of each member's tow in its window [M], N; NaN if it has none."""
         out = np.array(self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan)), dtype=float)
         for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(out)):
             if self.cut(m):
@@ -305,12 +305,12 @@ class Members:
         return self._warnings[int(m)]
 
     def why_unsteady(self, m):
-        """The meaning of the first reason for a member's verdict: the same words for the same code."""
+        """The meaning of the first reason for a member's verdict: a code always gives the same words."""
         codes = [reason["code"] for reason in self._reasons[int(m)]]
         return self._meanings.get(codes[0], codes[0]) if codes else "its result does not say why"
 
     def events(self, m):
-        """What happened in a member's run, as Run.events has it."""
+        """Events in a member's run, in the format of Run.events."""
         return self._events[int(m)]
 
     @cached_property
@@ -340,7 +340,7 @@ class Members:
 
     @cached_property
     def behind(self):
-        """Members that have finished since ensemble.h5 was made."""
+        """Members that have finished since ensemble.h5 was written."""
         return [
             self.name[m]
             for m in np.flatnonzero(self.status == WAITING)
@@ -348,7 +348,7 @@ class Members:
         ]
 
     def reasons(self, status):
-        """{name: why} of the members that failed, or of the waiting ones whose process died."""
+        """{name: why} of the failed members, or of waiting members whose process died."""
         return {
             self.name[m]: self.reason[m].strip() or "no reason recorded"
             for m in np.flatnonzero(self.status == status)
@@ -357,12 +357,12 @@ class Members:
 
     @cached_property
     def without_folder(self):
-        """Finished members whose folder is not there: their collisions are not known."""
+        """Finished members whose folder is missing, so that their collisions are unknown."""
         return [self.name[m] for m in np.flatnonzero(self.status == FINISHED) if not self.folder(m).is_dir()]
 
     @property
     def without_mean(self):
-        """Finished members that have no mean ice resistance."""
+        """Finished members without a mean ice resistance."""
         return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(self.mean))]
 
     def holes(self):
@@ -377,7 +377,7 @@ class Members:
                 if parts else "")
 
     def exclude(self, kinds):
-        """Leave members with these doubts out from here on; returns {name: kinds} of those dropped."""
+        """Leave out members with these doubts from here on; returns {name: kinds} of those dropped."""
         for m in np.flatnonzero(self.status == FINISHED):
             hit = self.doubts(m) & set(kinds)
             if hit:
@@ -386,8 +386,8 @@ class Members:
 
     @cached_property
     def copies(self):
-        """{name: name of the other} of finished members that ended in the very state of an earlier one of their
-        condition: no fields of their own, whatever their seeds."""
+        """{name: name of the other} of finished members that ended in exactly the same state as an earlier one of their
+        condition: they are not separate fields, whatever their seeds."""
         first, out = {}, {}
         for m in np.flatnonzero(self.status == FINISHED):
             other = first.setdefault((int(self.condition[m]), self.state[m] or self.name[m]), self.name[m])
@@ -397,13 +397,13 @@ class Members:
 
     @property
     def used(self):
-        """Rows of members that finished with a mean, are not excluded, and are no copies."""
+        """Rows of members that finished with a mean, are not excluded, and are not copies."""
         return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(self.mean))
                          if int(m) not in self._dropped and self.name[m] not in self.copies], dtype=int)
 
     @cached_property
     def builds(self):
-        """A sentence on members of several builds, or of a build that cannot be reproduced; "" if there are none."""
+        """A sentence on members of different builds, or of one that cannot be reproduced; "" if there are none."""
         builds = {}
         for m in np.flatnonzero(self.status == FINISHED):
             try:
@@ -441,15 +441,15 @@ class Members:
         return out
 
     def tows(self, rows, excluded=True):
-        """Rows of all finished members of the conditions of these, with a mean or not, each once; excluded: of those
-        that are excluded, too."""
+        """Rows, each once, of all finished members of the conditions of `rows`, with a mean or not; excluded: include
+        excluded members."""
         there = np.isin(self.condition, self.condition[rows]) & (self.status == FINISHED)
         return np.array([m for m in np.flatnonzero(there) if self.name[m] not in self.copies
                          and (excluded or int(m) not in self._dropped)], dtype=int)
 
     def without_bound(self, rows):
-        """WithoutBound of the conditions of these rows. Tows that are excluded, and those that ended for it, count:
-        without them the mean would be that of the tows which the ice let pass."""
+        """WithoutBound for the conditions of these rows. Excluded tows, and tows that ended because of such steps,
+        count: without them the mean would be that of the tows that the ice let pass."""
         tows = self.tows(rows)
         shares = np.nan_to_num([self.number("window_no_load_share", m) for m in tows])
         ended = [self.name[m] for m in np.flatnonzero(np.isin(self.condition, self.condition[rows]))
@@ -458,8 +458,8 @@ class Members:
                             [self.name[m] for m, x in zip(tows, shares) if x > 0], ended, len(tows) + len(ended))
 
     def impacts(self, m):
-        """Collisions of a member's tow in its window: (time s, peak N, its start s, hours, conversion), or None where
-        they were not told apart, or without a window."""
+        """Collisions of a member's tow in its window: (time s, peak N, its start s, hours, conversion), or None without
+        a window or if collisions were not recorded separately."""
         hours, start, end = (self.number(key, m) for key in ("impacts_hours", "impacts_from_s", "window_end_s"))
         if self.cut(m):
             hours, end = hours - (end - self.adrift(m)) / 3600, self.adrift(m)

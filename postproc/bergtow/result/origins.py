@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where each value of a case comes from: given with a source, given and called assumed, given without a word, or a
+"""The origin of each value of a case: given with a source, given and marked as assumed, given without comment, or a
 default.
 
 The origin of a value is the comment on its line in the case file; for a default it is the comment in the resolved case.
@@ -16,20 +16,20 @@ import numpy as np
 import yaml
 
 TITLE_BLOCK = ("client", "project", "author", "document", "revision", "distribution")
-NAMES = {"document": "document number"}  #: of the title block, where the key is not the name
+NAMES = {"document": "document number"}  #: names in the title block that differ from the key
 
-#: kind: its label
+#: {kind: its label}
 KINDS = {
     "assumed": "assumed", "memory": "from memory", "reported": "reported", "source": "source", "given": "given",
     "set": "set",
     "study": "study", "default": "default", "field": "as read", "unused": "not used"
 }
 
-BESIDE = "set."  #: in the text of a case as given, of the keys that were given beside its files (src/case/case_read.c)
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  #: 20 times as fast, where the package was built with it
-ZERO = 1e-12  #: no value of a key is so small
+BESIDE = "set."  #: in the text of a case as given, prefix of keys set in addition to its files (src/case/case_read.c)
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  #: 20 times as fast, if the package was built with it
+ZERO = 1e-12  #: no value of a key is this small
 
-#: used for outlines that have no thickness of their own; a field file always has one
+#: used for outlines without thicknesses; a field file always has them
 THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 
 
@@ -40,13 +40,13 @@ class Value:
     key: str
     value: str
     meaning: str
-    kind: str     #: of KINDS
+    kind: str     #: one of KINDS
     origin: str   #: in words
 
 
 def annotated(text):
-    """{"section.key": (value as written, comment behind it)} of a case in YAML; {} where it cannot be parsed. A case
-    with a base has a document for each of its files, and the first that has a key holds."""
+    """{"section.key": (value as written, comment after it)} of a case in YAML; {} if it cannot be parsed. A case with a
+    base has one document for each of its files, and the first that contains a key takes precedence."""
     try:
         roots = list(yaml.compose_all(text, Loader=LOADER))
     except yaml.YAMLError:
@@ -74,7 +74,7 @@ def annotated(text):
 
 
 def set_by_hand(command_line):
-    """Keys of --set key=value in a command line."""
+    """Keys set by --set key=value in a command line."""
     try:
         words = shlex.split(command_line)
     except ValueError:
@@ -85,8 +85,8 @@ def set_by_hand(command_line):
 
 def of_study(run, own):
     """{key: comment in the study} of the keys that the study of a member sets; {} for a run without a study. own: {key:
-    value} set for this run beside its case; {} for a result without them: then the keys that the study sets for any
-    member."""
+    value} set for this run in addition to its case; if it is {}, as in a result that does not record them, the keys
+    that the study sets for any member are returned."""
     folder = run.path.resolve().parent
     try:
         text = (folder.parent / "study.yml").read_text(encoding="utf-8") if folder.name == "members" else ""
@@ -110,10 +110,10 @@ def of_study(run, own):
 
 
 def classify(words):
-    """Kind of a comment on a value: assumed, memory, reported, source or, for none, None.
+    """Kind of a comment on a value: assumed, memory, reported, source or, without a comment, None.
 
-    By its words, or by the marks of cases/field: [A] assumed, [R] reported without its original source, [P] published.
-    Of several marks the least certain counts.
+    It follows from the words, or from the marks of cases/field: [A] assumed, [R] reported without its original source,
+    [P] published. If there are several marks, the least certain counts.
     """
     low = words.lower()
     if "assumed" in low or "[A]" in words:
@@ -126,7 +126,7 @@ def classify(words):
 
 
 def of_default(meaning):
-    """(kind, origin) of a default from the meaning of its key: "..., assumed [Source]"."""
+    """(kind, origin) of a default from the description of its key: "..., assumed [Source]"."""
     kind = classify(meaning)
     source = re.search(r"\[([^\]]*[A-Za-z][^\]]*)\]\s*$", meaning)
     if kind in ("assumed", "memory"):
@@ -135,7 +135,7 @@ def of_default(meaning):
 
 
 def source_of_ice(case):
-    """The key of the file that the ice was read from, or None for generated ice; case: {key: text}."""
+    """The key that names the file the ice was read from, or None for generated ice; case: {key: text}."""
     return next((key for key in ("ice.outlines", "ice.field") if case.get(key, "none") not in ("", "none")), None)
 
 
@@ -158,7 +158,7 @@ def spread(values, unit):
 
 
 def of_field(run):
-    """[Value] of the ice as it was, where it was read from a file: the keys for ice that is made say nothing of it."""
+    """[Value] of the actual ice, if it was read from a file: the keys for generated ice do not describe it."""
     ice = source_of_ice(run.case)
     if ice is None or not run.n_floes:
         return []
@@ -179,7 +179,7 @@ def values(run):
     given = annotated(run.case_text)
     own = {key[len(BESIDE):]: value for key, (value, _) in given.items() if key.startswith(BESIDE)}
     study = of_study(run, own)
-    # the command line of a study belongs to all its members; results without `own` record set values there alone
+    # the command line of a study belongs to all its members; only in results that do not record `own` does it count
     by_hand = set_by_hand(str(run.attributes.get("command_line", ""))) | set({} if study else own)
     for key, (value, meaning) in resolved.items():
         if key in unused:
@@ -200,7 +200,7 @@ def values(run):
 
 def title_block(case, attributes, given):
     """Rows (what, value) of the title block: values from the command line (given), or from the section `report` of a
-    case, {key: text}; the date, and the program by its attributes."""
+    case, {key: text}; the date; and the program, from its attributes."""
     rows = [(name, given.get(name) or case.get(f"report.{name}", "")) for name in TITLE_BLOCK]
     return [(NAMES.get(name, name), scrubbed(" ".join(value.split())) if value not in ("", "none") else "–")
             for name, value in rows] + [
@@ -209,20 +209,20 @@ def title_block(case, attributes, given):
 
 
 def marked(block):
-    """What tells a document from its other issues, for every page: its number and revision, of title_block()."""
+    """The number and revision of title_block(), which distinguish the issues of a document, for every page."""
     found = dict(block)
     number, revision = found[NAMES["document"]], found["revision"]
     return ", ".join([number] * (number != "–") + [f"revision {revision}"] * (revision != "–"))
 
 
 def scrubbed(text):
-    """Without the paths of the machine that made it: of each the last part is left."""
+    """The text without paths of the machine that made it: only the last part of each path is left."""
     return re.sub(r"(?<![\w./])(?:~|\.\.?)?/(?:[^\s/:'\"]+/)+([^\s/:'\"]*)", r"\1", text)
 
 
 def short(value, digits=4):
-    """A value as the resolved case has it, with four digits in place of all; what rounding left of zero is zero.
-    Angles, which it has in radians, are in degrees, as the keys ask for them."""
+    """A value of the resolved case, rounded to four digits; rounding residue near zero becomes zero. Angles, in radians
+    there, are in degrees, as the keys ask for them."""
     value = re.sub(r"(?<![\w.])(-?\d+\.?\d*(?:e[-+]?\d+)?) rad\b",
                    lambda found: f"{np.degrees(float(found[1])):.{digits}g} deg", value)
     def rounded(found):
@@ -236,7 +236,7 @@ def short(value, digits=4):
 
 
 def preface(text):
-    """The comment at the head of a case file, without its marks: list of paragraphs. Lines of a sentence are joined;
+    """The comment at the top of a case file, without its marks: list of paragraphs. Lines of a sentence are joined;
     items of a list, tables and indented lines stay separate."""
     paragraphs = [""]
     for line in text.splitlines():

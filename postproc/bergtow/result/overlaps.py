@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Where floes lie over each other: the intersections of convex outlines, for pictures.
 
-Pairs are worked on many at a time, corner by corner: a picture of 37,000 floes has 100,000 pairs of neighbours, and one
-at a time they would take half a minute.
+Many pairs are processed at a time, corner by corner: a picture of 37,000 floes has 100,000 pairs of neighbours, which
+one by one would take half a minute.
 """
 import numpy as np
 
-LEAST = 1e-3   # of a floe's area: less is the slop of the solver
+LEAST = 1e-3   # of a floe's area: smaller overlaps are the solver's slop
 BATCH = 20000  # pairs at a time: some 100 MB
 
 
 def _clipped(a, count, p, q):
-    """The part of polygons that lies to the left of the line from p to q [P, 2]: (corners [P, K, 2], count [P])."""
+    """Clip polygons to the left of the line from p to q [P, 2]: (corners [P, K, 2], count [P])."""
     corner = np.arange(a.shape[1])
     there = corner < count[:, None]
     side = (q[:, :1] - p[:, :1]) * (a[:, :, 1] - p[:, 1:]) - (q[:, 1:] - p[:, 1:]) * (a[:, :, 0] - p[:, :1])
@@ -31,8 +31,8 @@ def _clipped(a, count, p, q):
 
 
 def intersections(a, a_count, b, b_count):
-    """Convex polygons a [P, K, 2] cut by convex polygons b [P, L, 2], anticlockwise, of so many corners each
-    [Sutherland & Hodgman 1974]: (corners [P, M, 2], count [P])."""
+    """Intersections of convex polygons a [P, K, 2] and b [P, L, 2], both anticlockwise, with a_count and b_count
+    corners [Sutherland & Hodgman 1974]: (corners [P, M, 2], count [P])."""
     a, count = a.copy(), a_count.copy()
     for k in range(b.shape[1]):
         now = np.flatnonzero((k < b_count) & (count > 0))
@@ -46,8 +46,8 @@ def intersections(a, a_count, b, b_count):
 
 
 def areas(a, count):
-    """[P] m² of anticlockwise polygons [P, K, 2] of so many corners."""
-    a = a - a[:, :1]  # digits of what lies far out
+    """[P] m² of anticlockwise polygons [P, K, 2] with the given numbers of corners."""
+    a = a - a[:, :1]  # avoids the loss of digits far from the origin
     corner = np.arange(a.shape[1])
     after = np.where(corner + 1 < count[:, None], corner + 1, 0)
     after = a[np.arange(len(a))[:, None], after]
@@ -56,15 +56,15 @@ def areas(a, count):
 
 
 def area(p):
-    """m² of one, [n, 2]."""
+    """Area of one polygon [n, 2], m²."""
     return float(areas(p[None], np.array([len(p)]))[0])
 
 
 def near(middle, reach):
-    """Pairs [P, 2] (i, j), i < j, in ascending order, of circles that overlap: middles [n, 2], radii [n].
+    """Pairs [P, 2] (i, j), i < j, in ascending order, of circles that overlap: centres [n, 2], radii [n].
 
-    In columns as wide as the largest circle: each has its neighbours in its own and in the next one, where a search in
-    one sorted key, of column and y, finds them.
+    Space is divided into columns as wide as the largest circle. The neighbours of a circle lie in its own column and
+    the next one, and a search in a single sorted key, made of column and y, finds them.
     """
     wide = 2 * reach.max() or 1.0
     x, y = (middle - middle.min(axis=0)).T
@@ -84,7 +84,7 @@ def near(middle, reach):
 
 
 def _apart(a, b, b_count):
-    """[P] of bool: an edge of b has all corners of a [P, K, 2] (filled up with some of its own) on its outer side."""
+    """[P] of bool: does an edge of b have all corners of a [P, K, 2] (padded with repeats) on its outer side?"""
     corner = np.arange(b.shape[1])
     after = b[np.arange(len(b))[:, None], (corner + 1) % b_count[:, None]]
     edge = np.where((corner < b_count[:, None])[:, :, None], after - b, 0.0)
@@ -93,7 +93,7 @@ def _apart(a, b, b_count):
 
 
 def overlaps(outlines):
-    """Polygons of the overlaps, deeper than the slop, of outlines [n, k, 2] (corners may repeat): pair by pair."""
+    """Polygons where outlines [n, k, 2] (corners may repeat) overlap by more than the slop, pair by pair."""
     outlines = np.asarray(outlines, dtype=float)
     n, most = outlines.shape[:2]
     if n < 2:
@@ -112,7 +112,7 @@ def overlaps(outlines):
     size, pairs, found = areas(kept, count), near(middle, reach), []
     for some in np.array_split(pairs, 1 + len(pairs) // BATCH):
         i, j = some.T
-        # about the middle of one, for the same reason
+        # relative to the middle of one of them, for the same reason
         a, b = kept[i] - middle[i, None], kept[j] - middle[i, None]
         meet = ~(_apart(a, b, count[j]) | _apart(b, a, count[i]))
         i, j = i[meet], j[meet]

@@ -8,9 +8,9 @@
     for outline in run.polygons(0):            # floes of frame 0, each [n, 2] m in the world frame
         ...
 
-Lengths are in m, times in s, forces in N, angles in rad. Everything is read on first use and kept, but for
-frames, which are read one at a time. A folder that cannot be used raises RunError, whose text names the path,
-the reason and the remedy.
+Lengths are in m, times in s, forces in N, angles in rad. Everything is read on first use and cached, except frames,
+which are read one at a time. A folder that cannot be used raises RunError, whose text names the path, the reason and
+the remedy.
 """
 import json
 import re
@@ -29,8 +29,8 @@ from bergtow.result.hdf5 import first_line, opened, plain
 
 
 def within(time, start, end):
-    """[n] of bool: samples that end between two times, these included, but for a last one of fewer steps than the
-    others, which a run leaves that ends within it."""
+    """[n] of bool: samples that end between two times, inclusive. A last sample with fewer steps than the others, left
+    by a run that ended within it, is excluded."""
     slack = 1e-9 * max(1.0, abs(time[-1])) if len(time) else 0.0
     there = (time >= start - slack) & (time <= end + slack)
     if len(time) > 2 and time[-1] - time[-2] < (1 - 1e-6) * (time[-2] - time[-3]):
@@ -39,8 +39,8 @@ def within(time, start, end):
 
 
 def least(x):
-    """A load that is no number in some steps (no_load) with the last number before each in its place, 0 at the start.
-    It has no bound there, so means and peaks of this are the least that they can be. A load without numbers stays."""
+    """Fill a load that is NaN in some steps (no_load) with the last number before each, 0 at the start. The load has no
+    bound there, so means and peaks of the result are lower bounds. A load without any numbers is returned unchanged."""
     there = np.isfinite(x)
     if there.all() or not there.any():
         return x
@@ -49,13 +49,13 @@ def least(x):
 
 
 def notes(found):
-    """Warnings or reasons of a summary, [{"code", "text", "values"}]; other entries are left out."""
+    """Warnings or reasons of a summary, [{"code", "text", "values"}]; entries of other forms are dropped."""
     return [{"code": str(note.get("code")), "text": str(note.get("text", "")), "values": note.get("values") or {}}
             for note in (found if isinstance(found, list) else ()) if isinstance(note, dict)]
 
 
 class Numbers(dict):
-    """An object of summary.json. Errors: RunError for a key that it does not have."""
+    """An object in summary.json. Raises RunError for a missing key."""
 
     def __init__(self, path, found):
         super().__init__(found)
@@ -67,13 +67,13 @@ class Numbers(dict):
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimate of the resistance as a file tells of it."""
+    """An estimate of the resistance as described in a file."""
 
     name: str
     label: str
-    on_top: bool         #: no resistance of ice: it comes on top of the others, and no run is held against it
-    uses_floe_size: bool  #: its curve differs between fields of one case
-    numbers: dict        #: what summary.json says: force_n, low_n, high_n, valid, compares, note, ...
+    on_top: bool         #: not an ice resistance: it is added to the others, and is not compared with a run
+    uses_floe_size: bool  #: its curve differs between fields of a case
+    numbers: dict        #: the entries in summary.json: force_n, low_n, high_n, valid, compares, note, ...
 
     @property
     def force(self):
@@ -83,23 +83,23 @@ class Estimate:
 
     @property
     def valid(self):
-        """It is meant for the conditions."""
+        """Is it meant for the conditions?"""
         return bool(self.numbers.get("valid"))
 
     @property
     def compares(self):
-        """A run is held against it: it is valid, and knows the concentration."""
+        """Can a run be compared with it? It must be valid, and depend on the concentration."""
         return bool(self.numbers.get("compares")) and self.force > 0
 
 
 def estimates_of(summary):
-    """{name: Estimate} of a summary, in the order of the program's registry; {} where there are none."""
+    """{name: Estimate} of a summary, in the order of the program's registry; {} if there are none."""
     found, labels = summary.get("estimates"), summary.get("estimate_labels")
     found = found if isinstance(found, dict) else {}
     out = {}
     for name, numbers in found.items():
         if not (isinstance(numbers, dict) and "force_n" in numbers):
-            continue  # a condition, or the curves
+            continue  # one of the conditions, or the curves
         about = labels[name]
         out[name] = Estimate(name, about["label"], about["kind"] == "on top", bool(about.get("uses_floe_size")),
                              numbers)
@@ -107,7 +107,7 @@ def estimates_of(summary):
 
 
 def parse_case(text):
-    """The values of a case file as {"section.key": text}, lists in one line; floes given by hand are left out."""
+    """The values of a case file as {"section.key": text}, lists on one line; floes given by hand are left out."""
     out = {}
 
     def walk(node, path):
@@ -126,7 +126,7 @@ def _in_one_line(node):
 
 
 def case_value(case, key, default=np.nan):
-    """Number of a key of parse_case, in SI units and radians as bergtow writes it; default where it is missing or no
+    """Number of a key from parse_case, in SI units and radians as bergtow writes it; default if it is missing or not a
     number."""
     match = re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)(?: [^\d].*)?", case.get(key, ""))
     try:
@@ -136,17 +136,15 @@ def case_value(case, key, default=np.nan):
 
 
 def _pairs(text):
-    """[(number, number)] of a sequence of pairs, as the resolved case has them."""
+    """[(number, number)] from a sequence of pairs in the resolved case."""
     return re.findall(r"\[([-+.\deE]+)[^,\[\]]*,\s*([-+.\deE]+)", text)
 
 
 class Run(Frames):
     """The output folder of one run.
 
-    path        folder
-    summary     dict, the numbers of summary.json
-    attributes  dict, provenance (root attributes of result.h5)
-    Errors: RunError, from the constructor for missing or damaged files, later for missing or damaged entries.
+    path        folder summary     dict, the numbers of summary.json attributes  dict, provenance (root attributes of
+    result.h5) Raises RunError, from the constructor for missing or damaged files, later for missing or damaged entries.
     """
 
     def __init__(self, path):
@@ -206,7 +204,7 @@ class Run(Frames):
         return node
 
     def _read(self, name, index=(), ndim=None):
-        """Data set (or one entry of it) as an array; float data as float64."""
+        """Dataset (or one entry of it) as an array; float data as float64."""
         node = self._dataset(name)
         if ndim is not None and node.ndim != ndim:
             raise RunError(self.result, f"/{name} has {node.ndim} dimensions, not {ndim}",
@@ -245,15 +243,15 @@ class Run(Frames):
         return str(plain(self._dataset(f"series/{name}").attrs.get("units", "")))
 
     def description(self, name):
-        """One sentence on a series."""
+        """One sentence that describes a series."""
         return self.attribute(name, "description")
 
     def attribute(self, name, what):
-        """An attribute of a series: role, label, summary, merge, ...; "" where the file has none."""
+        """An attribute of a series: role, label, summary, merge, ...; "" if the file has none."""
         return str(plain(self._dataset(f"series/{name}").attrs.get(what, "")))
 
     def label(self, name):
-        """What pictures and tables call a series."""
+        """The name of a series in pictures and tables."""
         return self.attribute(name, "label") or name.replace("_", " ")
 
     def by_role(self, *roles):
@@ -265,8 +263,8 @@ class Run(Frames):
 
     @property
     def balance(self):
-        """The towed body's balance in the labels of its series, the ice resistance by the others:
-        "tow − drag − ... − inertia"."""
+        """The towed body's force balance in the labels of its series, solved for the ice resistance: "tow − drag − ...
+        − inertia"."""
         ends = "tow_force", "ice_resistance", "inertia_force"
         terms = [self.label(name) for name in self.by_role("balance") if name not in ends]
         return " − ".join(["tow", *terms, "inertia"])
@@ -278,13 +276,13 @@ class Run(Frames):
 
     @property
     def window(self):
-        """(start s, end s) of the window that the means of the summary refer to, or None."""
+        """(start s, end s) of the window over which the summary's means are taken, or None."""
         window = self.number("window.start_s"), self.number("window.end_s")
         return window if np.isfinite(window).all() else None
 
     @property
     def ordered_speed(self):
-        """The speed that the case orders at each sample [S], m/s; NaN where it orders none."""
+        """The ordered speed at each sample [S], m/s; NaN if the case does not order one."""
         programme, time = np.array(_pairs(self.case.get("tow.programme", "")), dtype=float), self["time"]
         if len(programme):
             return np.interp(time, *programme.T)
@@ -303,13 +301,13 @@ class Run(Frames):
 
     @cached_property
     def way(self):
-        """How far the body has come along the ordered tow [S], m, from the first sample on: sway counts nothing, and
-        what drives it back counts against it.
+        """Distance that the body has covered along the ordered tow [S], m, from the first sample: sway does not count,
+        and drifting back is subtracted.
 
-        Which leg it is on cannot be told from its place alone, for legs may meet or lie side by side; nor by the
-        event, since the body may come a line length after what tows it. So it changes legs where that makes its way
-        longest, once the way-point is passed: a body that cuts the corner has turned by half the angle there, and one
-        that is towed back is about to return.
+        The position alone does not tell which leg the body is on, since legs may meet or run side by side. Nor does the
+        event, because the body may follow the towing end at a line's length. So, after the waypoint has been passed,
+        the change of leg is placed where it makes the distance longest: a body that cuts the corner has then turned by
+        half the angle, and a body that is towed back is about to return.
         """
         x = np.column_stack([self["body_x"], self["body_y"]])
         along = (x - x[0]) @ self.headings.T
@@ -318,13 +316,13 @@ class Run(Frames):
             if event["kind"] != "waypoint" or event["subject"] >= along.shape[1]:
                 continue
             leg = along[:, event["subject"]]
-            k = max(int(np.searchsorted(time, event["time_s"])) - 1, 0)  # the sample before it
+            k = max(int(np.searchsorted(time, event["time_s"])) - 1, 0)  # the sample before the event
             way[k:] = leg[k:] + np.maximum.accumulate(way[k:] - leg[k:])
         return way
 
     def made_good(self, start, end):
-        """Mean speed of the body over ground along the ordered tow between two times, m/s; negative where it is driven
-        back. NaN without a body."""
+        """Mean speed of the body over ground along the ordered tow between two times, m/s; negative if the body is
+        driven back. NaN without a body."""
         if "body_x" not in self or not end > start:
             return np.nan
         first, last = np.interp([start, end], self["time"], self.way)
@@ -332,7 +330,7 @@ class Run(Frames):
 
     @property
     def speed_made_good(self):
-        """That over the window as long as something tows the body; NaN without two samples of it."""
+        """Speed made good over the part of the window in which the body is towed; NaN with fewer than two samples."""
         if self.window is None:
             return np.nan
         start, end = self.window[0], min(self.window[1], self.adrift)
@@ -340,8 +338,8 @@ class Run(Frames):
 
     @property
     def verdict(self):
-        """("steady", "not steady" or "too short", the reasons as one text); "not judged" of a result that names no
-        verdict: one without a towed body."""
+        """("steady", "not steady" or "too short", the reasons as one text); "not judged" for a result without a
+        verdict, i.e. without a towed body."""
         window = self.summary.get("window")
         window = window if isinstance(window, dict) else {}
         return str(window.get("verdict") or "not judged"), "; ".join(r["text"] for r in notes(window.get("reasons")))
@@ -353,22 +351,22 @@ class Run(Frames):
 
     @property
     def window_name(self):
-        """How the window may be called: "steady window" for a steady tow alone."""
+        """Name of the window in texts: "steady window" only for a steady tow."""
         return "steady window" if self.verdict[0] == "steady" else "window"
 
     @property
     def mean_name(self):
-        """How a mean of it may be called."""
+        """Name of a mean over the window in texts."""
         found = "mean" if self.verdict[0] == "steady" else "mean over the window"
         return f"{found} ({at_least.words(self.number('window.no_load_share'))})" if self.at_least else found
 
     def interval(self, key):
         """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval;
-        NaN where it is not known."""
+        NaN if unknown."""
         return tuple(self.number(f"mean_{key}_{which}n") for which in ("", "low_", "high_"))
 
     def number(self, key, default=np.nan):
-        """A number of summary.json, "window.start_s" for one in a group; default where it is missing or null."""
+        """A number from summary.json, "window.start_s" for a number in a group; default if it is missing or null."""
         value = self.summary
         for part in key.split("."):
             value = value.get(part) if isinstance(value, dict) else None
@@ -378,13 +376,13 @@ class Run(Frames):
 
     @property
     def at_least(self):
-        """Are means and peaks of the loads over the window lower bounds, since steps in it have no solution?"""
+        """Are means and peaks of the loads over the window lower bounds, because some of its steps have no solution?"""
         return self.number("window.no_load_share", 0.0) > 0
 
     @cached_property
     def events(self):
-        """What happened in the run, in order: [{"time_s", "kind", "subject", "value"}], kinds and numbers as /events of
-        result.h5 has them. summary.json has the first 40; they are taken where the file has none."""
+        """Events in the run, in order: [{"time_s", "kind", "subject", "value"}], with the kinds and numbers of /events
+        in result.h5. summary.json has the first 40, which are used if the file has none."""
         if "events/kind_names" not in self._file:
             return list(self.summary.get("events") or [])
         names = [plain(name) for name in self._read("events/kind_names")]
@@ -393,19 +391,19 @@ class Run(Frames):
 
     @property
     def adrift(self):
-        """From when on nothing tows the body, s; inf where something does to the end."""
+        """The time from which nothing tows the body, s; inf if it is towed to the end."""
         return min((e["time_s"] for e in self.events if e["kind"] == "adrift"), default=np.inf)
 
     @property
     def steps_per_sample(self):
-        """Steps in a sample of the series, output.sample_every."""
+        """Steps per sample of the series, output.sample_every."""
         return int(self._file["series"].attrs.get("steps_per_sample", 1)) if "series" in self._file else 1
 
     # ---- case
 
     @cached_property
     def case_text(self):
-        """Text of the case file as it was given."""
+        """Text of the case file as given by the user."""
         return str(plain(self._read("case_as_given" if "case_as_given" in self._file else "case")[()]))
 
     @cached_property
@@ -419,18 +417,18 @@ class Run(Frames):
         return parse_case(self.resolved_text)
 
     def value(self, key, default=np.nan):
-        """Number of a case key in SI units and radians; default where it is missing or no number."""
+        """Number of a case key in SI units and radians; default if it is missing or not a number."""
         return case_value(self.case, key, default)
 
     @property
     def geographic(self):
-        """True in the frame x north, y east; False in the basin's."""
+        """True in the frame with x north and y east; False in the basin's frame."""
         return self.case.get("domain.frame") == "geographic"
 
     @property
     def map_axes(self):
-        """Where the frame lies on the map, attributes of /xdmf: "origin_x", "origin_y" m, and where that place is known
-        on the earth "crs", for PROJ, and its coordinates there, "origin_east", "origin_north" m."""
+        """Position of the frame on the map, from the attributes of /xdmf: "origin_x", "origin_y" m, and, if
+        georeferenced, "crs" for PROJ and the coordinates there, "origin_east", "origin_north" m."""
         node = self._file.get("xdmf")
         if node is None:
             raise RunError(self.result, "has no /xdmf", "the file is incomplete: run the case again")
@@ -438,7 +436,7 @@ class Run(Frames):
 
     @cached_property
     def box(self):
-        """(x0, x1, y0, y1) m of the domain; from the floes of the first frame when the case does not say."""
+        """(x0, x1, y0, y1) m of the domain; from the floes of the first frame if the case does not give it."""
         length, width = self.value("domain.length"), self.value("domain.width")
         x0 = self.value("domain.x0", -length / 2 if self.geographic else 0.0)
         y0 = self.value("domain.y0", -width / 2)
@@ -458,7 +456,7 @@ class Run(Frames):
     # ---- loads on the towed body
 
     def _group(self, name, meaning):
-        """Attributes and data sets of a group as one dict."""
+        """Attributes and datasets of a group as one dict."""
         node = self._file.get(name)
         if not isinstance(node, h5py.Group):
             raise RunError(self.result, f"has no /{name}",
@@ -468,7 +466,7 @@ class Run(Frames):
     @cached_property
     def impacts(self):
         """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", the
-        meaning of a peak."""
+        definition of a peak."""
         return self._group("impacts", "collisions were not told apart")
 
     @cached_property
@@ -479,7 +477,7 @@ class Run(Frames):
 
     @property
     def panel_series(self):
-        """{"units": of the loads on panels, "load": [S, P] their series where the run kept it (output.panels)}."""
+        """{"units": of the loads on panels, "load": [S, P] their series if the run stored them (output.panels)}."""
         group = self._file.get("panels")
         if not isinstance(group, h5py.Group) or "mean_load" not in group:
             return {}

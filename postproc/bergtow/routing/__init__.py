@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Routes of a tow through ice whose floes are known."""
+"""Routes of a tow through known floes."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far simple polygons [n, 2] are apart."""
+"""Distances between simple polygons [n, 2]."""
 import numpy as np
 
 
@@ -12,7 +12,7 @@ def to_edges(points, polygon):
 
 
 def inside(points, polygon):
-    """[n] of bool, by the number of edges that a ray crosses."""
+    """[n] of bool, from the number of edges that a ray crosses."""
     x, y = points[:, 0, None], points[:, 1, None]
     (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, 0).T
     crosses = (ay > y) != (by > y)
@@ -27,7 +27,7 @@ def _side(a, b, p):
 
 
 def of(p, q):
-    """Least distance of two polygons, 0 where they share a point."""
+    """Least distance between two polygons, 0 if they share a point."""
     if inside(p[:1], q)[0] or inside(q[:1], p)[0]:
         return 0.0
     a, b, c, d = p[:, None], np.roll(p, -1, 0)[:, None], q[None], np.roll(q, -1, 0)[None]
@@ -41,8 +41,8 @@ def radius(polygon, centre):
 
 
 def least(body, hull, areas, enough=0.0):
-    """Least distance of a hull [n, 2], m from its centroid, to areas on its way: body [T, 3] x, y, yaw. A distance
-    above `enough` may be given too small. inf without areas."""
+    """Least distance between a hull [n, 2], m from its centroid, on its way and areas: body [T, 3] x, y, yaw. A
+    distance above `enough` may be underestimated. inf without areas."""
     found, reach = np.inf, radius(hull, 0)
     for area in areas:
         bound = np.where(inside(body[:, :2], area), 0.0, to_edges(body[:, :2], area)) - reach

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """A receding horizon: plan, tow for a while, look at the ice again, plan the rest.
 
-Every look is a tow from the start up to that time, along the way that was decided by then; a new plan leaves that way
-as it is, so that the tow up to the look is the same, to the bit, and the last one is a single case from start to goal.
-Rejected: to begin anew with the ice as it lies, for the floes would come to rest at every look.
+Each look is a tow from the start up to that time, along the route decided so far. A new plan keeps that part of the
+route, so that the tow up to the look is the same, to the bit, and the final tow is a single case from start to goal.
+Rejected: restarting with the ice as it lies, because the floes would come to rest at every look.
 
-The ice of the tow is that of the case. A look sees its floes as they lay `age` before, carried on with the mean drift,
-with the errors of the map. With neither age nor errors the look is perfect, which no one has: the gain is an upper
+The ice of the tow is that of the case. A look sees its floes as they lay `age` before, moved on with the mean drift,
+and with the errors of the map. Without age and errors the look is perfect, which no real look is: the gain is an upper
 bound.
 """
 import dataclasses
@@ -21,8 +21,8 @@ from bergtow.text import route as words
 import numpy as np
 
 MOST = 100       # looks
-FINE = 1e-4      # body widths that a polyline may be off the way of a body that is led by its speed
-AHEAD = 2        # steps that what is decided reaches beyond a look
+FINE = 1e-4      # body widths: how far a polyline may deviate from the path of a body whose speed is prescribed
+AHEAD = 2        # steps by which the decided part extends beyond a look
 
 
 def seen(ice, errors, k):
@@ -36,7 +36,7 @@ def seen(ice, errors, k):
 
 
 def led(route, s, speed):
-    """[m, 2] over the ground, from where the plan begins: of the body, or of the end that pulls it."""
+    """[m, 2] over the ground, from the start of the plan: path of the body, or of the end that pulls it."""
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
     moved = np.outer(way / speed, s.drift)
     if s.mode == "speed":
@@ -46,8 +46,8 @@ def led(route, s, speed):
 
 
 def with_point(points, way):
-    """A polyline [n, 2] with a point at `way` m of it: (points, its number). A tow up to there is the same, to the bit,
-    along every way that begins with these points: a leg that ended elsewhere would have another last digit."""
+    """Insert a point at `way` m along a polyline [n, 2]: (points, its index). A tow up to there is the same, to the
+    bit, on every route that begins with these points; a leg that ended elsewhere would differ in the last digit."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
     passed = np.append(0.0, np.cumsum(lengths))
     k = min(int(np.searchsorted(passed, way, side="right")) - 1, len(lengths) - 1)
@@ -58,8 +58,8 @@ def with_point(points, way):
 
 
 def best(plan, heading=None, headings=32):
-    """The cheapest route of a plan that is allowed; None where there is none. heading: of the tow at a look, rad, which
-    the straight line may leave by half a step of the lattice's headings: none of the lattice is sure to be nearer."""
+    """The cheapest allowed route of a plan; None if there is none. heading: of the tow at a look, rad. The straight
+    line may differ from it by half a step of the lattice's headings, as even the nearest heading of the lattice may."""
     def allowed(r):
         if set(r.faults) <= {"turns"} and heading is not None:
             off = (r.heading[0] - heading + np.pi) % (2 * np.pi) - np.pi
@@ -82,7 +82,7 @@ class Horizon:
                 "run.duration": f"{self.dt * np.ceil(duration / self.dt - 1e-9):.10g} s"}
 
     def tow(self, name, points, duration):
-        """The folder of a tow. Errors: RunError."""
+        """Make a tow and return its folder. Raises RunError."""
         keys = self.keys(points, duration)
         why = self.runs.make(name, range(1), keys)
         if SPENT in why:
@@ -93,7 +93,7 @@ class Horizon:
         return self.runs.path(name, 0)
 
     def whole(self, name, points, c):
-        """The outcome of a tow along all of a polyline, and its folder."""
+        """The outcome of a tow along a whole polyline, and its folder."""
         path = self.tow(name, points, self.duration(points))
         with Run(path) as run:
             out = tows.outcome(run, c, self.goal, self.s, self.w["limit"])
@@ -104,13 +104,13 @@ class Horizon:
         return tows.LONGER[self.s.mode] * (way / self.speed + self.s.ramp / 2)
 
     def way(self, time):
-        """Of what is led, a few steps after a time, m."""
+        """Distance covered by the body or end whose path is prescribed, a few steps after a time, m."""
         time, ramp = time + AHEAD * self.dt, self.s.ramp
         return self.speed * (time - ramp / 2 if time > ramp else time ** 2 / (2 * ramp) if ramp > 0 else time)
 
     def look(self, k, time, points):
         """(ice, start, heading, decided points, all points) at a look; None once the goal is reached or the line has
-        parted. All points are those that the tow goes by: where no new plan is allowed, they stay."""
+        parted. All points are the route of the current tow, which continues if no new plan is allowed."""
         s = self.s
         points, last = with_point(points, self.way(time))
         decided, tangent = points[:last + 1], points[last] - points[last - 1]
@@ -120,7 +120,7 @@ class Horizon:
             moved = np.array(s.drift) * (time - run.frame_times[frame])
             outlines = run.polygons(frame)
             some = np.append(s.moving, np.arange(run.n_start, run.n_floes))
-            some = some[np.isfinite(run.pose(frame)[some, 0])]  # pieces stand for the floes that split
+            some = some[np.isfinite(run.pose(frame)[some, 0])]  # pieces replace the floes that split
             ice = dataclasses.replace(s.ice, outlines=[outlines[i] + moved for i in some],
                                       thickness=run.thickness[some])
             body = np.array([run["body_x"][-1], run["body_y"][-1]])
@@ -138,8 +138,8 @@ class Horizon:
 
 
 def estimate(c, every, told, planning):
-    """(looks, seconds of all): of the tows up to each look, one after the other, of the three whole ones, and of the
-    plans. c: a Candidate; told: route.estimate(); planning: s, of a plan."""
+    """(looks, total seconds): for the successive tows up to each look, the three complete tows, and the plans. c: a
+    Candidate; told: route.estimate(); planning: s per plan."""
     replay, plain, _ = told
     looks = max(0, min(MOST - 1, int(np.ceil(c.route.duration / every)) - 1))
     up_to = plain * every / c.seconds * looks * (looks + 1) / 2
@@ -147,7 +147,7 @@ def estimate(c, every, told, planning):
 
 
 def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
-    """Tow with new looks, once planned, and straight, through the ice of the case; write and say what came out."""
+    """Tow with new looks, with the first plan only, and straight, through the ice of the case; report the results."""
     from bergtow.routing import route as command
     runs.members = [members.Member(situation.reading(s.values, s.field))]
     h = Horizon(a, w, s, goal, runs, files, found)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Members of a map: the ice as it may be, given what the map may be wrong by. The same members for every route.
+"""Members of a map: possible states of the ice, given the errors of the map. All routes use the same members.
 
-    position    m, standard deviation of a floe's place along each axis: half of the variance is of the whole map, as of
-                its placing on the earth, half of the floe. A floe's own part is cut at half the distance to the nearest
-                other one, so that none overlap; the map keeps its place across walls.
-    thickness   standard deviation / thickness, lognormal: half of the variance of the whole map, half of the floe
-    drift       m/s, standard deviation of each component of the drift: that much current is added, in which ice and
-                body drift
+    position    m, standard deviation of a floe's position along each axis: half of the variance belongs to the whole
+                map (georeferencing), half to the floe. A floe's own part is limited to half the distance to the
+                nearest other floe, so that none overlap; across walls the map is not shifted.
+    thickness   standard deviation / thickness, lognormal: half of the variance for the whole map, half for the floe
+    drift       m/s, standard deviation of each component of the drift: added as a current, with which ice and body
+                drift
 
-The halves are assumed. Floes that come to lie on the towed body or leave the domain are left out, and counted.
+The halves are assumed. Floes that end up on the towed body or outside the domain are left out, and counted.
 """
 import math
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Errors:
     """Standard deviations of a map."""
 
     position: float   #: m
-    thickness: float  #: of the thickness
+    thickness: float  #: relative to the thickness
     drift: float      #: m/s
 
     @property
@@ -39,11 +39,11 @@ class Errors:
 
 @dataclass
 class Member:
-    """One state of the ice."""
+    """One possible state of the ice."""
 
-    keys: dict           #: of the case, as texts
-    left_out: int = 0    #: floes on the towed body or out of the domain
-    drift: tuple = (0.0, 0.0)  #: added to that of the map, m/s
+    keys: dict           #: keys of the case, as texts
+    left_out: int = 0    #: number of floes on the towed body or outside the domain
+    drift: tuple = (0.0, 0.0)  #: added to the drift of the map, m/s
 
 
 @dataclass
@@ -76,8 +76,8 @@ class Floes:
             g.attrs["n_floes"] = len(self.area)
 
     def outlines(self):
-        """[n, 2] each, m. Number by number: the last digit of numpy's matrix products, sines and cosines depends on
-        where the operands lie in memory, and the members of a map must have the same bits in every call."""
+        """[n, 2] each, m. Computed number by number: the last digit of NumPy's matrix products, sines and cosines
+        depends on memory alignment, and the members of a map must be identical to the bit in every call."""
         turn = [(math.cos(yaw), math.sin(yaw)) for yaw in self.pose[:, 2]]
         at = np.hstack([self.pose[:, :2], np.reshape(turn, (-1, 2))])
         x, y, c, s = np.repeat(at, np.diff(self.offsets), axis=0).T
@@ -85,7 +85,7 @@ class Floes:
         return np.split(np.stack([c * u - s * v + x, s * u + c * v + y], axis=1), self.offsets[1:])[:-1]
 
     def take(self, kept):
-        """Those floes alone."""
+        """Only the floes in `kept`."""
         counts = np.diff(self.offsets)
         owner = np.repeat(kept, counts)
         return Floes(self.vertices[owner], np.append(0, np.cumsum(counts[kept])), self.pose[kept],
@@ -93,7 +93,7 @@ class Floes:
 
 
 def room(outlines, most):
-    """[n] half the distance of each floe to the nearest other one, m, at most `most`."""
+    """[n] half the distance from each floe to its nearest neighbour, m, at most `most`."""
     out = np.full(len(outlines), float(most))
     if len(outlines) < 2 or not most > 0:
         return out
@@ -109,7 +109,7 @@ def room(outlines, most):
 
 
 def clear_of_hull(outlines, situation, start=None, yaw=None):
-    """[n] of bool: floes that do not lie on the towed body where it starts."""
+    """[n] of bool: floes that do not lie on the towed body at its start."""
     start = np.array(situation.start if start is None else start)
     yaw = situation.values["body.yaw"] if yaw is None else yaw
     c, s = np.cos(yaw), np.sin(yaw)
@@ -121,7 +121,7 @@ def clear_of_hull(outlines, situation, start=None, yaw=None):
 
 
 def drawn(n, situation, errors, folder):
-    """n Members, or the one of a map without errors. Errors: RunError."""
+    """n Members, or a single one for a map without errors. Raises RunError."""
     as_read = reading(situation.values, situation.field)
     if errors.none:
         return [Member(as_read)]
@@ -138,7 +138,7 @@ def one(k, floes, own, situation, errors, folder, as_read):
     """Member k, whose ice is FOLDER/mNNN.h5."""
     rng, n, values = np.random.default_rng([SEED, k]), len(floes.area), situation.values
     walled = np.array([values[f"domain.{side}"] == "wall" for side in ("ends", "sides")])
-    # every draw is made whatever the errors, so that a larger error is the same member further out
+    # all random numbers are drawn whatever the errors, so that larger errors scale the same member
     common, shift, thick, each, current = (rng.standard_normal(shape) for shape in (2, (n, 2), (), n, 2))
     pose, half = floes.pose.copy(), np.sqrt(0.5)
     low, high = np.array(situation.extent[:2]), np.array(situation.extent[2:])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Routes as files: GeoJSON for charts, GPX for the bridge, a case a route for the program."""
+"""Routes as files: GeoJSON for charts, GPX for the bridge, and one case per route for the program."""
 import json
 import os
 from xml.sax.saxutils import escape, quoteattr
@@ -10,15 +10,15 @@ import numpy as np
 
 
 def positions(xy, place):
-    """[[east, north]] of metres of the case: degrees where the case has a place, otherwise metres."""
+    """[[east, north]] from metres of the case: degrees if the case has a geographic position, otherwise metres."""
     if place.origin is None:
         return np.round(place.map(xy), 4).tolist()
     return np.round(place.degrees(xy), 8).tolist()
 
 
 def features(candidates, place, numbers):
-    """GeoJSON features: of every candidate the track of the body, of the towing end, and the swath. numbers: {name:
-    properties}."""
+    """GeoJSON features for each candidate: the track of the body, that of the towing end, and the swath. numbers:
+    {name: properties}."""
     out = []
     for c in candidates:
         parts = [("berg", "LineString", c.track), ("swath", "Polygon", c.route.swath)]
@@ -33,7 +33,7 @@ def features(candidates, place, numbers):
 
 
 def geojson(candidates, place, numbers, path, force):
-    """Metres east and north of x = y = 0, by their own crs, where the case has no place. Errors: RunError."""
+    """Write GeoJSON; without a geographic position in metres from x = y = 0, with a local crs. Raises RunError."""
     local = {"type": "name", "properties": {"name": _library.limit("map_local_crs")}}
     crs = {} if place.origin else {"crs": local}
     found = {"type": "FeatureCollection", **crs, "made_by": writing.MARK,
@@ -42,7 +42,7 @@ def geojson(candidates, place, numbers, path, force):
 
 
 def gpx(candidates, place, path, force):
-    """Route points of the towing end, or of the body where nothing but it is led. Errors: RunError."""
+    """Write route points of the towing end, or of the body if its speed is prescribed. Raises RunError."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>',
              '<gpx version="1.1" creator="bergtow" xmlns="http://www.topografix.com/GPX/1/1">',
              f" <metadata><desc>{escape(writing.MARK)}</desc></metadata>"]
@@ -55,7 +55,7 @@ def gpx(candidates, place, path, force):
 
 
 def case(c, base, path, force):
-    """The case of a route, which the program runs as it is. Errors: RunError."""
+    """Write the case of a route, ready for the program to run. Raises RunError."""
     keys = {"run.title": f"tow along {c.label}", **c.keys}
     found = {"base": os.path.relpath(base, path.parent)}
     for key, text in keys.items():

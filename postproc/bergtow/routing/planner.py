@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Routes through known floes: the planner of the library (bergtow/route.h) with numpy arrays.
+"""Routes through known floes: the planner of the library (bergtow/route.h) with NumPy arrays.
 
-Everything is in SI units and radians, in the frame that drifts with the ice and is the frame of the case at t = 0: a
-place x of the berg at the time t is over the ground at x + drift t.
+Everything is in SI units and radians, in the frame that drifts with the ice and coincides with the frame of the case at
+t = 0: a position x of the berg at time t is x + drift t over the ground.
 """
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Points = Union[np.ndarray, Sequence[Sequence[float]]]
 
 
 class Weights(NamedTuple):
-    """What each term of the force counts. 1 is what bergtow/route.h derives, assumed; rafting is for fits."""
+    """Factor on each term of the force. 1 is the value that bergtow/route.h derives, assumed; rafting is for fits."""
     water: float = 1
     plough: float = 1
     compaction: float = 1
@@ -39,9 +39,9 @@ class Weights(NamedTuple):
 
 @dataclass(frozen=True)
 class Ice:
-    """Floes: outlines [n, 2], m, any simple polygons either way round, and the thickness of each, m; density, kg/m3;
+    """Floes: outlines [n, 2], m, any simple polygons in either direction, and the thickness of each, m; density, kg/m3;
     added mass / mass of floes; concentration at which packed ice jams, assumed; rafting: 1/2 kappa rho_i (1 -
-    rho_i/rho_w) g, N/m3, infinite where floes do not raft."""
+    rho_i/rho_w) g, N/m3, infinite if floes do not raft."""
     outlines: Sequence[Points]
     thickness: Union[np.ndarray, Sequence[float]]
     density: float = 910
@@ -60,13 +60,13 @@ class Hull:
 
 @dataclass(frozen=True)
 class Route:
-    """A path of the berg's centre. kind: "straight" or "planned". waypoints [n, 2], m: corners, and the end last, with
-    the radius of the arc at each, m. x, y, m, heading, rad, time, s, speed, m/s [m] along it, at most a cell apart.
-    legs: way to the start, m, length, m, speed, m/s, predicted mean force, N. force: the mean, peak: the largest of a
-    stretch of two widths, N. cost: of the objective. features: mean of each term of the force, without its weight, N.
-    ice_area, m2, ice_mass, kg: of floes in the swath, clipped exactly. clearance: from a circle about the hull to the
-    nearest no-go polygon, m. faults: of "no_go", "outside", "force_limit", "turns" (not by the heading that is asked
-    for). swath [k, 2]: outline of the swept width, m."""
+    """A path of the berg's centre. kind: "straight" or "planned". waypoints [n, 2], m: corners, then the end, with the
+    arc radius at each, m. x, y, m, heading, rad, time, s, speed, m/s [m] along it, at most a cell apart. legs: distance
+    to the start, m, length, m, speed, m/s, predicted mean force, N. force: the mean, peak: the largest over a stretch
+    of two widths, N. cost: value of the objective. features: mean of each term of the force, unweighted, N. ice_area,
+    m2, ice_mass, kg: of floes in the swath, clipped exactly. clearance: from a circle around the hull to the nearest
+    no-go polygon, m. faults: of "no_go", "outside", "force_limit", "turns" (but not turns to the requested heading).
+    swath [k, 2]: outline of the swept width, m."""
     kind: str
     waypoints: np.ndarray
     radii: np.ndarray
@@ -93,8 +93,8 @@ class Route:
 @dataclass(frozen=True)
 class Plan:
     """status: one of STATUS, with the numbers behind it in data. routes: the straight line first, then the planned
-    ones, best first. spacing and cell, m, of lattice and raster, states that the search looked at. cover [ny, nx]: ice
-    concentration over cover_extent x0, x1, y0, y1, for pictures."""
+    ones, best first. spacing and cell, m, of lattice and raster; states: how many the search visited. cover [ny, nx]:
+    ice concentration over cover_extent x0, x1, y0, y1, for pictures."""
     status: str
     data: dict[str, Any]
     routes: list[Route]
@@ -106,7 +106,7 @@ class Plan:
 
 
 class Fit(NamedTuple):
-    """Weights fitted to forces, share of the variance that they explain, and rank correlation of fit and force."""
+    """Weights fitted to forces, share of the variance that they explain, and rank correlation between fit and force."""
     weights: Weights
     r2: float
     rank_correlation: float
@@ -118,7 +118,7 @@ def _refuse(what: str, value: object, remedy: str) -> BergtowError:
 
 def _number(what: str, value: float, low: float, high: float = math.inf, above: bool = False,
             endless: bool = False) -> float:
-    """A number of an interval. Errors: BergtowError."""
+    """Check that a number lies in an interval. Raises BergtowError."""
     x = float(value)
     if (endless and x == math.inf) or (math.isfinite(x) and (low < x if above else low <= x) and x <= high):
         return x
@@ -134,7 +134,7 @@ def _place(what: str, value: Iterable[float], n: int = 2) -> list[float]:
 
 
 def _rings(what: str, polygons: Sequence[Points]) -> tuple[Any, np.ndarray]:
-    """Points of all polygons one after the other, and where each begins."""
+    """Points of all polygons, concatenated, and the offset of each polygon."""
     rings = [np.asarray(p, dtype=float) for p in polygons]
     for k, ring in enumerate(rings):
         if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 or not np.isfinite(ring).all():
@@ -148,7 +148,7 @@ def _pointer(array: np.ndarray, kind: Any = c_double) -> Any:
 
 
 class _Task:
-    """bt_route_task, checked, and the arrays that it points to."""
+    """bt_route_task, checked, with the arrays that it points to."""
 
     def __init__(self, ice: Ice, hull: Hull, start: Iterable[float], goal: Points, *, extent: Iterable[float],
                  speeds: Iterable[float] = (1.0,), objective: str = "work", force_limit: float = math.inf,
@@ -234,7 +234,7 @@ def _points(stretch: np.ndarray, cell: float) -> tuple[np.ndarray, ...]:
 
 
 def _legs(stretch: np.ndarray) -> np.ndarray:
-    """Stretches that follow each other at one speed, as one."""
+    """Merge consecutive stretches with the same speed."""
     kind = [("way", float), ("length", float), ("speed", float), ("force", float)]
     rows: list[list[float]] = []
     way = 0.0
@@ -265,15 +265,15 @@ def _route(found: _library.RouteFound, kind: str, width: float, cell: float) -> 
 
 
 def plan(ice: Ice, hull: Hull, start: Iterable[float], goal: Points, **options: Any) -> Plan:
-    """Routes from start to goal, a point or both ends of a line of points, fixed to the ground.
+    """Routes from start to goal, a point or both ends of a line, fixed to the ground.
 
-    Options: extent x0, y0, x1, y1, m, within which the whole hull stays (needed); speeds to choose from, m/s;
-    objective, of OBJECTIVES; force_limit, N, for force_factor times the predicted mean force of every stretch; no_go,
-    polygons [n, 2], m, fixed to the ground, and clearance from the hull, m; radius, the least of the berg's path, m;
-    headings 16 or 32; spacing and cell of lattice and raster, m; turn_cost, unit of the objective per rad; routes;
-    weights; drift of the ice and velocity of the water over the ground, m/s; start_heading, goal_heading, rad.
+    Options: extent x0, y0, x1, y1, m, which must contain the whole hull (required); speeds to choose from, m/s;
+    objective, one of OBJECTIVES; force_limit, N, on force_factor times the predicted mean force of every stretch;
+    no_go, polygons [n, 2], m, fixed to the ground, and clearance from the hull, m; radius, the smallest of the berg's
+    path, m; headings 16 or 32; spacing and cell of lattice and raster, m; turn_cost, unit of the objective per rad;
+    routes; weights; drift of the ice and velocity of the water over the ground, m/s; start_heading, goal_heading, rad.
 
-    Errors: BergtowError for numbers that are refused. What there is no route for is told by Plan.status."""
+    Raises BergtowError for invalid numbers. If there is no route, Plan.status gives the reason."""
     task = _Task(ice, hull, start, goal, **options)
     found = task.call("bt_route_make")
     t = task.task
@@ -299,7 +299,7 @@ def plan(ice: Ice, hull: Hull, start: Iterable[float], goal: Points, **options: 
 
 
 def _nearest_polygon(task: _Task, x: float, y: float) -> int:
-    """Index of the no-go polygon whose outline is nearest to a place."""
+    """Index of the no-go polygon whose outline is nearest to a position."""
     best, which = math.inf, -1
     for k, (a, b) in enumerate(zip(task.no_go_first[:-1], task.no_go_first[1:])):
         p = task.no_go[a:b]
@@ -313,8 +313,8 @@ def _nearest_polygon(task: _Task, x: float, y: float) -> int:
 
 def straight_route(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[float], *, speed: float,
                    **options: Any) -> Route:
-    """The straight line at one speed, without a search: its features, for fit_weights, its area, its force. Options: as
-    of plan()."""
+    """The straight line at one speed, without a search: its features, for fit_weights, its area, its force. Options:
+    those of plan()."""
     task = _Task(ice, hull, start, np.asarray(list(end), dtype=float), speeds=(speed,), **options)
     found = task.call("bt_route_straight")
     try:
@@ -326,8 +326,8 @@ def straight_route(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[f
 
 
 def fit_weights(features: Sequence[Union[Mapping[str, float], Sequence[float]]], forces: Sequence[float]) -> Fit:
-    """Weights not below 0 that fit mean forces of straight tows [n], N, best in the sense of least squares, from their
-    features, N, [n] dicts or [n, 5] in the order of Weights. Errors: BergtowError for fewer than two tows."""
+    """Non-negative weights that fit mean forces of straight tows [n], N, by least squares, from their features, N, [n]
+    dicts or [n, 5] in the order of Weights. Raises BergtowError for fewer than two tows."""
     rows = np.array([[f.get(name, 0.0) for name in Weights._fields] if isinstance(f, Mapping) else f
                      for f in features], dtype=float)
     y = np.asarray(forces, dtype=float)
@@ -349,26 +349,26 @@ def fit_weights(features: Sequence[Union[Mapping[str, float], Sequence[float]]],
 # --- tug and berg ----------------------------------------------------------------------------------------------------
 
 def tug_track(x: np.ndarray, y: np.ndarray, heading: np.ndarray, line: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end of a line of this length is, for a berg that drag keeps in line with its own path: a line ahead
-    along the tangent. It jumps where the berg enters an arc."""
+    """Position of the end of a line of this length, for a berg that drag keeps in line with its path: one line length
+    ahead along the tangent. It jumps where the berg enters an arc."""
     return x + line * np.cos(heading), y + line * np.sin(heading)
 
 
 def tug_radius(berg_radius: float, line: float) -> float:
-    """Radius of the tug's circle when the berg goes steadily round one of berg_radius."""
+    """Radius of the tug's circle when the berg steadily follows a circle of berg_radius."""
     return math.hypot(berg_radius, line)
 
 
 def berg_radius(tug_radius: float, line: float) -> float:
-    """Radius of the berg's circle when the tug goes steadily round one of tug_radius; 0 where that is within the line:
-    the berg ends in the middle."""
+    """Radius of the berg's circle when the tug steadily follows a circle of tug_radius; 0 if tug_radius is less than
+    the line: the berg ends up in the centre."""
     return math.sqrt(max(0.0, tug_radius ** 2 - line ** 2))
 
 
 def berg_track(x: np.ndarray, y: np.ndarray, line: float, start: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Where a berg goes that drag keeps in line with its own path, from `start`, a line away from the tug's first
-    place: the tractrix. Along a straight piece of the tug's track of length s the angle a between line and piece
-    follows tan(a/2) exp(-s/line), exact for the piece."""
+    """Track of a berg that drag keeps in line with its path, starting at `start`, one line length from the tug's first
+    position: the tractrix. Along a straight piece of the tug's track of length s the angle a between line and piece
+    follows tan(a/2) exp(-s/line), which is exact for the piece."""
     place = np.asarray(list(start), dtype=float)
     tug = np.column_stack([x, y])
     angle = math.atan2(*(tug[0] - place)[::-1])
@@ -376,7 +376,7 @@ def berg_track(x: np.ndarray, y: np.ndarray, line: float, start: Iterable[float]
     for a, b in zip(tug[:-1], tug[1:]):
         course = math.atan2(b[1] - a[1], b[0] - a[0])
         off = math.remainder(angle - course, 2 * math.pi)
-        if abs(abs(off) - math.pi) > 1e-12:  # a tug that backs straight towards the berg turns it by no angle
+        if abs(abs(off) - math.pi) > 1e-12:  # a tug that backs straight towards the berg does not turn the line
             off = 2 * math.atan(math.tan(0.5 * off) * math.exp(-math.hypot(*(b - a)) / line))
         angle = course + off
         out.append(b - line * np.array([math.cos(angle), math.sin(angle)]))

@@ -5,9 +5,9 @@
     bergtow route CASE.yml --to 20.3E,76.6N --plan-only        in seconds, without tows
     bergtow route CASE.yml --to "3 km,0" --replan "30 min"     with a new look at the ice every half hour
 
-Planned by routing/planner.py with a cost that is an estimate; then every candidate is towed through the same ice, and
-the tows decide (routing/verdict.py). Each file is written as soon as it exists. The same call goes on where it was
-stopped: tows are those of study/runs.py.
+routing/planner.py plans routes with an estimated cost. Then every candidate is towed through the same ice, and the tows
+decide (routing/verdict.py). Each file is written as soon as its contents exist. Repeating a call that was stopped
+continues it: its tows are those of study/runs.py.
 """
 import base64
 import json
@@ -28,17 +28,17 @@ import numpy as np
 
 BUDGET = 60.0            # min
 ROUTES, MEMBERS = 3, 10
-#: errors of a map where none are said, assumed: of the hull's width, of the thickness, of the speed of the tow
+#: default errors of a map, assumed: relative to the hull's width, to the thickness, to the speed of the tow
 POSITION, THICKNESS, DRIFT = 0.1, 0.1, 0.02
-#: least radius of a way: hull widths, of a body whose speed is prescribed; of one on a line the larger of the line
-#: and so many of the lengths m / C over which the drag C V² of water alone takes its momentum: the line leads inwards
+#: least radius of a path. For a body with prescribed speed: hull widths. For a body on a line: the larger of the line
+#: and this many lengths m / C, over which the drag C V² of water alone takes its momentum; the line then leads inwards
 #: by 27°
 RADIUS, LENGTHS = 2.0, 2.0
-RANKS_POORLY = 0.5       # rank correlation of the cost, below which it is said
-SWATH = 15.0             # hull widths: least length of a swath of --calibrate
+RANKS_POORLY = 0.5       # rank correlation of the cost, below which a warning is printed
+SWATH = 15.0             # hull widths: least length of a swath for --calibrate
 FILES = ("route-base.yml", "straight.yml", "routes.geojson", "routes.gpx", "route.json", "route.png", "route.html")
 
-#: status of a plan without routes: (what is named, why, remedy)
+#: status of a plan without routes: (name of the option or key, reason, remedy)
 STATUS = {
     "start_no_go": ("--from", "the body would lie in an area to keep out of", "start elsewhere, or take less "
                     "--clearance"),
@@ -120,7 +120,7 @@ def _not_below(text, unit, option):
 
 
 def refuse_looks(w, s):
-    """Refuse what --replan cannot have. Errors: RunError."""
+    """Reject options and cases that --replan does not support. Raises RunError."""
     if s.mode == "thrust":
         raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new "
                        "way would change its tow before the look", "set tow.mode to speed or line", USAGE)
@@ -132,7 +132,7 @@ def refuse_looks(w, s):
 
 
 def wanted(a, s):
-    """Numbers of the options, in SI: {"speeds", "errors", "radius", ...}. s: Situation."""
+    """Values of the options, in SI units: {"speeds", "errors", "radius", ...}. s: Situation."""
     speeds = [s.values["tow.speed"]]
     if a.speeds:
         speeds = sorted({_above(t, "m/s", "--speeds") for t in a.speeds.split(",")})
@@ -158,7 +158,7 @@ def wanted(a, s):
 
 
 def planned(a, w, s, goal, weights, factor, **more):
-    """planner.plan() with the options. more: of planner.plan()."""
+    """Call planner.plan() with the options. more: further options of planner.plan()."""
     given = {"speeds": w["speeds"], "objective": a.objective, "force_limit": w["limit"], "force_factor": factor,
              "no_go": s.no_go, "clearance": w["clearance"], "radius": w["radius"], "headings": a.headings,
              "cell": w["cell"], "turn_cost": a.turn_cost, "routes": a.routes, "weights": weights, "drift": s.drift,
@@ -168,7 +168,7 @@ def planned(a, w, s, goal, weights, factor, **more):
 
 
 def refuse(plan, found, path, force):
-    """Errors: RunError where a plan has no routes; what was found is written first."""
+    """Raises RunError if a plan has no routes, after writing what was found."""
     if plan.status not in STATUS:
         return
     writing.write_json(found | {"status": plan.status, "status_data": plan.data, "routes": []}, path, force)
@@ -183,7 +183,7 @@ def refuse(plan, found, path, force):
 
 
 def swaths(n, s, length):
-    """n straight swaths within the domain and clear of areas to keep out of: [(start, end)]. Errors: RunError."""
+    """n straight swaths within the domain and clear of no-go areas: [(start, end)]. Raises RunError."""
     rng, out = np.random.default_rng([members.SEED, 1]), []
     low, high = np.array(s.extent[:2]) + s.hull.radius, np.array(s.extent[2:]) - s.hull.radius
     for _ in range(1000 * n):
@@ -200,7 +200,7 @@ def swaths(n, s, length):
 
 
 def calibrated(a, w, s, runs):
-    """(weights, factor of peak over mean, what is said) by straight tows through the map."""
+    """(weights, ratio of peak to mean force, results) from straight tows through the map."""
     if a.calibrate < 6:
         raise RunError(f"--calibrate {a.calibrate}", "are too few swaths for five weights", "take 6 or more", USAGE)
     speed = w["speeds"][-1]
@@ -246,7 +246,7 @@ def calibrated(a, w, s, runs):
 
 
 def tow(runs, name, some, keys, line=None):
-    """Make the tows of some members, and say why those failed that did. line: as of runs.make()."""
+    """Make the tows of some members, and print why any of them failed. line: as in runs.make()."""
     why = runs.make(name, some, keys, line)
     for i, reason in zip(some, why):
         if reason and reason != SPENT:
@@ -254,11 +254,11 @@ def tow(runs, name, some, keys, line=None):
     return why
 
 
-# ---- what was found
+# ---- results
 
 
 def described(c):
-    """A candidate, for JSON."""
+    """A candidate as a dict for JSON."""
     r = c.route
     by_legs = not np.isfinite(c.speed)
     seconds = r.duration if by_legs else r.length / c.speed
@@ -270,7 +270,7 @@ def described(c):
 
 
 def means(some):
-    """Means over the members of a route; times and work of those that arrive."""
+    """Means over the members of a route; for times and work, over those that arrive."""
     out = {}
     for name in ("work", "time", "peak", "length", "mean_force", "largest", "off_track"):
         x = [t[name] for t in some if t["arrived"] or name in ("mean_force", "peak", "largest", "off_track")]
@@ -305,7 +305,7 @@ def draw(found, plan, some, s, goal, bold):
 
 
 class Files:
-    """What is written, whenever there is more of it."""
+    """Output files, written again whenever there are new results."""
 
     def __init__(self, folder, plan, some, s, goal, force):
         self.folder, self.plan, self.some, self.s, self.goal, self.force = folder, plan, some, s, goal, force
@@ -327,8 +327,8 @@ class Files:
 
 
 def estimate(runs, s, some, n):
-    """Seconds by the estimate of `bergtow check`: of the first candidate's tow that keeps frames, of one that does not,
-    and of wall time of the n tows of every candidate."""
+    """Seconds from the estimate of `bergtow check`: for the first candidate's tow with frames, for one without, and the
+    wall time of the n tows of all candidates."""
     keys = situation.reading(s.values, s.field) | some[0].keys
     replay, plain = (json.loads(checked(runs.program, s.case, runs.sets(i, keys), "--json"))["cost"]["core_time_s"]
                      for i in (0, 1))
@@ -337,8 +337,8 @@ def estimate(runs, s, some, n):
 
 
 def first_tow(found, told, folders):
-    """Says how long all tows will take, by the first that ends while others are made: a function that is called at each
-    line of the program, the first of them before any tow ends. told: estimate(); folders: of the tows."""
+    """Make a function that prints how long all tows will take, based on the first one to finish. It is called at each
+    line of the program's output, the first of them before any tow ends. told: estimate(); folders: of the tows."""
     replay, plain, total = told
     before = None
 
@@ -420,7 +420,7 @@ def perform(a):
 
 
 def verify(a, w, s, goal, some, n, runs, files, found, told):
-    """Tow every candidate through the members, and judge."""
+    """Tow every candidate through the members, and decide between them."""
     folder, began = files.folder, time.monotonic()
     runs.members = members.drawn(n, s, w["errors"], s.field.parent / "members")
     found["left_out"] = [m.left_out for m in runs.members]
@@ -454,7 +454,7 @@ def verify(a, w, s, goal, some, n, runs, files, found, told):
 
 
 def page(a, found, shown, folder):
-    """The page with two tows beside each other: [(heading, folder of the tow)]."""
+    """Write the page with two tows side by side: [(heading, folder of the tow)]."""
     print(folder / "route.json")
     if a.no_page:
         return

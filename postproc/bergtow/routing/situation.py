@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What a route is planned on: the floes, the hull, the water and the areas to keep out of, as the program has them.
+"""The input to a route plan, as the program has it: the floes, the hull, the water and the no-go areas.
 
 The floes are those of the run: the field that `bergtow field` writes, and the bodies of a Simulation of the case that
-reads it, floes given by hand and fixed ones included. Nothing of the ice is made in Python.
+reads it, including fixed floes and floes given by hand. Python generates no ice.
 """
 import json
 import os
@@ -22,9 +22,9 @@ from bergtow.study.runs import MESSAGES, messages
 
 import numpy as np
 
-FIXED = 2  # bt_simulation: a body at rest for ever
+FIXED = 2  # bt_simulation: a body permanently at rest
 GRAVITY = 9.81  # m/s2
-#: keys of the tow that a route says itself
+#: keys of the tow that each route sets itself
 OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
 
@@ -33,19 +33,19 @@ OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
 @dataclass(frozen=True)
 class Place:
-    """Where x = y = 0 of a case lies on the earth, and which way its axes point. origin: longitude and latitude, rad,
-    or None: nowhere."""
+    """Geographic position of x = y = 0 of a case, and the directions of its axes. origin: longitude and latitude, rad,
+    or None if unknown."""
 
     north_first: bool    #: the geographic frame: x north, y east
     origin: tuple = None
 
     def map(self, xy):
-        """[n, 2] metres east and north of metres of the case; its own inverse."""
+        """[n, 2] metres east and north from metres of the case; its own inverse."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         return xy[:, ::-1] if self.north_first else xy
 
     def degrees(self, xy):
-        """[n, 2] longitude and latitude of metres of the case."""
+        """[n, 2] longitude and latitude from metres of the case."""
         lib, lon, lat, out = _library.library(), c_double(), c_double(), []
         for east, north in self.map(xy):
             lib.bt_outline_unproject(c_double(north), c_double(east), *map(c_double, self.origin), byref(lon),
@@ -54,7 +54,7 @@ class Place:
         return np.array(out).reshape(-1, 2)
 
     def metres(self, degrees):
-        """Metres of the case, [n, 2], of longitude and latitude."""
+        """Metres of the case, [n, 2], from longitude and latitude."""
         lib, north, east, out = _library.library(), c_double(), c_double(), []
         for lon, lat in np.radians(np.asarray(degrees, dtype=float).reshape(-1, 2)):
             lib.bt_outline_project(c_double(lon), c_double(lat), *map(c_double, self.origin), byref(north),
@@ -64,7 +64,7 @@ class Place:
 
 
 def number(text, unit, option):
-    """A number with a unit, as the program reads it. Errors: RunError."""
+    """A number with a unit, as the program reads it. Raises RunError."""
     if not text.strip():
         raise RunError(option.strip(), "a number is missing", "write one on each side of a comma; see bergtow route "
                        "--help", USAGE)
@@ -77,12 +77,12 @@ def number(text, unit, option):
 
 
 def position(text, place, option):
-    """(x, y) in m of the case from "X,Y" with any unit of length, or from degrees, "20.1E,76.5N". Errors: RunError."""
+    """(x, y) in m of the case, from "X,Y" with any unit of length or from degrees, "20.1E,76.5N". Raises RunError."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 2:
         raise RunError(f"{option} {text}", "is no position", "write it as X,Y in metres of the case, or as degrees, "
                        "20.1E,76.5N", USAGE)
-    sides = [part[-1:].upper() if part[-2:-1] in "0123456789. " else "" for part in parts]  # of nan the n is none
+    sides = [part[-1:].upper() if part[-2:-1] in "0123456789. " else "" for part in parts]  # not the n of nan
     if {*sides} & {*"NESW"}:
         if not ({*sides} & {*"EW"} and {*sides} & {*"NS"}):
             raise RunError(f"{option} {text}", "is no place on the earth", "write a longitude and a latitude, as in "
@@ -101,7 +101,7 @@ def position(text, place, option):
 
 
 def goal(text, place):
-    """A point, or two of a line at any point of which the tow may end, "X,Y:X,Y". Errors: RunError."""
+    """A point, or the two ends "X,Y:X,Y" of a line at any point of which the tow may end. Raises RunError."""
     ends = [position(part, place, "--to") for part in text.split(":")]
     if len(ends) > 2 or len(ends) == 2 and ends[0] == ends[1]:
         raise RunError(f"--to {text}", "is neither a point nor a line", "write X,Y or X,Y:X,Y", USAGE)
@@ -109,8 +109,8 @@ def goal(text, place):
 
 
 def no_go_file(path, place):
-    """Polygons [n, 2] in m of the case from GeoJSON: degrees, or metres where its crs is the program's own. Holes
-    count as land. Errors: RunError."""
+    """Polygons [n, 2] in m of the case from GeoJSON, in degrees, or in metres if its crs is the program's own. Holes
+    count as land. Raises RunError."""
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
         features = found["features"] if found.get("type") == "FeatureCollection" else [found]
@@ -149,9 +149,9 @@ def no_go_file(path, place):
 
 
 def own_case(path, sets, values, folder, map_file=None, force=False):
-    """Write FOLDER/route-base.yml: the case with the files that it is based on in one, and without the keys that a
-    route says. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and what the
-    user says of tow.ramp, which a programme has no room for, or None. Errors: RunError."""
+    """Write FOLDER/route-base.yml: the case merged with the files that it is based on, and without the keys that a
+    route sets. sets: ["key=value"] of the user; values: {key: text} of this command. Returns its path, and the user's
+    tow.ramp or None, because a speed programme cannot include a ramp. Raises RunError."""
     merged = {}
     for file, some in reversed(files(path)):
         some = {k: v for k, v in some.items() if k != "base"}
@@ -188,8 +188,8 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
 
 
 def is_file(folder, text):
-    """Is this text of a case the name of a file: of a table, of outlines, of a field? Whatever the key, so that none is
-    forgotten; a title that is one by chance does no harm."""
+    """Does this text of a case name an existing file, such as a table, outlines or a field? The key does not matter, so
+    that none is forgotten; a title that happens to be a file name does no harm."""
     try:
         return (folder / text).is_file()
     except (OSError, ValueError):
@@ -197,7 +197,7 @@ def is_file(folder, text):
 
 
 def _drop(section, names):
-    """Take a key out of a case, by the names that lead to it."""
+    """Remove a key from a case. names: the path to it."""
     for name in names[:-1]:
         section = section.get(name, {})
     if isinstance(section, dict):
@@ -212,7 +212,7 @@ def _merged(old, new):
 
 
 def _rebased(node, folder):
-    """Names of files as absolute ones."""
+    """Make file names absolute."""
     if isinstance(node, dict):
         return {key: _rebased(below, folder) for key, below in node.items()}
     if isinstance(node, list):
@@ -226,21 +226,21 @@ def _rebased(node, folder):
 class Situation:
     """A case before its tow."""
 
-    case: Path            #: route-base.yml, without the way of the tow
-    field: Path           #: the floes, as `bergtow field` has written them
+    case: Path            #: route-base.yml, without the path of the tow
+    field: Path           #: the floes as written by `bergtow field`
     values: Case          #: every key
     place: Place
     ice: planner.Ice
     hull: planner.Hull
-    mass: float           #: of the body with its added mass, kg
+    mass: float           #: of the body including added mass, kg
     outline: np.ndarray   #: [n, 2] of the hull, m from its centroid, at yaw 0
     start: tuple          #: (x, y), m
     extent: tuple         #: (x0, y0, x1, y1), m
-    no_go: list           #: polygons [n, 2], m: of --no-go, and fixed floes
+    no_go: list           #: polygons [n, 2], m: from --no-go, and fixed floes
     drift: tuple          #: mean velocity of the floes, m/s
     water: tuple          #: of the water, m/s
     ramp: float           #: tow.ramp, s
-    moving: np.ndarray    #: numbers of the floes that are not fixed
+    moving: np.ndarray    #: indices of the floes that are not fixed
 
     @property
     def mode(self):
@@ -248,14 +248,14 @@ class Situation:
 
     @property
     def line(self):
-        """From the centroid of the body to the towing end, m: the line and the arm of its fastening; 0 where the body
-        itself is led."""
+        """Distance from the centroid of the body to the towing end, m: the line plus the arm to its attachment point; 0
+        if the speed of the body itself is prescribed."""
         v = self.values
         return 0.0 if self.mode == "speed" else v["tow.line_length"] + np.hypot(v["tow.hull_x"], v["tow.hull_y"])
 
 
 def field(program, case, folder):
-    """FOLDER/ice.h5, the floes of a case. Errors: RunError in the program's words."""
+    """Write FOLDER/ice.h5, the floes of a case. Raises RunError with the program's message."""
     folder.mkdir(parents=True, exist_ok=True)
     out = folder / "ice.h5"
     code, said = called([str(program), "field", str(case), "-o", str(out), "--force"], stdout=subprocess.DEVNULL,
@@ -266,12 +266,12 @@ def field(program, case, folder):
 
 
 def reading(case, file):
-    """{key: value} with which a case reads its floes from a field file."""
+    """{key: value} that make a case read its floes from a field file."""
     return {"ice.field": str(file)} | ({"ice.outlines": "none"} if case["ice.outlines"] else {})
 
 
 def checked(values):
-    """A case through whose ice a route can be planned. Errors: RunError."""
+    """Check that a route can be planned through the ice of a case. Raises RunError."""
     mode = values["tow.mode"]
     if mode == "none" or values["body.shape"] == "none":
         raise RunError("tow.mode", "nothing is towed in this case", "set body.shape, and tow.mode to speed, line or "
@@ -282,7 +282,7 @@ def checked(values):
 
 
 def place_of(path, sets):
-    """The Place of a case. Errors: CaseError."""
+    """The Place of a case. Raises CaseError."""
     return _place(Case(path, dict(text.partition("=")[::2] for text in sets)))
 
 
@@ -292,8 +292,8 @@ def _place(values):
 
 
 def of(program, case, folder, ramp=None, no_go=(), width=None):
-    """The Situation of a case. no_go: files; width: of the hull across its path, m, None: its mean over all headings.
-    Errors: RunError, CaseError."""
+    """The Situation of a case. no_go: files; width: of the hull across its path, m; None: the mean over all headings.
+    Raises RunError, CaseError."""
     values = Case(case)
     checked(values)
     place = _place(values)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Routes as cases, their tows through the members of the map, and what each tow says.
+"""Routes as cases, their tows through the members of the map, and the outcome of each tow.
 
-A route is a case of its own: the way of the body (tow.mode speed) or of the towing end, tow.speed or tow.programme, and
-run.duration. In a steady turn the line bears the drag F along the way and the centripetal force across it, so that it
-leads inwards of the tangent by delta, tan(delta) = m kappa V² / F, with the mass m that added mass is part of and the
-curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end goes where that puts it, at body + L (cos(delta) t +
-sin(delta) n): of a light body the inverse of the tractrix. kappa is smoothed over the length of the line, for a body
-cannot follow a jump of it; what the tow makes of that the simulation shows. Rejected: the tractrix alone, with which
-an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
+A route becomes a separate case: the path of the body (tow.mode speed) or of the towing end, tow.speed or tow.programme,
+and run.duration. In a steady turn the line carries the drag F along the path and the centripetal force across it, so it
+points inwards of the tangent by delta, tan(delta) = m kappa V² / F, with the mass m including added mass and the
+curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end is placed accordingly at body + L (cos(delta) t +
+sin(delta) n): for a light body this is the inverse of the tractrix. kappa is smoothed over the length of the line,
+because a body cannot follow a jump in it; the simulation shows how the tow responds. Rejected: the tractrix alone, with
+which an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
 
-The goal is reached where the body comes within ARRIVED of its width, at the moment in which it is nearest; every number
-of a tow is of the time up to there, or to its end where the goal is missed.
+The goal is reached where the body comes within ARRIVED of its width, at the moment when it is nearest. All numbers of a
+tow are for the time up to then, or to its end if the goal is missed.
 """
 from dataclasses import dataclass, field
 
@@ -22,11 +22,11 @@ from bergtow.study.runs import CaseRuns
 import numpy as np
 
 ARRIVED = 1.0        # body widths from the goal
-LONGER = {"speed": 1.05, "line": 1.15, "thrust": 1.6}  # run.duration / the predicted time; a vessel may be held up
+LONGER = {"speed": 1.05, "line": 1.15, "thrust": 1.6}  # run.duration / the predicted time; a vessel may be slowed down
 PEAK = 99            # percentile of the step means that counts as peak
-STRAIGHT = 5e-3      # body widths: what a polyline may be off a way
-FRAMES = 150         # of the one tow of a route that a page replays
-TOUCH = 1e-3         # body widths: contact with an area to keep out of
+STRAIGHT = 5e-3      # body widths: how far a polyline may deviate from a path
+FRAMES = 150         # of the one tow per route that a page replays
+TOUCH = 1e-3         # body widths: counts as contact with a no-go area
 
 
 @dataclass
@@ -36,11 +36,11 @@ class Candidate:
     name: str
     label: str
     route: object        #: planner.Route
-    speed: float         #: m/s, NaN: by legs
-    keys: dict = field(default_factory=dict)  #: of its case, as texts
-    track: np.ndarray = None                  #: [m, 2] of the body over the ground, as planned, m
+    speed: float         #: m/s, NaN: set by the legs
+    keys: dict = field(default_factory=dict)  #: keys of its case, as texts
+    track: np.ndarray = None                  #: [m, 2] planned track of the body over the ground, m
     tug: np.ndarray = None                    #: [m, 2] of the towing end, or None
-    points: np.ndarray = None                 #: [k, 2] way-points of the case, m
+    points: np.ndarray = None                 #: [k, 2] waypoints of the case, m
 
     @property
     def seconds(self):
@@ -75,8 +75,8 @@ def pairs(points):
 
 
 def programme(legs, ramp):
-    """[(time s, speed m/s)] of a tow that is as fast as its legs say: from rest, and from leg to leg in the share of
-    the ramp that the change of speed is of the largest one."""
+    """[(time s, speed m/s)] of a tow at the speeds of its legs: from rest, and from leg to leg. A change of speed takes
+    the share of the ramp that it is of the largest speed."""
     speeds, lengths = legs["speed"].astype(float), legs["length"].astype(float)
     top, out, time, at = speeds.max(), [(0.0, 0.0)], 0.0, 0.0
     for v, length in zip(speeds, lengths):
@@ -92,15 +92,15 @@ def programme(legs, ramp):
 
 
 def tug_track(route, situation):
-    """[m, 2] of the towing end in the frame of the ice."""
+    """[m, 2] track of the towing end in the frame of the ice."""
     s = situation
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
     new = np.append(True, np.diff(way) > 1e-9 * way[-1])
     way, x, y, heading = way[new], route.x[new], route.y[new], np.unwrap(route.heading)[new]
-    # curvature averaged over two lengths of the line with the weights of a triangle, from means of the heading
+    # curvature averaged over two line lengths with triangular weights, from means of the heading
     area = np.append(0.0, np.cumsum(np.diff(way) * (heading[1:] + heading[:-1]) / 2))
 
-    def whole(at):  # of the heading, which goes on as it begins and ends
+    def whole(at):  # integral of the heading, which is constant before the start and after the end
         inside = np.clip(at, 0, way[-1])
         return (np.interp(inside, way, area) + np.minimum(at, 0) * heading[0] +
                 np.maximum(at - way[-1], 0) * heading[-1])
@@ -112,7 +112,7 @@ def tug_track(route, situation):
 
 
 def candidate(name, label, route, speed, situation):
-    """The case of a route; speed: m/s, NaN: as its legs have it."""
+    """The case of a route. speed: m/s, NaN: as set by its legs."""
     s = situation
     by_legs = not np.isfinite(speed)
     time = route.time if by_legs else np.append(0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y)))) / speed
@@ -147,7 +147,7 @@ def candidate(name, label, route, speed, situation):
 
 
 def candidates(routes, speeds, situation):
-    """Every route at every speed, and at those of its legs where they differ."""
+    """Every route at every speed, and also at the speeds of its legs if these differ."""
     out, k = [], 0
     for route in routes:
         k += route.kind != "straight"
@@ -165,7 +165,7 @@ def candidates(routes, speeds, situation):
 
 @dataclass
 class Tows(CaseRuns):
-    """Tows of candidates through members, which are conditions of a study: each reads its own ice."""
+    """Tows of candidates through members. Each member is a condition of a study, and reads its own ice."""
 
     members: list = field(default_factory=list)
 
@@ -173,20 +173,20 @@ class Tows(CaseRuns):
         return f"c{i + 1:03d}-r001"
 
     def own(self, i, values):
-        """The keys of a member; the first one keeps frames."""
+        """The keys of a member. Only the first member writes frames."""
         member = self.members[i].keys if self.members else {}
         frames = -1.0 if i else float(values["run.duration"].split()[0]) / FRAMES
         return {k: v for k, v in (member | {"output.frame_interval": f"{frames:.10g} s"}).items() if k not in values}
 
     def sets(self, i, values):
-        """What replaces values of the case in the tow of a member, as texts of --set."""
+        """Values that replace those of the case in the tow of a member, as texts for --set."""
         return [f"{k}={v}" for k, v in (values | self.own(i, values)).items()]
 
     def study(self, n, values):
         return {"set": values, "variants": {f"m{i + 1:03d}": self.own(i, values) for i in range(n)}}
 
 
-# ---- what a tow says
+# ---- the outcome of a tow
 
 
 def to_goal(xy, goal):
@@ -200,7 +200,7 @@ def to_goal(xy, goal):
 
 
 def arrival(xy, goal, within):
-    """Index of the sample at which the goal is reached, None where it is missed."""
+    """Index of the sample at which the goal is reached, None if it is missed."""
     distance = to_goal(xy, goal)
     near = np.flatnonzero(distance <= within)
     if not len(near):
@@ -212,7 +212,7 @@ def arrival(xy, goal, within):
 
 
 def outcome(run, c, goal, situation, force_limit=np.inf):
-    """{name: number} of a tow. Errors: RunError."""
+    """{name: number} for a tow. Raises RunError."""
     s, time = situation, run["time"]
     if len(time) < 2:
         raise RunError(run.path, "holds no series", "make run.dt shorter", CASE)
@@ -226,7 +226,7 @@ def outcome(run, c, goal, situation, force_limit=np.inf):
     if s.mode != "speed":
         line = np.column_stack([run["carriage_x"], run["carriage_y"]])[:n] - xy[:n]
         along = np.sum(step * line, axis=1) / np.hypot(*line.T)
-    there = np.isfinite(force) & np.isfinite(along)  # not once the line has parted
+    there = np.isfinite(force) & np.isfinite(along)  # excludes the time after the line has parted
     work = float(np.sum((force * along)[there]))
     steady = there & (time[:n] > s.ramp)
     some = force[steady if steady.any() else there]

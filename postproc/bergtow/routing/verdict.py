@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Which route is better than the straight line, and whether that is shown.
+"""Which route is better than the straight line, and is the difference significant?
 
-The best of several looks better than it is, in the very members by which it was found to be the best. So one half of
-the members chooses, and the other half judges: the interval is of the paired differences to the straight line in
-members that had no part in the choice. A tow fails where it misses the goal, touches an area to keep out
-of, parts its line, or exceeds the limit of force; tows are ranked by their failures first, and by the mean of the
-objective then.
+The best of several routes looks better than it is in the members that were used to select it. So one half of the
+members selects, and the other half judges: the interval is that of the paired differences to the straight line in
+members that had no part in the selection. A tow fails if it misses the goal, touches a no-go area, parts its line, or
+exceeds the force limit. Tows are ranked first by their failures, then by the mean of the objective.
 """
 from bergtow.stats.mean import LEVEL, t_interval
 
@@ -13,11 +12,11 @@ import numpy as np
 import scipy.stats
 
 FAULTS = ("missed", "no_go_contact", "limit_exceeded", "parted", "slack")
-FAILURES = FAULTS[:-1]  #: a slack line is said, and no failure
+FAILURES = FAULTS[:-1]  #: a slack line is reported, but is not a failure
 
 
 def halves(n):
-    """(members that choose, members that judge); a single one does both."""
+    """(members that select, members that judge); a single member does both."""
     return (range(n), range(n)) if n < 2 else (range(n // 2), range(n // 2, n))
 
 
@@ -30,19 +29,19 @@ def fails(tow):
 
 
 def value(tow, objective):
-    """Of the objective; NaN where the tow fails to arrive, for it was not made."""
+    """Value of the objective; NaN if the tow did not arrive, since it was then not completed."""
     return tow[objective] if tow["arrived"] else np.nan
 
 
 def rank(tows, some, objective):
-    """To sort by: failures, then the mean of the objective."""
+    """Sort key: failures, then the mean of the objective."""
     values = [value(tows[i], objective) for i in some]
     known = [v for v in values if np.isfinite(v)]
     return sum(fails(tows[i]) for i in some), np.mean(known) if known else np.inf
 
 
 def compared(tows, straight, some, objective):
-    """Paired differences of the objective to the straight line, and of the failures, over some members."""
+    """Paired differences from the straight line in the objective and in failures, over some members."""
     a, b = (np.array([value(t[i], objective) for i in some]) for t in (tows, straight))
     both = np.isfinite(a) & np.isfinite(b)
     d = a[both] - b[both]
@@ -51,7 +50,7 @@ def compared(tows, straight, some, objective):
     base = float(b[both].mean()) if both.any() else np.nan
     better = sum(fails(straight[i]) and not fails(tows[i]) for i in some)
     worse = sum(fails(tows[i]) and not fails(straight[i]) for i in some)
-    # sign test of the members in which one fails and the other does not
+    # sign test on the members in which exactly one of the two fails
     chance = float(scipy.stats.binom.sf(better - 1, better + worse, 0.5)) if better + worse else 1.0
     return {"pairs": int(both.sum()), "difference": mean, "difference_95": [float(low), float(high)],
             "relative": mean / base, "relative_95": [float(low) / base, float(high) / base],
@@ -59,7 +58,7 @@ def compared(tows, straight, some, objective):
 
 
 def shown(c):
-    """Is it shown that this route is better?"""
+    """Is this route significantly better?"""
     if c["fails_less"] > c["fails_more"]:
         return c["chance_of_fails"] <= (1 - LEVEL) / 2
     return c["fails_more"] == 0 and bool(c["difference_95"][1] < 0)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Statistics of an ensemble: the design tow force, loads with return levels, means with intervals, estimates beside
-them, distributions, peaks of collisions, sensitivity."""
+"""Statistics of an ensemble: the design tow force, loads with return levels, means with intervals, comparison with
+estimates, distributions, peaks of collisions, sensitivity."""
 
 from bergtow import progress
 from bergtow.errors import RunError
@@ -17,10 +17,10 @@ from bergtow.table import scale, short
 
 import numpy as np
 
-MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
+MOST_SAMPLES = 300  # of a condition's series, to which distributions are fitted
 
 
-#: the options that statistics() takes: what bergtow statistics has by default
+#: the options of statistics(): the defaults of bergtow statistics
 DEFAULTS = {
     "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
     "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
@@ -44,11 +44,11 @@ def member(e, m):
 
 
 def samples(e, rows, members):
-    """Samples of the steady windows of a condition: (all of them; how many are independent; every 2 tau-th above zero,
-    at most MOST_SAMPLES).
+    """Samples of the steady windows of a condition: (all of them; number of independent ones; every 2 tau-th above
+    zero, at most MOST_SAMPLES).
 
-    All fields are thinned alike, by the median of their tau. Thinning each field by its own tau would give it the
-    weight 1/tau, and nearly all weight to a field without contact, whose tau is that of a constant.
+    All fields are thinned equally, by the median of their tau. Thinning each field by its own tau would give it the
+    weight 1/tau, and almost all weight to a field without contact, whose tau is that of a constant.
     """
     found = [(e.steady(m), members[m]["tau_samples"]) for m in rows]
     every = [x for x, _ in found if len(x)]
@@ -61,8 +61,8 @@ def samples(e, rows, members):
 
 
 def estimates(e, rows, mean):
-    """Force of each estimate, mean of the condition's fields, and simulated / estimate where all of them are held
-    against it (bergtow/estimate.h)."""
+    """Force of each estimate, averaged over the condition's fields, and simulated / estimate if all of them can be
+    compared with it (bergtow/estimate.h)."""
     out = {}
     for name, estimate in e.estimates.items():
         def column(what, default=None):
@@ -112,7 +112,7 @@ def extremes(e, rows, options):
 
 
 def drift(e, rows, mean):
-    """Does the mean of all fields change over the window (stats/drift.py)?"""
+    """Does the mean over all fields drift during the window (stats/drift.py)?"""
     found = stat_drift.of([e.number("window_series_ice_resistance_change_n", m) for m in rows if not e.cut(m)], mean)
     if found is None:
         return {"verdict": "not judged", "words": "too few fields"}
@@ -154,17 +154,18 @@ def condition(e, c, members, options):
     if without and len(rows):
         out = at_least.condition(out, str(without), without.share, loads.bounded(out["loads"], without))
     out["without_bound"] = {"share": without.share, "some": without.some, "ended": without.ended, "tows": without.tows,
-                            "words": without.words(named=True)}  # "" where there are none
+                            "words": without.words(named=True)}  # "" if there are none
     return out | {"design": statement.statement(e, rows, out)}
 
 
 def sample(e, means):
-    """({varied parameter: [n]}, mean ice resistance [n], the kind of the n in words). means: by member.
+    """({varied parameter: [n]}, mean ice resistance [n], "conditions" or "members": the sampling unit). means: by
+    member.
 
-    For a Latin hypercube the means of its conditions are the sample. The fields of a condition share the part of it
-    that the parameters do not explain; counted one by one they gave a parameter without effect an interval that
-    excludes 0 in 58 % of 95 % intervals (10 conditions of 8 fields). In a grid all levels meet all others, and what one
-    parameter does cancels in the effect of another: there it was 0 to 6 %, so the members are the sample.
+    For a Latin hypercube the condition means are the sample. Fields of a condition share the part of it that the
+    parameters do not explain; counted individually, 58 % of the 95 % intervals (10 conditions of 8 fields) for a
+    parameter without effect excluded 0. In a grid all levels meet all others, and the effect of one parameter cancels
+    in that of another: there it was 0 to 6 %, so the members are the sample.
     """
     groups = [c.finished for c in e.conditions() if len(c.finished)] if e.sampled else [[m] for m in e.used]
     first = np.array([g[0] for g in groups], dtype=int)
@@ -173,11 +174,11 @@ def sample(e, means):
 
 
 def sensitivity(e, members):
-    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over the varied
-    parameters.
+    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, with respect to
+    the varied parameters.
 
-    Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be
-    predicted.
+    If a few jams dominate the variance of the mean, no smooth function predicts it; its logarithm may still be
+    predictable.
     """
     if without := e.without_bound(np.arange(e.n)):
         return {"refused": f"means are lower bounds, {without}"}
@@ -193,7 +194,7 @@ def sensitivity(e, members):
 
 
 def nothing_to_count(e, dropped):
-    """Why there are no statistics, and what to do: RunError."""
+    """RunError that says why there are no statistics, and what to do."""
     if dropped:
         return RunError(e.file, "has no member with a mean ice resistance left", "exclude less")
     if e.behind:
@@ -213,7 +214,7 @@ def nothing_to_count(e, dropped):
 
 
 def waiting(e):
-    """Names of members that are still to come."""
+    """Names of members that have not been run yet."""
     return [e.name[m] for m in np.flatnonzero(e.status == WAITING) if e.name[m] not in e.unsound]
 
 

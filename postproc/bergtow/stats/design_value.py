@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The design statement of an ensemble: for each condition the tow force that is exceeded with a stated probability in a
-tow of stated length, its interval over fields, the conditions that it holds for, and warnings.
+tow of stated length, its interval over fields, where it holds, and warnings.
 
     p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
-Warnings are facts about the model or the sample that an interval does not include: rigid floes without a largest force,
-a domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a line that parted, a
-start-up (not part of any number) that takes more than the value, fields that are not alike.
+
+Warnings are facts about the model or the sample that an interval does not cover: rigid floes without a largest force, a
+domain that is too narrow, windows that are not steady, a tail extrapolated far, a line that parted, a start-up (not
+included in any number) with a load above the value, fields that are not alike.
 """
 from dataclasses import dataclass
 
@@ -24,9 +25,9 @@ from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
 from bergtow.table import hours_text, quantity, short
 
-LONG = 2.0          # the tow of the statement / the tow simulated: beyond, a longer load than any simulated is meant
-FAR = 10.0          # times the hours simulated: an extrapolation beyond is reported
-WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
+LONG = 2.0          # the tow of the statement / the simulated tow: above, the value is for a longer tow than simulated
+FAR = 10.0          # times the simulated hours: an extrapolation beyond this is reported
+WIDE = 3.0          # upper end of the interval / value: above, the value is only an order of magnitude
 SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (result/members.py: DOUBTS) that concern the value
 DOUBTFUL = {
@@ -36,36 +37,36 @@ DOUBTFUL = {
     "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",
     "stopped": "members that stopped early"
 }
-#: the line of conditions that the values hold for: case key, words before and after its value
+#: for the line "holds for": case key, words before and after its value
 HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
              ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
              ("tow.speed", "", ""), ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
 TOWED = {"speed": " prescribed", "line": " of the towing end of the line", "thrust": " asked of the vessel"}
-#: keys of current and wind, with the words for the case that all of them are zero
+#: keys of current and wind, with the words used if all of them are zero
 STILL = {"no current": ("water.current_x", "water.current_y", "water.tide.major", "water.current_table"),
          "no wind": ("air.wind_x", "air.wind_y", "air.wind_table")}
 
 
 @dataclass(frozen=True)
 class Case:
-    """The facts of a condition's case that a statement needs."""
+    """Facts about a condition's case that a statement needs."""
 
     rigid: bool            #: nothing limits the force of a floe
-    jams: bool             #: its rigid floes are so dense that they jam
+    jams: bool             #: its rigid floes are dense enough to jam
     mode: str
-    breaking_loads: dict   #: {series of a branch's tension: N}, of the branches that part
+    breaking_loads: dict   #: {series of a branch's tension: N}, of the branches that can part
     bollard_pull: float    #: N, NaN without a vessel
-    ramp: float            #: s, over which the tow is brought to its speed
+    ramp: float            #: s, over which the tow is accelerated to its speed
     texts: dict            #: {key: value as written}
 
     @property
     def breaking_load(self):
-        """That of the weaker branch, N; NaN where none parts."""
+        """Breaking load of the weaker branch, N; NaN if none can part."""
         return min(self.breaking_loads.values(), default=np.nan)
 
     @property
     def breaking_words(self):
-        """"150 kN", of a bridle "150 kN of branch 1, 120 kN of branch 2"; "" where none parts."""
+        """"150 kN", for a bridle "150 kN of branch 1, 120 kN of branch 2"; "" if no branch can part."""
         found = {name[len(loads.TENSION):]: quantity(load, "N") for name, load in self.breaking_loads.items()}
         return found["1"] if list(found) == ["1"] else ", ".join(f"{load} of branch {k}" for k, load in found.items())
 
@@ -77,7 +78,7 @@ def _breaking_loads(run, mode):
 
 
 def ice_as_read(run):
-    """{key: value} of a run whose ice is read from a file: the keys say nothing of it."""
+    """{key: actual value} for a run whose ice is read from a file, since the keys do not describe that ice."""
     if source_of_ice(run.case) is None or not run.n_floes:
         return {}
     size = np.sqrt(4 * run.area[:run.n_start] / np.pi).mean()
@@ -85,7 +86,7 @@ def ice_as_read(run):
 
 
 def case_of(e, rows):
-    """Case of the first member of a condition that can be read, None where none can."""
+    """Case of the first member of a condition that can be read, None if none can."""
     for m in rows:
         try:
             with Run(e.folder(m)) as run:
@@ -100,13 +101,13 @@ def case_of(e, rows):
 
 
 def cases(e, s):
-    """[(condition of the statistics s, its Case)] of the conditions whose case can be read."""
+    """[(condition of the statistics s, its Case)] for the conditions whose case can be read."""
     found = [(c, case_of(e, of.finished)) for c, of in zip(s["conditions"], e.conditions())]
     return [(c, case) for c, case in found if case]
 
 
 def speed_made_good(e, rows):
-    """Mean over fields of the speed in the window, m/s, with its interval; None where no member has one."""
+    """Mean over fields of the speed in the window, m/s, with its interval; None if no member has one."""
     speeds = []
     for m in rows:
         try:
@@ -129,7 +130,7 @@ def unbounded(e, rows):
 
 
 def domain(e, rows):
-    """How much too narrow the domain is, "" where it is not."""
+    """By how much the domain is too narrow, "" if it is not."""
     widths, needed = (_numbers(e, f"domain_body_widths{name}", rows) for name in ("", "_needed"))
     if np.any(few := widths < needed):
         return f"{widths[few].min():.3g} body widths; {needed[few].max():.3g} are asked for"
@@ -137,7 +138,7 @@ def domain(e, rows):
 
 
 def _of_the_case(e, rows, case, tow):
-    """Warnings that follow from the simulated case: pairs of the problem and its amount."""
+    """Warnings that follow from the simulated case: pairs of problem and amount."""
     out = []
     if case is None:
         out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
@@ -163,7 +164,7 @@ def _of_the_case(e, rows, case, tow):
 
 
 def _of_the_sample(e, rows, c, load):
-    """The same of how much was simulated, and of the tail."""
+    """Warnings about the amount of simulation and about the tail."""
     out, d = [], load["design"]
     for kind, words in DOUBTFUL.items():
         some = [words + (f", since {e.why_unsteady(m)}" if kind == "unsteady" else "")
@@ -202,7 +203,7 @@ def _of_the_sample(e, rows, c, load):
 
 
 def _of_unlike_fields(load):
-    """Do the fields differ by more than chance? Of a single field another warning tells."""
+    """Warning if the fields differ by more than chance; a single field gets another warning."""
     p = load["alike_p"]
     if np.isnan(p):
         return [("the windows are too short to tell whether the fields are alike, as the interval takes them", "")
@@ -214,13 +215,13 @@ def _of_unlike_fields(load):
 
 
 def start_exceeds(d):
-    """Does the start-up take more than the design value, or than the largest of the window where there is no value?"""
+    """Does the start-up exceed the design value or, without one, the largest value of the window?"""
     return d["start_up"] is not None and d["start_up"]["largest"] > d.get("value", d["largest"])
 
 
 def _of_the_start(case, load):
-    """The same of the start-up, which is in no number of the load. While the ramp accelerates the body, its inertia
-    comes on top of ice and drag, and a longer ramp takes less; a peak at another time may have any cause."""
+    """Warnings about the start-up, which no number of the load includes. While the ramp accelerates the body, its
+    inertia adds to ice and drag, and a longer ramp reduces the load; a peak at another time may have any cause."""
     found, d = load["start_up"], load["design"]
     if not start_exceeds(d | {"start_up": found, "largest": load["largest"]}):
         return []
@@ -236,8 +237,8 @@ def _of_the_start(case, load):
 
 
 def steps(e, rows):
-    """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}). The
-    numbers of the summary are in it, which know the steps between samples and members without their folder."""
+    """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}).
+    Numbers of the summaries are included, which cover the steps between samples and members without their folder."""
     out, labels = {}, {}
     for m in rows:
         try:
@@ -257,7 +258,7 @@ def steps(e, rows):
 
 
 def branches(e, rows, case, found):
-    """Of each branch of the line its breaking load (NaN: none), the largest tension of a step, start included, and the
+    """For each branch of the line its breaking load (NaN: none), the largest tension in a step, start included, and the
     design tension (NaN: none), N. found: statistics of the loads."""
     largest, labels = steps(e, rows)
     def row(name):
@@ -269,8 +270,8 @@ def branches(e, rows, case, found):
 
 
 def _of_the_line(e, rows, lines):
-    """Warnings of lines that parted, or that would. A line parts by the tension of a step, while the design tension is
-    a mean over the time scale, so both are compared with the breaking load; lines: those of branches()."""
+    """Warnings about lines that parted, or would part. A line parts by the tension in one step, while the design
+    tension is a mean over the time scale, so both are compared with the breaking load; lines: from branches()."""
     out, tows = [], e.tows(rows)
     broken = [v for m in tows for v in e.events(m) if v["kind"] == loads.PARTED]
     if broken:
@@ -285,7 +286,7 @@ def _of_the_line(e, rows, lines):
                     ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
-    known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # of these it is said above
+    known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # these are reported above
     for words, key, some in (("the design tension is", "design", lines),
                              ("the largest mean tension over one step, by which a line parts, is", "largest_step",
                               [x for x in lines if x["series"] not in known])):
@@ -297,7 +298,7 @@ def _of_the_line(e, rows, lines):
 
 
 def _of_the_models(load):
-    """Do the two models of the tail agree?"""
+    """Warning if the two models of the tail disagree."""
     over, blocks = (load[kind].get("levels", [None])[-1] for kind in ("over_threshold", "block_maxima"))
     if not over or not blocks or not np.isfinite([over["level"], blocks["level"]]).all():
         return []
@@ -309,16 +310,16 @@ def _of_the_models(load):
 
 
 def statement(e, rows, c):
-    """The design statement of a condition c, a dict of bergtow statistics: {"tow", "tension", "branches",
-    "warnings", "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
+    """The design statement for a condition c, a dict of bergtow statistics: {"tow", "tension", "branches", "warnings",
+    "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" is None if there is no tow force."""
     there = np.flatnonzero(e.condition == c["index"])
-    towed = e.tows(there, excluded=False)  # those too whose line parted before the window, which are not among the rows
+    towed = e.tows(there, excluded=False)  # including tows whose line parted before the window, not among the rows
     case, found = case_of(e, towed), c["loads"]
     tow, lines = found.get("tow_force"), branches(e, towed, case, found)
     tensions = [(load["design"], load) for load in found.values()
                 if load["needs"] in loads.LINE and "value" in load["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
-    # a branch without a value may bear more than the branch with one
+    # a branch without a value may carry more than the branch with one
     if worst and any(load["largest"] > worst[0]["value"] for load in found.values()
                      if load["needs"] in loads.LINE and "value" not in load["design"]):
         worst = None
@@ -334,7 +335,7 @@ def statement(e, rows, c):
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
     for load in found.values() if len(rows) else ():
-        if load["needs"] in loads.LINE:  # warnings about the sample of the tow force hold here, too
+        if load["needs"] in loads.LINE:  # warnings about the sample of the tow force apply here, too
             said = _of_the_start(case, load) + _of_the_sample(e, rows, c, load)
             warned += [(f"{load['label']}: {what}", detail) for what, detail in said if (what, detail) not in warned]
     warned = _of_the_line(e, there, lines) + warned
@@ -356,8 +357,8 @@ def statement(e, rows, c):
 
 
 def _moved(e, case):
-    """Current and wind in words: "no current", or the values of the case, where the study does not vary them. They must
-    be stated, because a current changes the speed of the tow through the water."""
+    """Current and wind in words: "no current", or the values of the case, unless the study varies them. They must be
+    stated, because a current changes the speed of the tow through the water."""
     for words, keys in STILL.items():
         there = [key for key in keys if case.texts.get(key, "none").split(" ")[0] not in ("0", "none")]
         if there:
@@ -370,8 +371,8 @@ def _moved(e, case):
 
 
 def _lead(e, case):
-    """The lead ahead of the body in words, none where the study varies whether there is one: ice that was removed or
-    cut is not that of the floes named here."""
+    """The lead ahead of the body in words; none if the study varies whether there is one. With a lead, ice was removed
+    or cut and no longer has the floes described here."""
     mode, size = case.texts.get("lead.mode", "none"), case.texts.get("lead.floe_size", "")
     if mode == "none" or "lead.mode" in e.parameters:
         return []
@@ -383,7 +384,7 @@ def _lead(e, case):
 
 
 def _holds_for(e, case):
-    """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
+    """"floes of 30 m, 1 m thick, ...": the keys that the study does not vary, with the values of the case."""
     if case is None:
         return ""
     said = [(in_short(case.texts[key]), before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Does the mean of several fields change over the window? From the line through the series of each, which one run alone
-may not tell from its noise: the mean of the changes, with Student's t over the fields.
+"""Does the mean over several fields change during the window? A line is fitted to the series of each field. A single
+run may not distinguish its slope from noise: the mean of the changes is tested with Student's t over the fields.
 
-Without scipy, which `make demo` does not install.
+Does not use scipy, which `make demo` does not install.
 """
 from bergtow import _library
 
@@ -12,8 +12,8 @@ LEAST = 5  # fields
 
 
 def student(freedom, level=0.95):
-    """t of Student's distribution that so much of it lies within: t = sqrt(n) tan a turns its density into
-    cos^(n-1) a."""
+    """Quantile t of Student's distribution such that |t| is below it with this probability: t = sqrt(n) tan a turns its
+    density into cos^(n-1) a."""
     angle = np.linspace(0, np.pi / 2, 200_001)
     density = np.cos(angle) ** (freedom - 1)
     share = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
@@ -21,7 +21,7 @@ def student(freedom, level=0.95):
 
 
 def interval(values):
-    """(low, high) of the mean of independent values, 95 %; NaN of fewer than two."""
+    """(low, high) of the mean of independent values, 95 %; NaN for fewer than two."""
     values = np.asarray(values, dtype=float)
     n = len(values)
     if n < 2:
@@ -31,7 +31,7 @@ def interval(values):
 
 
 def of(changes, mean):
-    """(the mean change, its interval, whether it matters) of changes over the window, N; None of too few fields."""
+    """(the mean change, its interval, is it significant?) from changes over the window, N; None for too few fields."""
     changes = np.asarray(changes, dtype=float)
     changes = changes[np.isfinite(changes)]
     if len(changes) < LEAST:

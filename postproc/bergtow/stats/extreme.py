@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Extremes of peaks or of a signal: how often a level is exceeded, block maxima (GEV), peaks over a threshold (GPD),
-return levels with intervals.
+"""Extremes of peaks or of a signal: rate of exceedance, block maxima (GEV), peaks over a threshold (GPD), return levels
+with intervals.
 
 A field is a dict: time s [n] and peak [n], in order, start s, hours. The peaks are those of collisions, or all samples
-of a signal (stats/load.py); both are treated alike, since clusters count and not samples.
+of a signal (stats/load.py). Both are treated the same way, since clusters are counted, not samples.
 
-A level z of return time T hours of tow is exceeded once in T hours on the average.
+A level z with a return time of T hours of tow is exceeded once in T hours on average.
     empirical        rate(z) = number of peaks above z / hours
     block maxima     blocks of b hours, GEV G fitted to their largest peaks: z = G^-1(exp(-b/T))
-    over threshold   clusters of peaks above u come at the rate L a hour, and the excess of a cluster's largest peak
-                     is GPD of scale s and shape k: z = u + s ((L T)^k - 1)/k, L T > 1
+    over threshold   clusters of peaks above u occur at a rate of L per hour, and the excess of a cluster's largest peak
+                     is GPD with scale s and shape k: z = u + s ((L T)^k - 1)/k, L T > 1
 [Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
-Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
+Peaks above u that are closer to each other than the gap form one cluster: a floe that is pushed along hits repeatedly.
 A level that is exceeded with probability p in a tow of T hours has the return time T / -ln(1 - p), since clusters at
-high levels come like a Poisson process.
+high levels form a Poisson process.
 
-Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stats/profile.py).
-With fewer fields than that needs, by the likelihood alone. Either is a lower bound of the uncertainty: the model of the
-tail, the threshold, and that fields are alike (stats/alike.py) are assumed. Below a shape of -1/2 maximum likelihood is
-irregular [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the
-levels; this is reported.
+Intervals are found by profile likelihood, widened for dependence within a field and scatter between fields
+(stats/profile.py); with too few fields for that, by the likelihood alone. Either is a lower bound of the uncertainty,
+because the model of the tail, the threshold, and that fields are alike (stats/alike.py) are assumed. Below a shape of
+-1/2 maximum likelihood is irregular [Smith 1985, Biometrika 72]: the fitted end of the tail, and so the levels, are
+only slightly above the largest peak; this is reported.
 
-A load that something limits - a thrust at the bollard pull - stays at its largest value. Such a sample has no tail, and
-is refused in words. Values that differ by rounding alone are the same (TIE): in a moving mean of such a signal they
-differ by some 1e-14 of it, and a tail would be fitted to that.
+A load that something limits, such as a thrust at the bollard pull, stays at its largest value. Such a sample has no
+tail, and is rejected with a message. Values that differ only by rounding count as equal (TIE): in a moving mean of such
+a signal they differ by some 1e-14 of it, and a tail would be fitted to that.
 """
 import numpy as np
 import scipy
@@ -33,16 +33,16 @@ from bergtow.stats import profile as stat_profile
 
 LEAST_EXCESSES = 30
 LEAST_BLOCKS = 20
-SHARE = 0.1          # of the peaks above the threshold, or more, until there are LEAST_EXCESSES clusters
+SHARE = 0.1          # of the peaks above the threshold; or more, until there are LEAST_EXCESSES clusters
 IRREGULAR = -0.5     # shape: below this value the likelihood is irregular
 EMPTY = 0.05         # share of blocks without a peak: above this value no GEV is fitted
 RESAMPLES = 199       # of the p-values
 TIE = 1e-9           # of the largest value: values that differ by less are the same
-SATURATED = 0.1      # share of the clusters at the largest value: from here on it is a limit, and excesses are no GPD
+SATURATED = 0.1      # share of the clusters at the largest value: above, it is a limit, and excesses are not GPD
 
 
 def tie(peak):
-    """Largest difference of peaks that count as the same."""
+    """Largest difference between peaks that count as equal."""
     return TIE * float(np.abs(peak).max(initial=0.0))
 
 
@@ -52,7 +52,7 @@ def exceeds(peak, level):
 
 
 def commonest(values):
-    """(the most frequent of these values, but for rounding, and its count)."""
+    """(the most frequent of these values, apart from rounding, and its count)."""
     x = np.sort(values)
     starts = np.flatnonzero(np.concatenate([[True], np.diff(x) > tie(x)]))
     counts = np.diff([*starts, len(x)])
@@ -61,8 +61,8 @@ def commonest(values):
 
 
 def saturated(values, what):
-    """Why values are no sample of a tail: more than the share SATURATED of them are the largest; "" if not. what: the
-    values, in words."""
+    """Why values are not a sample of a tail: more than the share SATURATED of them equal the largest; "" if they are.
+    what: the values, in words."""
     top = values.max(initial=-np.inf)
     there = int(np.sum(values >= top - tie(values)))
     return f"saturated at {top:.4g} N, which {there} of {len(values)} {what} reach and none exceeds" \
@@ -70,10 +70,10 @@ def saturated(values, what):
 
 
 def gpd(excess):
-    """(scale, shape) of maximum likelihood, shape > stat_fit.LEAST_SHAPE.
+    """(scale, shape) by maximum likelihood, shape > stat_fit.LEAST_SHAPE.
 
-    With t = shape/scale the likelihood's best shape is mean ln(1 + t y), which leaves one unknown [Grimshaw 1993,
-    Technometrics 35]; it is searched on a grid, since there can be several maxima, and then refined.
+    With t = shape/scale the most likely shape is mean ln(1 + t y), which leaves one unknown [Grimshaw 1993,
+    Technometrics 35]. It is searched for on a grid, since there can be several maxima, and then refined.
     """
     y = np.asarray(excess, dtype=float)
     unit = y.mean()
@@ -84,9 +84,9 @@ def gpd(excess):
         t = np.asarray(t, dtype=float)
         small = np.abs(t) < 1e-8
         shape = np.where(small, 1.0, shape_of(np.where(small, 1.0, t)))
-        # t = 0: exponential of mean 1
+        # t = 0: exponential with mean 1
         value = np.where(small, 1.0, np.log(shape / np.where(small, 1.0, t)) + shape + 1)
-        return np.where(~small & (shape <= stat_fit.LEAST_SHAPE), 1e6, value)  # finite: the search takes differences
+        return np.where(~small & (shape <= stat_fit.LEAST_SHAPE), 1e6, value)  # finite for differences
     low = -1 / y.max()
     t = np.concatenate([low * (1 - np.geomspace(1e-6, 1, 120)), np.geomspace(1e-6, 50, 120)])
     t.sort()
@@ -102,7 +102,7 @@ def gpd(excess):
 
 
 def clusters(time, peak, threshold, gap):
-    """Largest peak of each cluster above the threshold; a cluster ends where none follows within the gap."""
+    """Largest peak of each cluster above the threshold; a cluster ends if no other peak follows within the gap."""
     above = exceeds(peak, threshold)
     t, p = time[above], peak[above]
     if not len(t):
@@ -114,7 +114,7 @@ def clusters(time, peak, threshold, gap):
 
 
 def block_maxima(time, peak, start, hours, blocks):
-    """Largest peak of each of so many equal blocks of a field, NaN where a block has none."""
+    """Largest peak in each of the equal blocks of a field, NaN in a block without peaks."""
     k = np.clip(((time - start) / (3600 * hours) * blocks).astype(int), 0, blocks - 1)
     out = np.full(blocks, np.nan)
     for i in range(blocks):
@@ -124,7 +124,7 @@ def block_maxima(time, peak, start, hours, blocks):
 
 
 def return_hours(probability, hours):
-    """Return time of the level that is exceeded with this probability in a tow of so many hours."""
+    """Return time of the level that is exceeded with this probability in a tow of this many hours."""
     return hours / -np.log1p(-probability)
 
 
@@ -133,9 +133,9 @@ def _excesses(fields, threshold, gap):
 
 
 def choose_threshold(fields, pooled, gap, clusters_wanted=None):
-    """The level that the share SHARE of the peaks exceeds, or lower, up to half of them, until there are LEAST_EXCESSES
-    clusters; None if there never are. clusters_wanted, for a signal: the highest level with so many, or that with the
-    most of them."""
+    """The level that the share SHARE of the peaks exceeds; or a lower one, exceeded by at most half of them, that gives
+    LEAST_EXCESSES clusters; None if none does. clusters_wanted, for a signal: the highest level with this many
+    clusters, or the level with most of them."""
     ordered, wanted = np.sort(pooled)[::-1], clusters_wanted or LEAST_EXCESSES
     count, best = max(0 if clusters_wanted else int(SHARE * len(pooled)), wanted), (0, -np.inf)
     while count <= len(pooled) // 2:
@@ -150,7 +150,7 @@ def choose_threshold(fields, pooled, gap, clusters_wanted=None):
 
 def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAMPLES, what="collisions",
                    clusters_wanted=None):
-    """Peaks over a threshold as a dict; {"refused": why} where there are too few. what: the peaks, in words."""
+    """Peaks over a threshold as a dict; {"refused": why} if there are too few. what: the peaks, in words."""
     pooled, hours = np.concatenate([f["peak"] for f in fields]), sum(f["hours"] for f in fields)
     if threshold is None:
         threshold = choose_threshold(fields, pooled, gap, clusters_wanted)
@@ -196,7 +196,7 @@ def interval_note(fields):
 
 
 def gpd_minus_log_likelihood(log_scale, shape, y):
-    """Of excesses y [n]; log_scale and shape numbers."""
+    """For excesses y [n]; log_scale and shape are numbers."""
     if not stat_fit.LEAST_SHAPE < shape < 10:
         return np.inf
     z = y * np.exp(-log_scale)
@@ -209,15 +209,15 @@ def gpd_minus_log_likelihood(log_scale, shape, y):
 
 
 def gpd_intervals(each, hours, threshold, scale, shape, hours_of_levels):
-    """([(level, (low, high)) of each return time], (low, high) of the shape). each: excesses by field.
+    """([(level, (low, high)) for each return time], (low, high) of the shape). each: excesses by field.
 
-    The rate of clusters stays at its estimate in the profile; its own error, from the counts of the fields, is in the
-    dispersion.
+    In the profile the rate of clusters stays at its estimate; its error, from the counts of the fields, is included in
+    the dispersion.
     """
     excess, unit, n = np.concatenate(each), scale, len(each)
     y, total, hours = [x / unit for x in each], np.concatenate(each) / unit, np.asarray(hours, dtype=float)
     rate = len(excess) / hours.sum()
-    best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted one), shape, ln rate
+    best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted scale), shape, ln rate
     def by_field(theta):
         return np.array([
             gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h
@@ -252,7 +252,7 @@ def growth(shape, times):
 
 
 def rate_share(alone, by_field, level, best):
-    """Variance of the level with the error of the rate over that without it, by the likelihood."""
+    """Variance of the level with the error of the rate divided by that without it, from the likelihood."""
     def variance(f, g, theta):
         with np.errstate(invalid="ignore"):
             information = stat_profile.gradient(lambda t: stat_profile.gradient(f, t), theta)
@@ -267,13 +267,13 @@ def rate_share(alone, by_field, level, best):
     return share if np.isfinite(share) and share >= 1 else 1.0
 
 
-SHORT = 0.5  # of the middle one of the fields by length: shorter ones do not set the length of the blocks
+SHORT = 0.5  # relative to the median length of the fields: shorter ones do not determine the length of the blocks
 
 
 def _blocks(fields, blocks):
-    """(maxima of the blocks of each field, hours of a block). All blocks have one length: a whole number of them fits
-    the shortest of the fields that are at least half as long as the median. The rest of a field after its last whole
-    block is left out, and so are fields without a whole block."""
+    """(maxima of the blocks of each field, hours of a block). All blocks have the same length: a whole number of them
+    fits into the shortest of the fields that are at least half as long as the median. The rest of a field after its
+    last whole block is left out, and so are fields without a whole block."""
     hours = np.array([f["hours"] for f in fields])
     length, out = float(hours[hours >= SHORT * np.median(hours)].min()) / blocks, []
     for f in fields:
@@ -284,8 +284,8 @@ def _blocks(fields, blocks):
 
 
 def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a collision"):
-    """Block maxima as a dict; {"refused": why} where there are too few, or blocks without a peak. blocks: of a field;
-    without it so many that there are LEAST_BLOCKS. what: a peak, in words."""
+    """Block maxima as a dict; {"refused": why} if there are too few, or blocks without a peak. blocks: per field; by
+    default enough for LEAST_BLOCKS in all. what: a peak, in words."""
     n = len(fields)
     each, length = _blocks(fields, blocks or int(np.ceil(LEAST_BLOCKS / n)))
     maxima = np.concatenate(each)
@@ -343,6 +343,6 @@ def gev_intervals(each, location, scale, shape, shares):
 
 
 def exceedance(fields):
-    """(peaks N, largest first, times a hour that each is reached) of all fields together."""
+    """(peaks N, in descending order, rate per hour at which each is reached) over all fields."""
     peaks = np.sort(np.concatenate([f["peak"] for f in fields]))[::-1] if fields else np.zeros(0)
     return peaks, np.arange(1, len(peaks) + 1) / max(sum(f["hours"] for f in fields), 1e-300)

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Distributions fitted by maximum likelihood, and how well they fit.
+"""Distributions fitted by maximum likelihood, and their goodness of fit.
 
-normal, lognormal, Weibull and gamma (both from zero on) and the generalised extreme value distribution (GEV, shape > 0:
-heavy upper tail). Goodness of fit: Anderson-Darling A², with a p-value by parametric bootstrap: samples are drawn from
-the fit and fitted again, since tables hold for given parameters only and are far too generous for fitted ones [Stephens
-1974, J. Am. Stat. Assoc. 69]. AIC = 2k - 2 ln L, and AICc with its correction for few values, compare the fits with
-each other; neither says that the best of them is good.
+Normal, lognormal, Weibull and gamma (the last two with origin zero), and the generalised extreme value distribution
+(GEV, shape > 0: heavy upper tail). Goodness of fit: Anderson-Darling A², with a p-value from a parametric bootstrap.
+Samples are drawn from the fit and fitted again, because tables apply to given parameters only and are far too generous
+for fitted ones [Stephens 1974, J. Am. Stat. Assoc. 69]. AIC = 2k - 2 ln L, and AICc with its small-sample correction,
+compare the fits with each other; neither shows that the best of them is good.
 """
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-LEAST = 8            # values below which a fit says nothing
+LEAST = 8            # with fewer values a fit is meaningless
 RESAMPLES = 199
 SEED = 20172
 LEAST_SHAPE = -0.95  # of GEV and GPD: the likelihood has no maximum at -1 and below
@@ -31,12 +31,12 @@ class Fit:
     kolmogorov: float
     p_value: float
     frozen: object
-    refused: str = ""  #: why there is no fit; all else is empty then
+    refused: str = ""  #: why there is no fit; all other fields are then empty
 
 
 class Frozen:
-    """A distribution of SciPy with its parameters. SciPy's own way makes its documentation anew each time, which took a
-    sixth of the time of a report."""
+    """A SciPy distribution with fixed parameters. SciPy's own version regenerates its documentation each time, which
+    took a sixth of the time of a report."""
 
     def __init__(self, family, *shapes, **scales):
         self._family, self._shapes, self._scales = family, shapes, scales
@@ -63,7 +63,7 @@ def _lognormal(x):
 
 
 def _weibull(x):
-    """Shape c from sum x^c ln x / sum x^c - 1/c = mean ln x, whose left side rises with c."""
+    """Shape c from sum x^c ln x / sum x^c - 1/c = mean ln x, whose left side increases with c."""
     logs = np.log(x)
     top = logs.max()
     def equation(c):
@@ -89,8 +89,8 @@ def _gamma(x):
 
 
 def gev_moments(x):
-    """(location, scale, shape) by L-moments [Hosking, Wallis & Wood 1985, Technometrics 27]: the start of the
-    likelihood's search."""
+    """(location, scale, shape) by L-moments [Hosking, Wallis & Wood 1985, Technometrics 27]: the starting point of the
+    likelihood search."""
     x = np.sort(x)
     n, i = len(x), np.arange(len(x))
     b0, b1, b2 = x.mean(), np.sum(i * x) / (n * (n - 1)), np.sum(i * (i - 1) * x) / (n * (n - 1) * (n - 2))
@@ -116,13 +116,13 @@ def gev_minus_log_likelihood(theta, x):
 
 
 def gev(x):
-    """(location, scale, shape) of maximum likelihood, shape > LEAST_SHAPE."""
+    """(location, scale, shape) by maximum likelihood, shape > LEAST_SHAPE."""
     centre, width = np.mean(x), np.std(x)
     y = (x - centre) / width
     location, scale, shape = gev_moments(y)
     start = np.array([location, np.log(scale), shape])
-    if not np.isfinite(gev_minus_log_likelihood(start, y)):  # a value lies beyond the end of the first guess
-        start = np.array([-0.45, np.log(0.78), 1e-3])        # Gumbel of mean 0 and standard deviation 1
+    if not np.isfinite(gev_minus_log_likelihood(start, y)):  # a value lies outside the support of the first guess
+        start = np.array([-0.45, np.log(0.78), 1e-3])        # Gumbel with mean 0 and standard deviation 1
     found = scipy.optimize.minimize(gev_minus_log_likelihood,
                                     start,
                                     args=(y, ),
@@ -138,7 +138,7 @@ def _gev(x):
                                                                                      scale=scale)
 
 
-#: name: (fit, parameters, only of positive values)
+#: name: (fit, parameters, positive values only?)
 DISTRIBUTIONS = {
     "normal": (_normal, 2, False), "lognormal": (_lognormal, 2, True), "Weibull": (_weibull, 2, True),
     "gamma": (_gamma, 2, True), "GEV": (_gev, 3, False)
@@ -153,7 +153,7 @@ def anderson_darling(x, cdf):
 
 
 def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):
-    """Share of samples from the fit whose own A² reaches the statistic."""
+    """Share of samples from the fit whose A² reaches the statistic."""
     rng = rng or np.random.default_rng(SEED)
     above = tried = 0
     for _ in range(resamples):
@@ -167,11 +167,11 @@ def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):
 
 
 def fit(name, x, resamples=RESAMPLES):
-    """Fit of one distribution to independent values x; one with `refused` where it makes no sense."""
+    """Fit one distribution to independent values x; the result has `refused` set if a fit makes no sense."""
     make, k, positive = DISTRIBUTIONS[name]
-    # Contiguous: of a view with strides numpy takes the range to end one stride after the last number. Where the result
-    # happens to lie there, it sees an overlap and calls the scalar log instead of the vector one, whose last bits are
-    # others: one run of forty then differed.
+    # Contiguous: for a strided view NumPy takes the range to end one stride after the last number. If the result
+    # happens to lie there, NumPy assumes an overlap and calls the scalar log instead of the vector one, whose last bits
+    # differ: one run in forty then differed.
     x, n = np.ascontiguousarray(x, dtype=float), len(x)
     why = (f"{n} values, needs {LEAST}" if n < LEAST else "all values are the same" if np.ptp(x) == 0
            else f"{np.sum(x <= 0)} values are not positive" if positive and x.min() <= 0 else "")
@@ -190,13 +190,13 @@ def fit(name, x, resamples=RESAMPLES):
 
 
 def fit_all(x, resamples=RESAMPLES):
-    """Every fit, best AICc first, refused ones last."""
+    """All fits, best AICc first, refused ones last."""
     fits = [fit(name, x, resamples) for name in DISTRIBUTIONS]
     return sorted(fits, key=lambda f: (bool(f.refused), f.aicc if np.isfinite(f.aicc) else np.inf))
 
 
 def as_dict(f):
-    """A fit for JSON."""
+    """A fit as a dict for JSON."""
     if f.refused:
         return {"name": f.name, "refused": f.refused}
     return {

@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Statistics of a load as it acts on a thing that is built: of its whole signal, quasi-static loads and
-collisions alike, filtered to a time scale.
+"""Statistics of a load as it acts on a structure: of its whole signal, with quasi-static loads and collisions alike,
+filtered to a time scale.
 
 A time step gives an impulse, and impulse / dt is a mean over the step: with half the step the largest of them is up to
-twice as large, and no structure ever bears it. So the signal is first averaged over a time scale S, by a moving mean of
-the impulses,
+twice as large, and no structure ever carries it. So the signal is first averaged over a time scale S, by a moving mean
+of the impulses,
     x_S(t) = (1/S) integral of x from t - S to t,
-which the step no longer decides once S is some steps, and which needs no assumption on how long a collision lasts while
-S is longer than that. The mean does not wait for the filter: its first value stands S after the start of the window, so
-nothing of the start-up is in it. All moving means before that one are the start-up, those too that reach from before
-the window into it: a peak across the start of the window is in one of the two.
+which no longer depends on the step once S is several steps, and which needs no assumption about the duration of a
+collision while S is longer than that. The mean does not wait for the filter: its first value is at S after the start of
+the window, so it contains nothing of the start-up. All earlier moving means count as the start-up, including those that
+extend from before the window into it: a peak across the start of the window is in one of the two.
 
-Fields are independent, samples of a field are not. Means: Student's t over the means of fields. Standard deviation,
+Fields are independent, samples within a field are not. Means: Student's t over the means of fields. Standard deviation,
 quantiles and rates of all samples together: the jackknife over fields, value +- t se with
     se^2 = (n - 1)/n sum (v_i - v)^2,      v_i the number without field i      [Efron & Tibshirani 1993, ch. 11]
-of standard deviations and rates on the logarithm, of shares on the logit: symmetric intervals of few fields reach to
-where none of these can be. Of a load that is never negative, mean and quantiles have intervals that end at 0.
-Extremes: stats/extreme.py, of all samples, where clusters are told apart by two correlation times of the filtered
-signal, S at least.
+applied to the logarithm of standard deviations and rates and to the logit of shares, because with few fields symmetric
+intervals extend to impossible values. If a load is never negative, the intervals of its mean and quantiles end at 0.
+Extremes: stats/extreme.py, from all samples, where clusters are separated by two correlation times of the filtered
+signal, or at least S.
 """
 import numpy as np
 import scipy
@@ -27,31 +27,31 @@ from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import mean as stat_mean
 
 QUANTILES = (5, 25, 50, 75, 95, 99)
-LEAST_SCALES = 5      # time scales that a window must hold to be of use
-RESAMPLES = 49        # of p-values, at most: there are many loads
-LEVELS = 16           # of the table of exceedance, from the median to the largest value
-#: clusters above the threshold, and block maxima, about. Of a correlated signal a tenth of the samples is far too much
-#: for the tail to be GPD: intervals of the level of ten times the hours simulated held it in two sets of three, with
-#: 60 clusters in 92 % and more (README.md)
+LEAST_SCALES = 5      # time scales that a usable window must contain
+RESAMPLES = 49        # for p-values, at most: there are many loads
+LEVELS = 16           # of the exceedance table, from the median to the largest value
+#: approximate number of clusters above the threshold, and of block maxima. In a correlated signal a tenth of the
+#: samples is far too many for a GPD tail: intervals of the level for ten times the simulated hours then contained it in
+#: two sets of three, with 60 clusters in 92 % or more (README.md)
 CLUSTERS = 60
 BLOCKS = 40
 PLAIN, LOG = (np.asarray, np.asarray), (np.log, np.exp)
 LOGIT = lambda p: np.log(p / (1 - p)), lambda x: 1 / (1 + np.exp(-x))
-LEAST_GAPS = 4        # a block is as many times as long as what separates clusters, or its maxima are not independent
+LEAST_GAPS = 4        # a block is at least this many cluster gaps long, otherwise its maxima are not independent
 
 
 def moving_mean(x, n):
-    """Means of n samples in a row along the first axis, [len(x) - n + 1, ...]."""
+    """Means of n consecutive samples along the first axis, [len(x) - n + 1, ...]."""
     total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
     return (total[n:] - total[:-n]) / n
 
 
 def field_of(time, x, start, end, scale):
-    """The filtered signal of one field between two times as stats/extreme.py has it, with its sampling interval dt and
-    the time scale in effect, s; None where the window is shorter than LEAST_SCALES of these, or the load is not there
-    throughout.
+    """The filtered signal of one field between two times in the format of stats/extreme.py, with its sampling interval
+    dt and the effective time scale, s; None if the window is shorter than LEAST_SCALES of these, or the load is not
+    defined throughout.
 
-    Samples x [n] are means up to their time. Of x [n, k] each column is filtered by itself, and the largest is taken.
+    Samples x [n] are means up to their time. For x [n, k] each column is filtered separately, and the largest is taken.
     """
     there = within(time, start, end)
     time, x = time[there], x[there]
@@ -69,8 +69,8 @@ def field_of(time, x, start, end, scale):
 
 
 def start_up(time, x, start, end, scale):
-    """The largest of the means of field_of that begin before the window, whether that is long enough or not, its time
-    and the time scale in effect: {"largest", "time_s", "scale"}; None where there is none."""
+    """The largest of the means, as in field_of, that begin before the window, even if that window is too short; with
+    its time and the effective time scale: {"largest", "time_s", "scale"}; None if there is none."""
     there = within(time, -np.inf, end)
     time, x = time[there], x[there]
     if len(time) < 2:
@@ -90,8 +90,8 @@ def start_up(time, x, start, end, scale):
 
 
 def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
-    """95 % interval of a value between low and high, from its values without each of the fields; NaN ends for a single
-    field. scale: (function, its inverse); the interval is symmetric in the function wherever that is finite."""
+    """95 % interval of a value, within [low, high], from its values without each of the fields; NaN ends for one field.
+    scale: (function, its inverse); the interval is symmetric in the function if that is finite throughout."""
     n, without = len(without), np.asarray(without)
     if n < 2 or not np.isfinite([value, *without]).all():
         return np.nan, np.nan
@@ -105,7 +105,7 @@ def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
 
 
 def over_fields(statistic, samples, low=-np.inf, scale=None):
-    """A statistic of the samples of all fields together, samples [fields] of arrays, with its interval."""
+    """A statistic of the samples of all fields together, with its interval. samples: [fields] of arrays."""
     without = [statistic(np.concatenate(samples[:i] + samples[i + 1:])) for i in range(len(samples))
                ] if len(samples) > 1 else [np.nan]
     value = statistic(np.concatenate(samples))
@@ -113,37 +113,37 @@ def over_fields(statistic, samples, low=-np.inf, scale=None):
 
 
 def ratio_over_fields(counts, sizes, high=np.inf, scale=LOG):
-    """Sum of counts / sum of sizes, one of each a field, with its interval."""
+    """Sum of counts / sum of sizes, one of each per field, with its interval."""
     counts, sizes = np.asarray(counts, dtype=float), np.asarray(sizes, dtype=float)
     without, value = (counts.sum() - counts) / np.maximum(sizes.sum() - sizes, 1e-300), counts.sum() / sizes.sum()
     return {"value": value, "interval_95": jackknife(value, without, 0.0, high, scale)}
 
 
 def least_of(samples):
-    """What bounds an interval of a load: 0, unless some samples are below."""
+    """Lower limit for an interval of a load: 0, unless some samples are below."""
     return 0.0 if all(np.min(x) >= 0 for x in samples) else -np.inf
 
 
 def mean_over_fields(means, low):
-    """Ends of the interval of the mean of fields, no lower than low."""
+    """Interval of the mean of fields, cut off at low."""
     return tuple(np.maximum(stat_mean.t_interval(means), low))
 
 
 def constant(fields):
-    """Is a signal the same in all fields together, but for rounding? What differs between them is none."""
+    """Is a signal constant over all fields, apart from rounding? Such differences do not count."""
     peaks = np.concatenate([f["peak"] for f in fields])
     return bool(np.ptp(peaks) <= stat_extreme.tie(peaks))
 
 
 def gap_of(fields):
-    """Time without exceedance that ends a cluster, s: two correlation times of the fields with a signal that changes, a
-    time scale at least."""
+    """Time without exceedance that ends a cluster, s: two correlation times, over the fields in which the signal
+    changes, but at least a time scale."""
     taus = [stat_mean.series_mean(f["peak"]).tau * f["dt"] for f in fields if not constant([f])]
     return float(max(2 * np.nanmedian(taus) if taus else 0.0, max(f["scale"] for f in fields)))
 
 
 def exceedance(fields, gap):
-    """Rows of level, share of the time above it, and how often an hour it is exceeded, clusters counted once."""
+    """Rows of level, share of the time above it, and rate per hour of exceedance, counting a cluster once."""
     every, out = np.concatenate([f["peak"] for f in fields]), []
     for level in np.linspace(np.median(every), every.max(), LEVELS + 1)[:-1]:
         above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]

@@ -3,21 +3,21 @@
 
     tow_force, ice_resistance     and every series that the program registers as a load of line or vessel
     floe_force                    largest force of one floe on the hull in a step, or the peak of a collision
-    panel_load                    load on that panel of the hull where it is largest (cases with output.panels)
+    panel_load                    load on the hull panel where it is largest (cases with output.panels)
 
-Names, units and labels come from the members' files. All but floe_force are filtered (stats/load.py). That load is
-local and lasts as long as a collision; its value depends on impact.conversion, which is named.
+Names, units and labels come from the members' files. All except floe_force are filtered (stats/load.py). That load is
+local and lasts as long as a collision; its value depends on impact.conversion, which is stated with it.
 
 A line that parts. The tension of a branch counts until it parts, all other loads until no branch is left: after that
 there is no tow, and its zeros would enter every number. Neither tow force nor tension then exceeds the strength of the
 branches, and every load ends at its largest. So if a line parted in any tow there is no tail, and no design value.
-Rejected: a lower bound, which would stand in the place of a design value but be below the breaking load.
+Rejected: a lower bound, which would take the place of a design value but be below the breaking load.
 
 Time scale. 30 s by default: a bollard pull trial averages its readings over this time for the largest static pull,
-while the continuous pull, used to choose a towing vessel, is a mean of 10 min [IMO 1998, MSC/Circ.884, Guidelines for
+while the continuous pull, used to choose a towing vessel, is a mean over 10 min [IMO 1998, MSC/Circ.884, Guidelines for
 safe ocean towing]. So the vessel must hold a tow force of 30 s by thrust and not by its inertia. Shorter loads reach
 neither vessel nor line: a berg of 80 m on 600 m of line has a period of minutes. At model scale the time scale is
-shorter by the root of the length scale (estimate.length_scale), by Froude's law; so are the hours of a tow.
+shorter by the square root of the length scale (estimate.length_scale), by Froude's law; so are the hours of a tow.
 """
 from dataclasses import dataclass
 
@@ -38,8 +38,8 @@ PROBABILITY = 0.05
 ALWAYS = ("tow_force", "ice_resistance")
 ROLE = "load"
 LOCAL = ("floe_force", "panel_load")  # on a part of the hull
-LINE = ("line", "bridle")             # the tension of a branch needs one of these
-TENSION = "line_tension_"             # and the number of the branch
+LINE = ("line", "bridle")             # the tension of a branch requires one of these
+TENSION = "line_tension_"             # followed by the number of the branch
 PARTED, ADRIFT = "line_broken", "adrift"  # events: a branch parts; none is left
 TAILS = ("over_threshold", "block_maxima")
 
@@ -52,18 +52,18 @@ class Load:
     label: str
     units: str
     description: str
-    needs: str = ""       #: part of a tow that it needs, by its name in the registry
-    refused: str = ""     #: why there are no statistics of it
-    conversion: str = ""  #: meaning of the peaks of collisions in it; "" if it does not depend on a conversion
+    needs: str = ""       #: registry name of the part of a tow that it requires
+    refused: str = ""     #: why there are no statistics for it
+    conversion: str = ""  #: definition of the collision peaks in it; "" if it does not depend on a conversion
 
 
 def filler(run):
-    """The function from a series to a load: `least` if the run has steps without a solution; other NaN stay."""
+    """Function that turns a series into a load: `least` if the run has steps without a solution; other NaN are kept."""
     return least if run.number("no_load_steps") > 0 else np.asarray
 
 
 def _floe_force(run):
-    """(Load, values) of the largest force of one floe, None where collisions are not recorded separately."""
+    """(Load, values) of the largest force of one floe, None if collisions are not recorded separately."""
     if not {"largest_quasi_static_load", "impact_peak"} <= set(run.series_names):
         return None
     push, peak = run["largest_quasi_static_load"], run["impact_peak"]
@@ -79,7 +79,7 @@ def _floe_force(run):
 
 
 def _panel_load(run):
-    """(Load, values [n, panels]), None where a run has no series of them."""
+    """(Load, values [n, panels]), None if a run has no panel series."""
     if "load" not in run.panel_series:
         return None
     return Load("panel_load", "load on one hull panel", run.panel_series["units"],
@@ -87,7 +87,7 @@ def _panel_load(run):
 
 
 def of_run(run):
-    """[(Load, values)] of a run and the times of the values."""
+    """[(Load, values)] of a run, and the times of the values."""
     out, filled = [], filler(run)
     for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
         if np.isfinite(run[name]).any():
@@ -97,7 +97,7 @@ def of_run(run):
 
 
 def of_member(e, m):
-    """The same of a member of an ensemble; if its folder is missing, the loads in ensemble.h5."""
+    """The same for a member of an ensemble; if its folder is missing, the loads in ensemble.h5."""
     try:
         with Run(e.folder(m)) as run:
             return of_run(run)
@@ -107,12 +107,12 @@ def of_member(e, m):
 
 
 def scaling(e, rows):
-    """Time at full scale / time in a condition: the root of its length scale."""
+    """Time at full scale / time in a condition: the square root of its length scale."""
     return e.scaling(rows[0]) if len(rows) else 1.0
 
 
 def until(e, m, name):
-    """Time until a load of a member is no longer that of a tow, s: a tension until its branch parts, any other load
+    """Time until which a load of a member belongs to a tow, s: for a tension until its branch parts, for any other load
     until no branch is left."""
     return min((v["time_s"] for v in e.events(m) if v["kind"] == PARTED and name == f"{TENSION}{v['subject']}"),
                default=e.adrift(m))
@@ -124,8 +124,8 @@ def tows_with(e, rows, *kinds):
 
 
 def cut_off(e, rows, load):
-    """Why a load has no tail, "" where it may have one: steps without a solution, or lines that parted where that
-    matters to it. Tows that are excluded count: those that are left are the ones that the line survived."""
+    """Why a load has no tail, "" if it may have one: steps without a solution, or parted lines if the load depends on
+    them. Excluded tows count, because the remaining ones are those that the line survived."""
     through_the_line, tows = load.name == ALWAYS[0] or load.needs in LINE, e.tows(rows)
     if without := e.without_bound(rows):
         return str(without)
@@ -134,15 +134,15 @@ def cut_off(e, rows, load):
 
 
 def bounded(found, without):
-    """Names of the loads of a condition that a line bounds, even in steps without a solution: tensions, and the tow
-    force where there are any. None of them where tows ended for it: which are left depends on their loads."""
+    """Names of the loads of a condition that a line bounds, even in steps without a solution: tensions, and with them
+    the tow force. Empty if tows ended because of such steps: which tows are left then depends on their loads."""
     tensions = {name for name, x in found.items() if x["needs"] in LINE}
     return set() if without.ended or not tensions else tensions | {ALWAYS[0]}
 
 
 def in_window(e, m, time_scale):
-    """[(Load, field, start)] of a member: every load in the window, as long as it is that of a tow, and before it, as
-    stat_load.field_of and start_up have them, None where there is none."""
+    """[(Load, field, start)] of a member: every load in the window, as long as it belongs to a tow, and before the
+    window, in the formats of stat_load.field_of and start_up, None where undefined."""
     out, (some, time) = [], of_member(e, m)
     start, end = e.window(m, time)
     for load, x in some if np.isfinite([start, end]).all() else []:
@@ -153,11 +153,11 @@ def in_window(e, m, time_scale):
 
 
 def gather(e, rows, options):
-    """({name: (Load, [field, ...], start)}, {name: {"label", "why"}}) of a condition: the fields as stat_load.field_of
-    makes them, the largest start-up of all its tows, also of those whose line parts in it, and the loads that are left
-    out: those that are refused, that are constant over all fields together, and whose collisions the members convert in
-    different ways. A field with a constant load is a field like any other: ice that the tow does not meet gives a load
-    of zero, and its hours count. options: time_scale (None: the default)."""
+    """({name: (Load, [field, ...], start)}, {name: {"label", "why"}}) of a condition: the fields from
+    stat_load.field_of; the largest start-up of all its tows, including those whose line parts in it; and the loads that
+    are left out, because they are refused, are constant over all fields together, or contain collisions that the
+    members convert differently. A field with a constant load counts like any other: ice that the tow does not meet
+    gives a load of zero, and its hours count. options: time_scale (None: the default)."""
     out, starts, why = {}, {}, {}
     time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
     for m in e.tows(rows, excluded=False):
@@ -183,9 +183,9 @@ def gather(e, rows, options):
 
 
 def _design(found, hours, total):
-    """The level of the last return time by peaks over a threshold, or by block maxima where there are too few. One
-    whose interval bounds nothing (table.bound) is none: the sample does not know the tail, and such a level has been a
-    hundred times the largest load simulated."""
+    """The level of the last return time from peaks over a threshold, or from block maxima if there are too few. There
+    is none if its interval is not bounded (table.bound): the sample then does not determine the tail, and such a level
+    has been a hundred times the largest simulated load."""
     for kind, model in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
         level = found[kind].get("levels", [{"level": np.nan}])[-1]
         if np.isfinite(level["level"]):
@@ -205,7 +205,7 @@ def _design(found, hours, total):
 
 def statistics(e, rows, options, gathered=None):
     """{name: all statistics of a load} of the members of a condition; options: time_scale and tow_hours (None: the
-    default), probability, hours, resamples. gathered: what gather() found, where that is known."""
+    default), probability, hours, resamples. gathered: the result of gather(), if known."""
     gathered = gather(e, rows, options)[0] if gathered is None else gathered
     tow_hours = options.tow_hours or TOW_HOURS / scaling(e, rows)
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
@@ -234,7 +234,7 @@ def statistics(e, rows, options, gathered=None):
 
 
 def _inertia(e, m, end, scale):
-    """Mean of the inertia of a member's body over the time scale before `end`, N; NaN where its folder is not there."""
+    """Mean inertia force of a member's body over the time scale before `end`, N; NaN if its folder is missing."""
     try:
         with Run(e.folder(m)) as run:
             some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
@@ -244,10 +244,10 @@ def _inertia(e, m, end, scale):
 
 
 def panels(e, rows):
-    """Means over the window and largest step means of every panel of the hull, over the fields that were towed to the
-    end of it: {"mean", "mean_95", "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their
-    middles from the body's x axis towards y, "units", "fields"}; None where members have none, or unlike numbers of
-    them."""
+    """Means over the window and largest step means for every panel of the hull, over the fields that were towed to the
+    end of the window: {"mean", "mean_95", "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of
+    panel midpoints from the body's x axis towards y, "units", "fields"}; None if members have no panels, or different
+    numbers of them."""
     mean, largest, units, middle = [], [], "", None
     for m in [m for m in rows if not e.cut(m)]:
         try:
@@ -271,7 +271,7 @@ def panels(e, rows):
 
 
 def add_options(p):
-    """Options of the statistics of loads, and --exclude."""
+    """Add the options of the statistics of loads, and --exclude."""
     p.add_argument("--exclude",
                    action="append",
                    choices=EXCLUDABLE,

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Means with intervals: of one correlated series, and of the means of several fields.
 
-Within a run. The library's own (bergtow/stats.h, src/base/stats.c): that of the program.
+Within a run: computed by the library (bergtow/stats.h, src/base/stats.c), as in the program.
 
-Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense
-ice are skewed; the studentised bootstrap follows the skewness (second-order correct), where the percentile and BCa
-bootstrap are too short for few fields.
+Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile with n - 1 degrees of
+freedom. Means of dense ice are skewed; the studentised bootstrap accounts for skewness (second-order correct), whereas
+the percentile and BCa bootstrap intervals are too short for few fields.
 """
 from ctypes import POINTER, c_double
 
@@ -16,14 +16,14 @@ import scipy
 
 LEVEL = 0.95
 RESAMPLES = 1999
-LEAST_BOOTSTRAP = 5  # fields: fewer have too few different resamples
-TRIM = 0.125         # share of the fields cut off at each end: one of eight, two of twenty
+LEAST_BOOTSTRAP = 5  # fields: fewer give too few distinct resamples
+TRIM = 0.125         # share of the fields cut off at each end: one in eight, two in twenty
 SEED = 20171         # of every resampling: the same files give the same table
 
 
 def series_mean(x):
-    """Mean of the library of an evenly spaced series: mean, sd, se, low and high, the ends of its 95 % interval, tau,
-    n_eff, n; NaNs where there are fewer than two samples or one is not finite."""
+    """Mean of an evenly spaced series, computed by the library: mean, sd, se, low and high, the ends of its 95 %
+    interval, tau, n_eff, n; NaNs if there are fewer than two samples or one is not finite."""
     x = np.ascontiguousarray(x, dtype=float)
     return _library.library().bt_stats_mean(x.ctypes.data_as(POINTER(c_double)), len(x))
 
@@ -38,10 +38,10 @@ def t_interval(x, level=LEVEL):
 
 
 def mean_of_conditions(conditions, level=LEVEL):
-    """(mean, low, high) of the mean of the means of several conditions; NaNs for the bounds where one has fewer than
-    two fields. conditions: [{field: value}]. Values of one field move together, whatever conditions they belong to:
-    with m conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the variance is
-    the sum of d^2 n / (n - 1). With one condition that is t_interval."""
+    """(mean, low, high) of the mean of the means of several conditions; the bounds are NaN if a condition has fewer
+    than two fields. conditions: [{field: value}]. Values of one field are correlated, whichever conditions they belong
+    to: with m conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the
+    variance is the sum of d^2 n / (n - 1). With one condition this is t_interval."""
     counts, moved = [len(c) for c in conditions], {}
     mean = np.mean([np.mean(list(c.values())) for c in conditions])
     if min(counts) < 2:
@@ -76,8 +76,8 @@ def studentised_interval(x, level=LEVEL, resamples=RESAMPLES, rng=None):
 
 
 def median_interval(x, level=LEVEL):
-    """(low, high) of the median by order statistics, without any assumption on the distribution; NaN where n is too
-    small for the level."""
+    """(low, high) of the median by order statistics, without assuming a distribution; NaN if n is too small for the
+    level."""
     x = np.sort(x)
     n = len(x)
     k = int(scipy.stats.binom.ppf((1 - level) / 2, n, 0.5))
@@ -87,8 +87,8 @@ def median_interval(x, level=LEVEL):
 
 
 def fields_needed(mean, sd, error, level=LEVEL):
-    """Least n whose t interval is within error * |mean|, from the mean and the standard deviation between fields; NaN
-    without either."""
+    """Least n for which the t interval is within error * |mean|, from the mean and the standard deviation between
+    fields; NaN if either is missing."""
     if not (np.isfinite([mean, sd]).all() and mean != 0):
         return np.nan
     ratio, n = sd / (error * abs(mean)), 2
@@ -98,8 +98,8 @@ def fields_needed(mean, sd, error, level=LEVEL):
 
 
 def between_fields(means, errors, wanted=0.05):
-    """Statistics of the means of fields, with the standard errors within each, as a dict of numbers and (low, high)
-    pairs."""
+    """Statistics of the means of fields, with the standard errors within each field, as a dict of numbers and (low,
+    high) pairs."""
     means, errors = np.asarray(means, dtype=float), np.asarray(errors, dtype=float)
     n = len(means)
     if n == 0:

@@ -1,30 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""Intervals of a quantity by its profile likelihood, widened for values that depend on each other within a field.
+"""Intervals of a quantity from its profile likelihood, widened for dependence between values within a field.
 
-With l_p(q) the largest log-likelihood of all parameters that give the quantity q, the interval holds the q with
+With l_p(q) the largest log-likelihood of all parameters that give the quantity q, the interval contains the q with
     2 (l(q^) - l_p(q)) <= max(k, K c),      c = g V_s g / g V_m g,
-K the square of Student's t quantile of F - 1 degrees of freedom, k of that of F - 1 + WORTH.
+K the square of Student's t quantile with F - 1 degrees of freedom, k of that with F - 1 + WORTH.
 g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the
-squared scores of the F fields: c is about 1 where the values of a field are independent of each other and of the field,
-and larger where they are not [Chandler & Bate 2007, Biometrika 94]. c is known as well as F fields tell it. The
-likelihood itself is known better, by all their values, but a model of the tail holds a little less than it says: WORTH
-is chosen on series whose extremes are known (README.md). With K for both, up to 99 to 100 % of the intervals of 5 to 8
-fields held the level; with the normal quantile for k, as few as 87 % of those of 8.
-Follows the skewness of return levels. Rejected: percentiles of a bootstrap over fields. Of 95 % intervals of
-exponential tails from 8 and 20 fields they covered 65 to 82 % and 75 to 80 %, since the shape of a short sample is low
-and its resamples are lower still.
+squared scores of the F fields: c is about 1 if the values in a field are independent of each other and of the field,
+and larger if they are not [Chandler & Bate 2007, Biometrika 94]. c is known only as well as F fields allow. The
+likelihood itself is known better, from all their values, but tail models cover slightly less than they claim: WORTH was
+chosen on series whose extremes are known (README.md). With K for both, up to 99 to 100 % of the intervals of 5 to 8
+fields contained the level; with the normal quantile for k, as few as 87 % of those of 8.
+The interval follows the skewness of return levels. Rejected: percentiles of a bootstrap over fields. Of 95 % intervals
+of exponential tails from 8 and 20 fields they covered 65 to 82 % and 75 to 80 %, since the shape from a short sample is
+low and from its resamples lower still.
 
-J is the scatter of the fields drawn. Where fields differ in level, those that bear the level of a longer time are worse
-than any of these, and the interval does not hold it as often as it says (stats/alike.py; README.md has numbers).
+J is the scatter of the sampled fields. If fields differ in level, those that determine the level of a longer time are
+worse than any sampled one, and the interval covers less often than it claims (stats/alike.py; numbers in README.md).
 """
 import numpy as np
 import scipy
 
-LEAST_FIELDS = 5  # fewer say nothing of the scatter between fields: the likelihood alone, by the normal quantile
-WORTH = 3         # degrees of freedom that the likelihood counts for beside the fields
-STEPS = 60        # doublings of the distance before an interval counts as open
+LEAST_FIELDS = 5  # with fewer fields their scatter is unknown: the likelihood alone, with the normal quantile
+WORTH = 3         # degrees of freedom that the likelihood adds to those of the fields
+STEPS = 60        # steps outwards, each 1.6 times the last, before an interval counts as open
 BISECTIONS = 14
-SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes are of the order of one
+SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes are of order one
 
 
 def gradient(f, theta, step=1e-4):
@@ -38,7 +38,7 @@ def gradient(f, theta, step=1e-4):
 
 
 def dispersion(minus_log_likelihoods, quantity, theta):
-    """c for a quantity of theta; minus_log_likelihoods(theta) gives one number a field. 1 where it cannot be found."""
+    """c for a quantity of theta; minus_log_likelihoods(theta) gives one number per field. 1 if it cannot be found."""
     theta = np.asarray(theta, dtype=float)
     # at the limit of the admissible parameters the gradient is not finite; this is detected below
     with np.errstate(invalid="ignore"):
@@ -57,8 +57,8 @@ def dispersion(minus_log_likelihoods, quantity, theta):
 
 
 def drop(fields, c, share=1.0, level=0.95):
-    """Fall of the log-likelihood at the ends of the interval. c: of `dispersion`; share: variance with what the profile
-    holds fixed over that without."""
+    """Drop of the log-likelihood at the ends of the interval. c: from `dispersion`; share: variance including the error
+    of parameters that the profile holds fixed / variance without it."""
     def squared(quantile):
         return quantile(0.5 + level / 2) ** 2
     if fields < LEAST_FIELDS:
@@ -74,8 +74,8 @@ def interval(minus_log_likelihood, best, rest, fall, first):
     """
     least = minus_log_likelihood(best, rest)
     def rise(q, start):
-        # A simplex of its own size: SciPy's is 0.00025 wide about zero and then ends where it began. Impossible values
-        # are very unlikely ones: the search takes differences.
+        # The simplex is set explicitly: SciPy's is 0.00025 wide near zero, so that the search ends where it began.
+        # Impossible values count as very unlikely ones, because the search takes differences.
         simplex = start + SIMPLEX * np.vstack([np.zeros(len(start)), np.eye(len(start))])
         found = scipy.optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
                                         options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400,

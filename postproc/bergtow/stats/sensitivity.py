@@ -1,36 +1,36 @@
 # SPDX-License-Identifier: MIT
 """Which parameter matters: rank correlations and Sobol indices, from the sample of the study.
 
-Spearman's rho of a parameter with the response, and the partial one (PRCC), after the ranks of the other parameters
-have been regressed out of both; intervals by Fisher's z with the variance 1.06/(n - k - 3) of ranks [Fieller, Hartley &
-Pearson 1957, Biometrika 44].
+Spearman's rho of a parameter with the response, and the partial rank correlation (PRCC), after the ranks of the other
+parameters have been regressed out of both; intervals by Fisher's z with the variance 1.06/(n - k - 3) for ranks
+[Fieller, Hartley & Pearson 1957, Biometrika 44].
 
-Sobol indices from a polynomial chaos expansion fitted by least squares [Sudret 2008, Reliab. Eng. Syst. Saf. 93].
-Indices do not change when a parameter is transformed monotonically, so each is taken by its rank: uniform on (0, 1) in
-a Latin hypercube, whether it was sampled on a linear or a logarithmic scale. Its functions are orthonormal under the
-sample's own distribution of it: Legendre-like polynomials where it has many values, one function less than there are
-values where it has few (then a full factorial design gives the analysis of variance), names included. Then with y = sum
-c_a psi_a,  S_i = sum of c_a² over terms in i alone / sum of all,  T_i = the same over all terms in i. The estimate c²
-is high by the variance of c, which is taken off. The degree is the one with the best Q² (cross-validated R², each value
-left out in turn). The part that the expansion does not explain, including the scatter of the fields, is reported as 1 -
-R²; the indices divide the part that it explains.
+Sobol indices come from a polynomial chaos expansion fitted by least squares [Sudret 2008, Reliab. Eng. Syst. Saf. 93].
+Indices do not change under a monotonic transformation of a parameter, so each is replaced by its rank: uniform on (0,
+1) in a Latin hypercube, whether sampled on a linear or a logarithmic scale. The basis functions are orthonormal under
+the parameter's own distribution in the sample: Legendre-like polynomials if it has many values, one function fewer than
+there are values if it has few (then a full factorial design gives the analysis of variance), including names. With y =
+sum c_a psi_a,  S_i = sum of c_a² over terms in i alone / sum of all,  T_i = the same over all terms containing i. The
+estimate c² is biased high by the variance of c, which is subtracted. The degree is the one with the best Q²
+(cross-validated R², leaving out each value in turn). The part that the expansion does not explain, including the
+scatter of the fields, is reported as 1 - R²; the indices divide the part that it explains.
 """
 import itertools
 
 import numpy as np
 import scipy
 
-FEW = 6              # a parameter with at most so many different values is a choice among levels
+FEW = 6              # a parameter with at most this many distinct values is a choice among levels
 MOST_DEGREE = 10
 LEAST_SAMPLES = 20
-PER_TERM = 2         # samples a term of the expansion
+PER_TERM = 2         # samples per term of the expansion
 LEAST_Q2 = 0.3
 RESAMPLES = 100
 SEED = 20174
 
 
 def scores(column):
-    """Middle ranks in (0, 1) of a column; names in the order in which they first appear."""
+    """Mid-ranks in (0, 1) of a column; names are ordered by first appearance."""
     column = np.asarray(column)
     if column.dtype == object:
         names = list(dict.fromkeys(column))
@@ -44,7 +44,7 @@ def _residual(y, others):
 
 
 def _interval(r, n, others):
-    """95 % interval of a rank correlation; NaN where the sample is too small."""
+    """95 % interval of a rank correlation; NaN if the sample is too small."""
     freedom = n - others - 3
     if freedom < 1 or not np.isfinite(r) or abs(r) >= 1:
         return (r, r) if abs(r) >= 1 else (np.nan, np.nan)
@@ -84,10 +84,10 @@ def _functions(u, levels, degree):
 
 
 def _terms(depth, degree):
-    """Exponents [terms][k], without the constant, of total degree up to `degree`; depth: functions of each parameter
-    and whether it is a choice.
+    """Exponents [terms][k], without the constant, of total degree up to `degree`; depth: number of functions of each
+    parameter, and whether it is a choice.
 
-    A function of a choice counts as of degree one: all of them come in together.
+    Each function of a choice counts as degree one, so that all of them enter together.
     """
     def cost(a):
         return sum((1 if choice else e) for e, (_, choice) in zip(a, depth) if e)
@@ -112,10 +112,10 @@ def _design(columns, degree):
 
 
 def _fit(a, y):
-    """(coefficients, their variances, R², Q²) of least squares."""
+    """(coefficients, their variances, R², Q²) from least squares."""
     q, r = np.linalg.qr(a)
     if np.min(np.abs(np.diag(r))) < 1e-8 * np.max(np.abs(np.diag(r))):
-        return None  # the sample cannot tell some terms apart
+        return None  # some terms cannot be distinguished in the sample
     c = np.linalg.solve(r, q.T @ y)
     rest, hat = y - a @ c, np.sum(q * q, axis=1)
     freedom, total = len(y) - a.shape[1], np.sum((y - y.mean()) ** 2)
@@ -138,8 +138,7 @@ def _indices(c, variance, terms, k):
 
 
 def sobol(parameters, y, resamples=RESAMPLES):
-    """First-order and total Sobol indices with intervals as a dict; {"refused": why} where the sample does not carry
-    them."""
+    """First-order and total Sobol indices with intervals as a dict; {"refused": why} if the sample is insufficient."""
     y = np.asarray(y, dtype=float)
     n, names = len(y), [k for k, v in parameters.items() if len(set(np.asarray(v).tolist())) > 1]
     if not names:
@@ -173,9 +172,9 @@ def sobol(parameters, y, resamples=RESAMPLES):
     for _ in range(resamples):
         pick = rng.integers(0, n, n)
         drawn_a = a[pick]
-        # nearly orthonormal columns: the normal equations do
+        # the columns are nearly orthonormal, so the normal equations suffice
         again = np.linalg.lstsq(drawn_a.T @ drawn_a, drawn_a.T @ y[pick], rcond=None)[0]
-        # its own variance and that of drawing anew
+        # its own variance and that of the resampling
         drawn.append(np.concatenate(_indices(again, 2 * variance, terms, len(names))))
     drawn = np.array(drawn).reshape(-1, 2 * len(names))
     low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0) if len(drawn) else np.full((2, 2 * len(names)), np.nan)

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""How much of the scatter of a number comes from the fields, from the parameters, and from each of them.
+"""How much of the scatter of a number comes from the fields, from the parameters, and from each parameter.
 
 Members of a Latin hypercube, r separate fields in each of n conditions:
 
     y = m + p(condition) + f(field),    E MS_within = s_f²,    E MS_between = s_f² + r s_p²
 
-the one-way analysis of variance with random effects; with unequal numbers of fields r is Cochran's mean. Intervals
-are those of the jackknife over conditions, of variances on the logarithm; a hypercube is stratified, so they are
-rather too wide. Sobol indices of the means of the conditions (stats/sensitivity.py) divide the parameters' part, on the
-scale, plain or logarithmic, where the expansion predicts better. Rejected: shares from correlations alone, which miss
-effects of pairs; a surrogate of all members, whose cross-validation would see the same condition twice.
+This is the one-way analysis of variance with random effects; with unequal numbers of fields r is Cochran's mean.
+Intervals are those of the jackknife over conditions, for variances on a logarithmic scale; a hypercube is stratified,
+so they tend to be too wide. Sobol indices of the condition means (stats/sensitivity.py) divide the parameters' part, on
+the scale, linear or logarithmic, on which the expansion predicts better. Rejected: shares from correlations alone,
+which miss interactions; a surrogate of all members, whose cross-validation would see the same condition twice.
 """
 from dataclasses import dataclass
 
@@ -20,20 +20,20 @@ from bergtow.stats import load as stat_load
 from bergtow.stats import sensitivity as stat_sensitivity
 
 LEAST = 8            # conditions
-QUANTITIES = ("width", "length", "dt", "tolerance", "window")  # of bergtow converge, that act on the mean
+QUANTITIES = ("width", "length", "dt", "tolerance", "window")  # of bergtow converge, those that affect the mean
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Mean and variances of the two parts."""
+    """The mean and the variances of the two parts."""
 
     mean: float
-    fields: float      #: variance, NaN with one field in each condition
-    parameters: float  #: variance, that of both parts then
+    fields: float      #: variance; NaN with one field in each condition
+    parameters: float  #: variance; with one field in each condition, that of both parts
 
 
 def parts(groups):
-    """Of values [[y, ...], ...], a list a condition."""
+    """Parts from values [[y, ...], ...], one list per condition."""
     n = np.array([len(g) for g in groups], dtype=float)
     means = np.array([np.mean(g) for g in groups])
     grand = means.mean()
@@ -42,7 +42,7 @@ def parts(groups):
     if freedom < 1:
         return Parts(float(grand), np.nan, float(between))
     within = sum(np.sum((np.asarray(g) - m) ** 2) for g, m in zip(groups, means)) / freedom
-    # of means: E between = s_p² + s_f² mean(1 / n)
+    # for means: E between = s_p² + s_f² mean(1 / n)
     return Parts(float(grand), float(within), float(between - within * np.mean(1 / n)))
 
 
@@ -52,7 +52,7 @@ def _sd(variance, ends):
 
 
 def shares(parameters, means):
-    """Sobol indices of the means of the conditions, on the scale that is predicted better; a dict as that of
+    """Sobol indices of the condition means, on the scale on which they are predicted better; a dict like that of
     stat_sensitivity.sobol, with "scale"."""
     plain = stat_sensitivity.sobol(parameters, means) | {"scale": "the number itself"}
     if np.min(means) <= 0:
@@ -64,12 +64,12 @@ def shares(parameters, means):
 
 
 def _of_a_chain(chain):
-    """(bias, standard deviation, why they are not all) of a quantity, relative to the mean of the study; chain: rows
-    of converge.json that begin at its value.
+    """(bias, standard deviation, why they are incomplete) for a quantity, relative to the mean of the study; chain:
+    rows of converge.json that begin at its value.
 
-    An effect that matters is known: what all of them make together is a bias. Its error is half the half-width of its
-    interval. Of the last comparison, whose effect may be none, half the larger end of the interval: that holds the
-    scatter of that comparison, so it is an upper bound rather than an estimate.
+    An effect that matters is known: all such effects together make a bias. Its error is half the half-width of its
+    interval. For the last comparison, which may have no effect, it is half the larger end of the interval; as that
+    includes the scatter of the comparison, it is an upper bound rather than an estimate.
     """
     factor, squares = 1.0, 0.0
     for row in chain:
@@ -84,8 +84,8 @@ def _of_a_chain(chain):
 
 
 def relative_numerics(rows, own):
-    """The numerical error, relative to the mean, from the rows of converge.json and the values that the study
-    runs with, {quantity: value}: {"sd", NaN where nothing is known; "biases": {quantity: relative effect}; "unknown":
+    """The numerical error, relative to the mean, from the rows of converge.json and the values that the study runs
+    with, {quantity: value}: {"sd", NaN if nothing is known; "biases": {quantity: relative effect}; "unknown":
     {quantity: why sd does not bound it}}; None without rows."""
     squares, biases, unknown = [], {}, {}
     for name in QUANTITIES:
@@ -103,7 +103,7 @@ def relative_numerics(rows, own):
 
 
 def _numerics(relative, mean):
-    """The same of a mean, with "bias": all biases together, in its unit."""
+    """The same for a mean, with "bias": all biases combined, in the unit of the mean."""
     if relative is None or "refused" in relative:
         return relative
     bias = np.prod([1 + b for b in relative["biases"].values()]) - 1
@@ -112,8 +112,8 @@ def _numerics(relative, mean):
 
 def budget(parameters, condition, y, numerics=None):
     """Everything as nested dicts. parameters: {name: [M]}, condition [M], y [M]; numerics: relative_numerics(), or
-    {"refused": why}. {"refused": why} where there are too few conditions. The shares are those of the mean square
-    deviation from what a converged computation would give: of the variance, and of the square of a bias."""
+    {"refused": why}. {"refused": why} if there are too few conditions. The shares refer to the mean square deviation
+    from the result of a converged computation, which is the variance plus the square of the bias."""
     y, condition = np.asarray(y, dtype=float), np.asarray(condition)
     ids = np.unique(condition)
     if len(ids) < LEAST:

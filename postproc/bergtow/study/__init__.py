@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Many runs: ensembles, and studies that make their runs."""
+"""Ensembles, and studies that start their own runs."""

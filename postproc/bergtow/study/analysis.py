@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The analyses converge, budget and capability: their options, and the result of each as NAME.json in a folder,
-NAME.png where something can be drawn, a text at the terminal, and a chapter of the report.
+NAME.png if it can be drawn, text at the terminal, and a chapter of the report.
 
-The words of NAME stand in text/NAME.py: content(found), and figure(found) where something can be drawn;
-`found` as read from the file, with None for numbers that are not finite.
+The words of NAME are in text/NAME.py: content(found), and figure(found) if it can be drawn; `found` is as read from the
+file, with None for numbers that are not finite.
 """
 import os
 
@@ -14,7 +14,7 @@ from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
 from bergtow.text import converge as converge_text
 
-#: heading and words, in the order of a report
+#: headings and modules with the words, in the order of a report
 KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty budget", budget_text),
          "capability": ("Towing capability", capability_text)}
 
@@ -23,7 +23,7 @@ KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty bud
 
 
 def add_options(p, minutes):
-    """--budget, --set, --jobs, --force."""
+    """Add --budget, --set, --jobs, --force."""
     p.add_argument("--budget", type=arguments.minutes, default=minutes, metavar="MIN",
                    help=f"wall time, min (default {minutes:g}); the same call continues")
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
@@ -37,7 +37,7 @@ def _files(name, folder):
 
 
 def begin(name, file, kind, folder, force):
-    """Is there a case or study, and a place for what is found? Errors: RunError."""
+    """Check that the case or study exists, and that the results can be written. Raises RunError."""
     if not file.exists():
         raise RunError(file, "no such file", f"name a {kind} file")
     for path in _files(name, folder):
@@ -45,7 +45,7 @@ def begin(name, file, kind, folder, force):
 
 
 def keep(name, found, folder, force):
-    """Write a result and print it. Errors: RunError."""
+    """Write a result and print it. Raises RunError."""
     words, found = KINDS[name][1], writing.plain(found)
     data, *pictures = _files(name, folder)
     writing.write_json(found, data, force)
@@ -60,7 +60,7 @@ def keep(name, found, folder, force):
 
 
 def also(folders):
-    """Check that the folders named by --also hold results. Errors: RunError."""
+    """Check that the folders named by --also hold results. Raises RunError."""
     for folder in folders:
         if not any((folder / f"{name}.json").is_file() for name in KINDS):
             raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in KINDS)}",
@@ -68,7 +68,7 @@ def also(folders):
 
 
 def chapter(name, found):
-    """{"heading", "parts", "figure"} of the result of a command, for a report; figure is a function without
+    """{"heading", "parts", "figure"} from the result of a command, for a report; figure is a function without
     arguments, or None. found["doubt"]: why the result does not belong to the subject of the report."""
     heading, words = KINDS[name]
     draw = getattr(words, "figure", None)

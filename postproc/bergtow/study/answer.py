@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The answer to a client's question, answer.json: tow force with interval or named fall-back, its parts, load cases,
-the band over what is assumed, ramp, vessel, line, speeds, and the sentence that is made of them.
+"""The answer to a client's question, answer.json: tow force with interval or a named fall-back, its parts, load cases,
+the band over the assumed values, ramp, vessel, line, speeds, and the sentence made from them.
 
-Codes and numbers in SI units; what they read like is in text/answer.py. Every number of the sentence names the id of
-the row that it is from. A value is, in this order,
+It holds codes and numbers in SI units; text/answer.py turns them into words. Every number in the sentence names the id
+of the row that it comes from. A value is, in this order,
 
-    return_level     the level of the stated probability, where a tail can be fitted
+    return_level     the level of the stated probability, if a tail can be fitted
     constant         a load that does not vary
-    at_least         the largest simulated, where a line parted or a step had no solution: nothing bounds it from above
+    at_least         the largest simulated, if a line parted or a step had no solution: it has no upper bound
     largest_of_n     the largest of the n tows, distribution-free (stats/largest.py)
-    none             where no tow has a window
+    none             if no tow has a window
 """
 import json
 import math
@@ -31,9 +31,9 @@ from bergtow.study.runs import checked
 import numpy as np
 
 FORMAT = 1
-LOWER = "largest_of_n", "at_least", "changed"  # kinds of loads that nothing bounds from above without an interval
-HALF = 0.5               # of a run is its window, where the case does not say where that begins: assumed
-#: parts of a mean tow force: name, key of the summary; None: parts of the drag
+LOWER = "largest_of_n", "at_least", "changed"  # kinds of loads that have no upper bound if they have no interval
+HALF = 0.5               # share of a run that is its window, if the case does not set the start of the window: assumed
+#: parts of a mean tow force: name, summary key; None: parts of the drag
 PARTS = (("ice", "mean_ice_resistance_n"), ("water", None), ("wind", None),
          ("coriolis", "mean_coriolis_force_n"), ("slope", "mean_tilt_force_n"), ("inertia", "mean_inertia_force_n"))
 BEND = 30.0                            # degrees, of the course change, assumed
@@ -43,12 +43,12 @@ BEND = 30.0                            # degrees, of the course change, assumed
 
 
 def plan(program, path, given, conditions, jobs, minutes, most):
-    """What a design value needs, and what a budget gives. conditions: how many; minutes: for the fields, inf without a
-    budget; most: fields of a condition. Errors: RunError.
+    """What a design value requires, and what a budget allows. conditions: their number; minutes: for the fields, inf
+    without a budget; most: fields per condition. Raises RunError.
 
-    A fitted tail needs blocks, each stat_load.LEAST_GAPS times as long as what separates clusters, two correlation
-    times. Before any run that is taken as the time in which the body goes on by its own length and a floe's, when the
-    ice that it touches has become other ice: assumed, and told as such."""
+    A fitted tail requires blocks, each stat_load.LEAST_GAPS times as long as the gap between clusters, two correlation
+    times. Before any run the gap is taken as the time in which the body moves by its own length plus that of a floe,
+    after which it touches different ice: assumed, and reported as such."""
     found = json.loads(checked(program, path, given, "--json"))
     values = case_numbers(program, path, given)
     speed, slower = values["speed"], values["slower"]
@@ -67,14 +67,14 @@ def plan(program, path, given, conditions, jobs, minutes, most):
 
 
 def fields_in(seconds, member, conditions, jobs):
-    """Fields of all conditions that end within so many s, at s a member; inf without an end."""
+    """Number of fields of all conditions that fit into this many s, at `member` s each; inf without a limit."""
     if not np.isfinite(seconds):
         return np.inf
     return int(max(0.0, seconds) / max(member, 1e-9)) * jobs // conditions
 
 
 def case_numbers(program, path, given):
-    """Numbers of a case that no run is needed for."""
+    """Numbers of a case that can be found without a run."""
     case = parse_case(checked(program, path, given, "--scale", "1"))
     scale = case_value(case, "estimate.length_scale", 1.0)
     return {"case": case, "speed": case_value(case, "tow.speed", 0.0), "slower": math.sqrt(scale) if scale > 0 else 1.0,
@@ -82,19 +82,19 @@ def case_numbers(program, path, given):
             "length": case_value(case, "body.length", 0.0), "duration": case_value(case, "run.duration")}
 
 
-# ---- of the ensemble
+# ---- from the ensemble
 
 
 def options(**more):
-    """Those of the statistics, as bergtow statistics has them, without p-values."""
+    """Options of the statistics, as in bergtow statistics, without p-values."""
     return SimpleNamespace(**({"time_scale": None, "tow_hours": None, "probability": stat_loads.PROBABILITY,
                                "hours": [], "resamples": 1, "error": 0.05, "gap": None, "blocks": None,
                                "threshold": None} | more))
 
 
 def value_of(e, c, found, fields, some):
-    """The value of a condition: see the head of this file. found: statistics of the tow force, None without one;
-    fields: of gather()."""
+    """The value of a condition: see the top of this file. found: statistics of the tow force, None without one; fields:
+    from gather()."""
     if found is None:
         if some is not None:
             return {"kind": "constant", "n": some}
@@ -119,8 +119,8 @@ def windy(case):
 
 
 def parts_of(e, rows, value, wind):
-    """Mean forces along the tow that its value is made of, {part: N}; what the value has above their sum is the
-    fluctuation. wind: there is some; its drag is the whole drag less that of the water."""
+    """Mean forces along the tow that make up its value, {part: N}; the excess of the value over their sum is the
+    fluctuation. wind: is there any? Its drag is the total drag minus that of the water."""
     def mean(key):
         x = e.summary.get(key, np.full(e.n, np.nan))[rows]
         return float(np.nanmean(x)) if np.isfinite(x).any() else 0.0
@@ -158,7 +158,7 @@ def condition(e, c, k, o):
 
 
 def with_speed(row, e, c):
-    """The same with its speed and concentration, from a member."""
+    """The row with its speed and concentration added, from a member."""
     for m in c.members:
         if e.status[m] == FINISHED and e.folder(m).is_dir():
             with Run(e.folder(m)) as run:
@@ -174,14 +174,14 @@ def conditions(e, **more):
 
 
 def hardest(rows, speed=None):
-    """The row with the largest value, of the speed that is asked for where there is one; None without a value."""
+    """The row with the largest value, at the requested speed if given; None without a value."""
     some = [r for r in rows if np.isfinite(r["value"]["n"])
             and (speed is None or not np.isfinite(r["speed_m_s"]) or math.isclose(r["speed_m_s"], speed, rel_tol=1e-6))]
     return max(some, key=lambda r: r["value"]["n"], default=None)
 
 
 def case_of(e, row):
-    """{key: text} of a condition's case, as the program reads it; {} where no member of it has left a folder."""
+    """{key: text} of a condition's case, as the program reads it; {} if none of its members has a folder."""
     for m in e.conditions()[int(row["id"].partition(".")[2]) - 1].members:
         if e.status[m] == FINISHED and e.folder(m).is_dir():
             with Run(e.folder(m)) as run:
@@ -190,8 +190,8 @@ def case_of(e, row):
 
 
 def tow_of(e, row, line, vessel):
-    """The steady tow of a row as load_cases takes it; None where no member of it has left a folder, or where it has no
-    ice resistance."""
+    """The steady tow of a row, for load_cases; None if none of its members has a folder, or if it has no ice
+    resistance."""
     c = e.conditions()[int(row["id"].partition(".")[2]) - 1]
     part = {p["part"]: p["n"] for p in row["parts"]}
     for m in c.finished:
@@ -214,7 +214,7 @@ def tow_of(e, row, line, vessel):
     return None
 
 
-# ---- what follows
+# ---- conclusions
 
 
 def steady_case(row):
@@ -224,12 +224,12 @@ def steady_case(row):
 
 
 def bounds(row):
-    """Ends of a load for a verdict. The largest of a few runs is a lower bound, which no pull is known to hold."""
+    """Ends of a load for a verdict. The largest of a few runs is only a lower bound, so no pull is known to hold it."""
     return row.get("interval_95") or ((row["n"], None) if row["kind"] in LOWER else None)
 
 
 def speeds(rows, v, efficiency):
-    """What the hardest ice of each speed needs, against what the vessel has."""
+    """The pull needed in the hardest ice at each speed, compared with the vessel's."""
     out = []
     for speed in sorted({r["speed_m_s"] for r in rows if np.isfinite(r["speed_m_s"])}):
         r = hardest(rows, speed)
@@ -244,8 +244,8 @@ def speeds(rows, v, efficiency):
 
 
 def feasible(some, asked, v, efficiency, t, top=None):
-    """Can the vessel do it at the speed that is asked, and up to which? Where another load case than the steady tow,
-    top, asks for more, the vessel has to hold both, and up to which speed it does nobody has looked at."""
+    """Can the vessel hold the tow at the requested speed, and up to which speed? If another load case, top, requires
+    more than the steady tow, the vessel must hold both, and up to which speed it can has not been examined."""
     here = next((s for s in some if math.isclose(s["speed_m_s"], asked, rel_tol=1e-6)), None)
     out = {"id": "feasible", "speed_m_s": asked, "verdict": here["feasible"] if here else "not_asked",
            "not_above_m_s": None, "by": None, "reason": None}
@@ -268,7 +268,7 @@ def feasible(some, asked, v, efficiency, t, top=None):
 
 
 def sentence(a):
-    """What the answer says, a code with values and the rows that they are from."""
+    """The content of the answer: codes, each with values and the rows that they come from."""
     out, d, v, line = [], a["design"], a["vessel"], a["line"]
     if d is None:
         return [{"code": "no_value", "values": {}, "rows": []}]
@@ -297,8 +297,8 @@ def sentence(a):
 
 
 def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
-    """The whole answer. asked: what the call asked for; rows: conditions(); cases: load cases without the steady one;
-    t: the load_cases.Tow of the hardest condition, None without a value."""
+    """The whole answer. asked: the request in the call; rows: conditions(); cases: load cases except the steady one; t:
+    the load_cases.Tow of the hardest condition, None without a value."""
     worst = hardest(rows, asked["speed_m_s"])
     cases = ([steady_case(worst)] if worst else []) + cases
     some = [c for c in cases if c["in_design"] and np.isfinite(c["n"])]

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
 """The band of a tow force over the ranges of assumed values: one value at a time, on common fields.
 
-The tow force is F = W + w, with W the part that follows from the drag law alone (water, wind) and w the part of the
-ice: its mean R and the excess of the design value over the mean. An end of a range changes W by its closed form, and R
-by runs in the same fields as those of the unchanged case. The design value is assumed to change with them:
+The tow force is F = W + w, where W is the part that follows from the drag law alone (water, wind) and w the part due to
+ice: its mean R plus the excess of the design value over the mean. An end of a range changes W by its closed form, and R
+according to runs in the same fields as those of the unchanged case. The design value is assumed to change with them:
 
     F' = W' + w R'/R                                                                                      (assumed)
 
-since a fitted tail under every value would cost a study each. The interval of R'/R is that of the paired fields.
+since a fitted tail for every value would cost a study each. The interval of R'/R is that of the paired fields.
 
-Effects of the ranges are added up with the signs that make the load largest, and least: the band is that of the worst
-corner, and no probability. Where every range has a distribution, and only there, the variances of fields and ranges are
-added, each effect being taken as linear over its range, to one interval of 95 %.
+Effects of the ranges are added with the signs that make the load largest, and least: the band is that of the worst
+corner, not a probability. If, and only if, every range has a distribution, the variances of fields and ranges are also
+added, each effect being taken as linear over its range, to give one 95 % interval.
 """
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ from bergtow.study.case_file import contents
 import numpy as np
 import scipy
 
-#: keys whose effect on the load is in the drag law, {key: the part}
+#: keys whose effect on the load follows from the drag law, {key: the part}
 ANALYTIC = {"body.drag.water_form": "water", "body.drag.air_form": "wind"}
 TENTH = 0.1
 NORMAL_ENDS = 1.96   # standard deviations from the middle to an end of a normal range
@@ -33,16 +33,16 @@ AIR = "0.4: Hunke & Comeau 2011; 0.8: OpenBerg of OpenDrift (revision 130bc999);
 
 @dataclass(frozen=True)
 class Range:
-    """What may be assumed in place of the value of a key."""
+    """Values that may be assumed for a key instead of its value."""
 
     key: str
     low: str
     high: str
     source: str
-    distribution: str = ""   #: "" where none is stated
+    distribution: str = ""   #: "" if none is stated
 
 
-#: of the keys that no client can measure beforehand; the subject of the question (ice, berg, speed) is not among them
+#: for keys that no client can measure beforehand; the subject of the question (ice, berg, speed) is not among them
 RANGES = (
     Range("body.drag.water_form", "0.25", "1.25", DRAG),
     Range("body.drag.air_form", "0.4", "1.25", AIR),
@@ -52,7 +52,7 @@ RANGES = (
 
 
 def read(path):
-    """Ranges from the `parameters` of a study file, as bergtow budget takes them. Errors: RunError."""
+    """Read ranges from the `parameters` of a study file, in the format of bergtow budget. Raises RunError."""
     found, out = contents(path).get("parameters"), []
     for key, at in (found if isinstance(found, dict) else {}).items():
         if not (isinstance(at, dict) and {"from", "to"} <= set(at)):
@@ -67,8 +67,8 @@ def read(path):
 
 
 def applies(some, value, wind):
-    """Those of the ranges that the case has: no law that is off, no wind where there is none. value: of a key, by
-    name."""
+    """The ranges that apply to the case: no law that is switched off, no wind if there is none. value: function that
+    returns the value of a key."""
     def on(r):
         if r.key == "body.drag.air_form":
             return wind
@@ -81,7 +81,7 @@ def first_drag(some):
 
 
 def ratio(base, other):
-    """(R'/R, (low, high) of 95 %) of paired means of fields; without interval for fewer than two."""
+    """(R'/R, (low, high) of 95 %) from paired means of fields; without an interval for fewer than two."""
     base, other = np.asarray(base, dtype=float), np.asarray(other, dtype=float)
     mean = base.mean()
     if not abs(mean) > 0:
@@ -89,13 +89,13 @@ def ratio(base, other):
     r, n = other.mean() / mean, len(base)
     if n < 2:
         return r, (np.nan, np.nan)
-    # of a ratio of means, to first order: the deviations other - r base, paired
+    # for a ratio of means, to first order: the paired deviations other - r base
     half = scipy.stats.t.ppf(0.975, n - 1) * np.std(other - r * base, ddof=1) / np.sqrt(n) / abs(mean)
     return r, (r - half, r + half)
 
 
 def band(n, rows):
-    """(least, largest) of a load n when every effect takes the sign that makes it so."""
+    """(least, largest) value of a load n, when every effect takes the sign that makes it so."""
     effects = np.array([[row["n_low"], row["n_high"]] for row in rows
                         if row["n_low"] is not None and row["n_high"] is not None], dtype=float).reshape(-1, 2)
     return n + np.minimum(effects.min(axis=1, initial=0.0), 0.0).sum(), \
@@ -111,7 +111,7 @@ def _moments(row):
 
 
 def combined(n, interval, rows):
-    """((low, high) of 95 % of fields and ranges together, None), or (None, why not)."""
+    """((low, high) of 95 % for fields and ranges combined, None), or (None, why not)."""
     if any(not row["distribution"] for row in rows):
         return None, "range_without_distribution"
     if any(row["n_low"] is None or row["n_high"] is None for row in rows):

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Search along a value for the place where the share of random trials that succeed falls below a given share q, with as
-few trials as possible.
+"""Search along a value for the point where the success rate of random trials falls below a given share q, with as few
+trials as possible.
 
 At one value the trials are independent, and the question is whether the probability p of success is above or below q.
 The likelihood ratio of any p against q, and so that of a mixture of them, is a fair bet while p <= q: the probability
 that it ever exceeds 1/a is at most a [Ville 1939; Robbins 1970, Ann. Math. Stat. 41, 1397]. So one may test after each
-trial, and stop when a side is sure at 1 - LEVEL. The mixture is p = 1, and p of density (1 - p)^-1/2 in (q, 1]: at q =
-1/2 it takes 6 of 6 successes, or 11 of 12. Rejected: Wald's sequential test, which at p near q picks a side by chance;
-an interval for a fixed number of trials, which is not valid after repeated tests.
+trial, and stop when a side is established at 1 - LEVEL. The mixture is p = 1, and p of density (1 - p)^-1/2 in (q, 1]:
+at q = 1/2 it takes 6 of 6 successes, or 11 of 12. Rejected: Wald's sequential test, which at p near q picks a side by
+chance; an interval for a fixed number of trials, which is not valid after repeated tests.
 
-A trial has no outcome if its run failed, and the cause may be the same that makes a tow fail. So a side is sure only if
-it would be sure with any outcomes of these trials.
+A trial has no outcome if its run failed, possibly for the same reason that makes a tow fail. So a side is established
+only if it would be with any outcomes of these trials.
 
-Success is assumed to be monotonic along the value. Between a value that succeeds and a value that fails the middle is
-tried next; a value that stays undecided has p near q, and the gaps on both sides of it are narrowed.
+Success is assumed to be monotonic along the value. Between a value that succeeds and a value that fails, the midpoint
+is tried next; a value that stays undecided has p near q, and the gaps on both sides of it are narrowed.
 """
 from dataclasses import dataclass, field
 
@@ -26,7 +26,7 @@ YES, NO, OPEN = "yes", "no", "open"
 
 
 def log_evidence(good, bad, share):
-    """Logarithm of the bet that p > share, after so many good and bad trials."""
+    """Logarithm of the bet that p > share, after the given numbers of good and bad trials."""
     # the mixture of density (1 - p)^-1/2 over (share, 1]: the integral of p^good (1 - p)^(bad - 1/2), over its weight
     inside = scipy.special.betainc(bad + 0.5, good + 1, 1 - share)
     mixed = -np.inf if inside <= 0 else np.log(inside) + scipy.special.betaln(good + 1, bad + 0.5) - np.log(
@@ -38,7 +38,7 @@ def log_evidence(good, bad, share):
 
 
 def verdict(good, bad, share=0.5, level=LEVEL):
-    """YES where p > share is sure, NO where p < share is, OPEN else."""
+    """YES if p > share is certain, NO if p < share is, otherwise OPEN."""
     if log_evidence(good, bad, share) >= -np.log(level):
         return YES
     return NO if log_evidence(bad, good, 1 - share) >= -np.log(level) else OPEN
@@ -46,13 +46,13 @@ def verdict(good, bad, share=0.5, level=LEVEL):
 
 @dataclass
 class Point:
-    """Trials at a value."""
+    """Trials at one value."""
 
     value: float
     good: int = 0
     bad: int = 0
     failed: int = 0      #: trials without an outcome
-    spent: bool = False  #: no more trials there
+    spent: bool = False  #: no more trials are made there
 
     @property
     def n(self):
@@ -65,13 +65,13 @@ class Bracket:
 
     start: float
     end: float
-    resolution: float            #: width of the bracket that ends the search
+    resolution: float            #: width of the bracket at which the search ends
     share: float = 0.5
-    most: int = 24               #: trials of a value
+    most: int = 24               #: trials per value
     points: dict = field(default_factory=dict)  #: by value
 
     def point(self, value):
-        """The trials at a value, which is one as far as eight digits tell."""
+        """The trials at a value; values that agree to eight digits are the same."""
         value = float(f"{value:.8g}")
         return self.points.setdefault(value, Point(value))
 
@@ -80,28 +80,28 @@ class Bracket:
         return self.verdict(p.good, p.bad, p.failed)
 
     def verdict(self, good, bad, failed):
-        """YES or NO where it is sure whatever the trials without an outcome would have been."""
+        """YES or NO if it is certain whatever the outcomes of the failed trials would have been."""
         if verdict(good, bad + failed, self.share) == YES:
             return YES
         return NO if verdict(good + failed, bad, self.share) == NO else OPEN
 
     def decidable(self, p, failed):
-        """May the trials that are left to a point decide it, after so many without an outcome?"""
+        """Can the remaining trials of a point decide it, given this many without an outcome?"""
         rest = max(0, self.most - p.n)
         return (self.verdict(p.good + rest, p.bad, failed) != OPEN or
                 self.verdict(p.good, p.bad + rest, failed) != OPEN)
 
     def more(self, value):
-        """Is the value undecided, and worth more trials? After some without an outcome only while the rest may decide
-        it. Where all have one its share is near q, and every trial is made: stopping there, too, would save a quarter
-        of the trials and double the scatter of the estimate."""
+        """Is the value undecided, and worth more trials? If some had no outcome, only while the rest may decide it. If
+        all had one, its share is near q, and every trial is made: stopping early here, too, would save a quarter of the
+        trials but double the scatter of the estimate."""
         p = self.point(value)
         return self.judged(value) == OPEN and p.n < self.most and not p.spent and (
             not p.failed or self.decidable(p, p.failed))
 
     def ends(self):
-        """(value of a success, value of a failure) next to each other; if there are none of one kind, None for it, and
-        for the other kind the value next to an undecided end."""
+        """(value of a success, value of a failure) closest to each other; if there are none of one kind, None for it,
+        and for the other kind the value next to an undecided end."""
         yes = [v for v in self.points if self.judged(v) == YES]
         no = [v for v in self.points if self.judged(v) == NO]
         if not yes or not no:
@@ -111,7 +111,7 @@ class Bracket:
         return min(((a, b) for a in yes for b in no), key=lambda pair: abs(pair[0] - pair[1]))
 
     def expected(self, value):
-        """The judgement of a value by the ends, if success is monotonic: YES or NO, OPEN between them."""
+        """The verdict on a value that follows from the ends, if success is monotonic: YES or NO, OPEN between them."""
         yes, no = self.ends()
         if yes is None and no is None:
             return OPEN
@@ -140,26 +140,26 @@ class Bracket:
             undecided = [v for v in (self.start, self.end) if self.judged(v) == OPEN]
             if len(undecided) != 1:
                 return None
-            # the limit is near that end, on this side of it or beyond: the other one comes closer
+            # the limit is near that end, on either side of it: approach it from the other end
             yes, no = undecided[0], no if yes is None else yes
         low, high = min(yes, no), max(yes, no)
         inner = sorted(v for v in self.points if low < v < high)
         for value in inner:
             if self.more(value):
                 return value
-        # all that lie between were tried in vain: the gaps beside them, the wider one first
+        # all values in between were tried without a decision: the gaps next to them, the wider one first
         stops = [low, *inner, high]
         gaps = [(b - a, a, b) for a, b in zip(stops, stops[1:]) if not inner or a == low or b == high]
         width, a, b = max(gaps)
         return None if width <= self.resolution * (1 + 1e-6) else float(f"{0.5 * (a + b):.8g}")
 
     def estimate(self):
-        """The value at which the share crosses q: shares made monotonic (pool adjacent violators), linear between the
-        values; NaN where they do not cross it."""
+        """The value at which the share crosses q: shares made monotonic (pool adjacent violators), linear between
+        values; NaN if they do not cross it."""
         rows = sorted((p for p in self.points.values() if p.n), key=lambda p: p.value)
         if len(rows) < 2:
             return np.nan
-        # by the trials themselves: an end may be undecided, and nothing then is on one of the sides
+        # from the trials themselves: an end may be undecided, so that one side has no values
         overall = sum(p.good for p in rows) / sum(p.n for p in rows)
         falls = sum((p.good - overall * p.n) * p.value for p in rows) < 0
         blocks = []  # [share, trials, values]

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The uncertainty budget of a study whose parameters are drawn from their distributions: mean, and scatter from the
-fields, from the parameters, from each of them, and from the computation.
+"""The uncertainty budget of a study whose parameters are drawn from distributions: the mean, and the scatter due to the
+fields, to the parameters, to each parameter, and to the computation.
 
-    bergtow budget STUDY.yml -o DIR --budget 15        runs the members that are left, then DIR/budget.json, budget.png
+    bergtow budget STUDY.yml -o DIR --budget 15        runs the remaining members, then DIR/budget.json, budget.png
 
-The study is a Latin hypercube (`sampling`, `samples`) with separate fields for each condition, two or more of them
-(`repeats`) to separate fields from parameters. Numerical choices are not varied here: their error is that of `bergtow
-converge` on the base case (`--converge FILE`, or converge.json in DIR), counted from the value of the study.
+The study is a Latin hypercube (`sampling`, `samples`) with separate fields for each condition, at least two of them
+(`repeats`) to separate fields from parameters. Numerical settings are not varied here: their error is that of `bergtow
+converge` on the base case (`--converge FILE`, or converge.json in DIR), starting from the value of the study.
 """
 import re
 import sys
@@ -28,12 +28,12 @@ from bergtow.table import hours_text
 import numpy as np
 
 BUDGET = 15.0  # min
-BOUNDED = "mean_drag", "mean_line", "peak_line", "mean_vessel"  # numbers of the summary that a lock leaves alone
+BOUNDED = "mean_drag", "mean_line", "peak_line", "mean_vessel"  # numbers of the summary that a lock does not affect
 OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
 
 
 def assumed(e):
-    """{parameter: distribution and source as the study says them}."""
+    """{parameter: distribution and source as the study gives them}."""
     out = {}
     for key, words in e.assumed.items():
         out[key] = dict(words)
@@ -45,9 +45,9 @@ def assumed(e):
 
 
 def quantile(e, rows, name, share):
-    """({"units", "description"}, values [rows]) of a quantile of a load in the window, as stats/loads.py has it, the
-    largest value at 100 %; NaN where a member has no window that is long enough. Errors: RunError where a line that
-    parted cuts the load off, or where it has no statistics."""
+    """({"units", "description"}, values [rows]) of a quantile of a load in the window, as in stats/loads.py, the
+    largest value at 100 %; NaN if a member's window is too short. Raises RunError if a parted line cuts the load off,
+    or if the load has no statistics."""
     scale, out, known = loads.TIME_SCALE / loads.scaling(e, rows), np.full(len(rows), np.nan), None
     for k, m in enumerate(rows):
         for load, field, _ in loads.in_window(e, m, scale):
@@ -66,7 +66,7 @@ def quantile(e, rows, name, share):
 
 
 def numbers(e, of):
-    """(its units and description, rows, values) of a number of the summary, or of LOAD:SHARE. Errors: RunError."""
+    """(units and description, rows, values) of a number of the summary, or of LOAD:SHARE. Raises RunError."""
     if load := re.fullmatch(r"(\w+):(\d+(?:\.\d+)?)", of):
         share = float(load[2])
         if not 0 < share <= 100:
@@ -88,7 +88,7 @@ def numbers(e, of):
 
 
 def those_there(e):
-    """The numbers of OF that an ensemble has; of a quantile that is left out the reason is printed."""
+    """The numbers of OF that an ensemble has; if a quantile is left out, the reason is printed."""
     out = [OF[0]]
     for of in OF[1:]:
         try:
@@ -100,7 +100,7 @@ def those_there(e):
 
 
 def numerics(e, converge, texts):
-    """The numerical error of means of an ensemble, in the form that stats/variance.py takes; None if nothing is known.
+    """The numerical error of means of an ensemble, in the format of stats/variance.py; None if nothing is known.
     Refused if converge.json belongs to another case."""
     if converge is None:
         return None
@@ -110,9 +110,9 @@ def numerics(e, converge, texts):
 
 
 def fair(e):
-    """Rows of a fair sample of a study that may have been cut short: of each repeat the conditions up to the first that
-    is still to come. Conditions stand in the order of the hypercube, which is random; which of those beyond are done
-    depends on how long they take, and so on the values that they have."""
+    """Rows of a fair sample of a study that may have been cut short: for each repeat, the conditions before the first
+    that has not been run. Conditions are in the order of the hypercube, which is random; which of the later ones are
+    done depends on their run time, and so on their values."""
     rows = []
     for r in np.unique(e.repeat):
         some = np.flatnonzero(e.repeat == r)
@@ -122,14 +122,14 @@ def fair(e):
 
 
 def without_intervals(found):
-    """The same with no interval known."""
+    """The same with all intervals set to unknown."""
     if not isinstance(found, dict):
         return found
     return {k: (np.nan, np.nan) if k.endswith("_95") else without_intervals(v) for k, v in found.items()}
 
 
 def refuse(file, latin, common):
-    """Errors: RunError where a study has no budget, however many of its members are run."""
+    """Raises RunError if a study cannot have a budget, however many of its members are run."""
     if not latin:
         raise RunError(file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study", CASE)
     if common:
@@ -137,9 +137,9 @@ def refuse(file, latin, common):
 
 
 def of_ensemble(e, of=OF[0], computed=None):
-    """The budget of a number of an ensemble. The numerical error, numerics(), is known for the mean ice resistance
-    alone: in per cent of it, which does not apply to a number that includes drag or inertia. If members of the sample
-    failed, or have no such number, the missing values are unknown, and there are no intervals. Errors: RunError."""
+    """The budget of a number of an ensemble. The numerical error, numerics(), is known only for the mean ice
+    resistance: as a percentage of it, it does not apply to numbers that include drag or inertia. If members of the
+    sample failed, or lack the number, the missing values are unknown, and there are no intervals. Raises RunError."""
     refuse(e.file, "sampling: latin-hypercube" in e.study,
            "fields: common" in e.study or "fields: numbered" in e.study)
     meaning, done, values = numbers(e, of)
@@ -168,7 +168,7 @@ def of_ensemble(e, of=OF[0], computed=None):
 
 
 def of_all(e, some, converge):
-    """The budget of the first number, with those of the others as "more"; budget.json."""
+    """The budget of the first number, with those of the others in "more"; the contents of budget.json."""
     texts = compared.cases(e)
     computed = numerics(e, converge, texts)
     first, *more = (of_ensemble(e, of, computed) for of in some)
@@ -198,7 +198,7 @@ def options(p):
 def perform(a):
     folder = a.output or Path("out") / a.study.stem
     analysis.begin("budget", a.study, "study", folder, a.force)
-    if a.study.is_file() and is_study(a.study):  # the program refuses a case, and reads a pipe
+    if a.study.is_file() and is_study(a.study):  # the program rejects a case, and reads a pipe
         keys = contents(a.study)
         refuse(a.study, keys.get("sampling") == "latin-hypercube", keys.get("fields", "own") != "own")
         if isinstance(n := keys.get("samples"), int) and n < stat_budget.LEAST:

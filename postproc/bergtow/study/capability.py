@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Towing capability: the speed that a tow reaches, and the value of a key - concentration, thickness, bollard pull - at
+"""Towing capability: the speed that a tow reaches, and the value of a key (concentration, thickness, bollard pull) at
 which half of the tows no longer succeed.
 
     bergtow capability CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
-    bergtow capability CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"   the vessel that is enough
+    bergtow capability CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"   a sufficient vessel
 
-A tow in one field succeeds when it keeps `--speed` (by default a tenth of tow.speed) along the ordered tow, in the mean
+A tow in one field succeeds if it keeps `--speed` (by default a tenth of tow.speed) along the ordered tow, on average
 over the window and over its last quarter, and no branch of its line parts. The last quarter counts because the mean of
 a tow that has come to rest in the ice only shows how long it has rested: without it the limit would depend on
-run.duration. Only those parts of the window count where tow.programme orders that speed: no tow keeps it through an
-ordered stop. Rejected: windows with a body that stood still (stalled_windows), since a tow that stops and continues
-succeeds; they are counted separately. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
-line that may part; a prescribed speed is kept at any force. The search is that of study/bracket.py; the values that it
-has tried are a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
-Where periodic sides are too near for the ice of a value, its runs have the width that `bergtow check` asks for.
+run.duration. Only those parts of the window count where tow.programme orders that speed, because no tow keeps it
+through an ordered stop. Rejected: windows with a body that stood still (stalled_windows), since a tow that stops and
+continues succeeds; they are counted separately. The case tows with a vessel (tow.mode thrust), which slows down and
+stops, or on a line that may part; a prescribed speed is kept at any force. The search is that of study/bracket.py. The
+values that it has tried are part of the curve; the rest of the curve is run with CURVE fields per value if the budget
+allows. If periodic sides are too close for the ice at a value, its runs use the width that `bergtow check` requires.
 """
 import sys
 import time
@@ -33,13 +33,13 @@ from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 import numpy as np
 
 BUDGET = 15.0            # min
-FIELDS = 12              # trials of a value, at most
-POINTS, CURVE = 5, 4     # of the curve: values, and fields of each
-PARTS = 16               # the range over the resolution
-STOPPED = 0.1            # of tow.speed: a slower tow has stopped
+FIELDS = 12              # trials per value, at most
+POINTS, CURVE = 5, 4     # of the curve: values, and fields at each
+PARTS = 16               # range / resolution
+STOPPED = 0.1            # share of tow.speed: a slower tow has stopped
 RANGES = {"ice.concentration": ("0.2", "0.95")}
-LATE = 0.25              # last part of that time, where a tow must still keep the speed
-FAILING = 3              # failed runs at a value before the search gives it up
+LATE = 0.25              # last part of that time, in which a tow must still keep the speed
+FAILING = 3              # failed runs at a value after which the search gives it up
 
 
 @dataclass(frozen=True)
@@ -47,22 +47,22 @@ class Trial:
     """The result of one run."""
 
     field: int
-    speed: float      #: m/s, mean over those parts of the window that order the speed to be kept; NaN: adrift
-    late: float       #: that over the last quarter of it
-    stood: bool       #: it stood still for a while, held by the ice
+    speed: float      #: m/s, mean over the parts of the window where the speed is ordered; NaN: adrift
+    late: float       #: the same over the last quarter of these
+    stood: bool       #: it stood still for some time, held by the ice
     parted: bool
     tow_force: float  #: N, mean; NaN: adrift
     tension: float    #: N, largest step mean of the run, its start included
     widths: float = np.nan  #: of the domain in body widths
-    needed: float = np.nan  #: those that the ice asks for, NaN where it asks for none
+    needed: float = np.nan  #: required by the ice, NaN if it requires none
 
     def made(self, least):
         return min(self.speed, self.late) >= least and not self.parted
 
 
 def kept(run, least):
-    """Speeds made good, m/s, over the time of the window in which the tow is ordered to be as fast as that, and over
-    the last quarter of this time; of the whole window where it never is."""
+    """Speeds made good, m/s, over the part of the window in which at least this speed is ordered, and over the last
+    quarter of that part; over the whole window if it is never ordered."""
     time, (start, end) = run["time"], run.window
     fast = run.ordered_speed >= least * (1 - 1e-9)
     counts = fast[1:] & fast[:-1]
@@ -75,7 +75,7 @@ def kept(run, least):
 
 
 def trial(run, number, least):
-    """Of a run that is there. Errors: RunError."""
+    """The trial of a finished run. Raises RunError."""
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer", CASE)
     if np.sum(within(run["time"], *run.window)) < 2:
@@ -86,8 +86,8 @@ def trial(run, number, least):
                        "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
     domain = run.summary.get("domain") or {}
     widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
-    # a body that is adrift before the end of the window has no speed and no tow force, but the tension that parted its
-    # line
+    # a body that is adrift before the end of the window has no speed and no tow force, but it has the tension that
+    # parted its line
     towed = run.adrift >= run.window[1]
     speed, late, force = (*map(float, kept(run, least)), run.number("mean_tow_force_n")) if towed else (np.nan,) * 3
     return Trial(number, speed, late, run.number("stalled_windows") > 0,
@@ -97,19 +97,19 @@ def trial(run, number, least):
 
 @dataclass
 class Condition:
-    """The search under one value of --for."""
+    """The search for one value of --for."""
 
-    name: str         #: of the folders
+    name: str         #: name for the folders
     label: str
-    number: float     #: the value of --for, NaN where there is none
+    number: float     #: the value of --for, NaN without it
     sets: dict
     search: bracket.Bracket
     trials: dict = field(default_factory=dict)   #: [Trial] by value
-    failed: dict = field(default_factory=dict)   #: [why] by value
-    wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None where that of the case will do
-    alike: set = field(default_factory=set)      #: values whose ice no seed changes: their fields are one run
-    why: str = ""     #: the search ended before it was through
-    case: dict = field(default_factory=dict)     #: {key: text} of the case under the value of --for
+    failed: dict = field(default_factory=dict)   #: [reason] by value
+    wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None if that of the case will do
+    alike: set = field(default_factory=set)      #: values whose ice the seed does not change: their fields are one run
+    why: str = ""     #: why the search ended early
+    case: dict = field(default_factory=dict)     #: {key: text} of the case with the value of --for
 
 
 @dataclass
@@ -120,7 +120,7 @@ class Search:
     key: str
     unit: str         #: of its values, SI
     least: float      #: m/s
-    say: object       #: where the progress goes, None for nowhere
+    say: object       #: stream for the progress, None for no output
     widen: bool = True
 
     def folder(self, c, value):
@@ -136,8 +136,8 @@ class Search:
         return sets | ({"domain.width": c.wider[value]} if c.wider[value] else {})
 
     def add(self, c, value, n):
-        """n more trials; False where the budget is spent. A run that fails has no outcome: another field is run, and
-        the value is decided where that one could not have changed it."""
+        """Make n more trials; False if the budget is spent. A run that fails has no outcome: another field is run
+        instead, and the value is decided once no outcome of the failed run could change the decision."""
         point = c.search.point(value)
         value = point.value
         name, some = self.folder(c, value), c.trials.setdefault(value, [])
@@ -180,20 +180,20 @@ class Search:
             p = s.point(value)
             ends = {k: {s.verdict(p.good + k, p.bad, p.failed), s.verdict(p.good, p.bad + k, p.failed)}
                     for k in range(1, s.most)}
-            least = next((k for k in ends if ends[k] != {bracket.OPEN}), 1)  # no fewer can decide
+            least = next((k for k in ends if ends[k] != {bracket.OPEN}), 1)  # fewer cannot decide
             sure = next((k for k in ends if bracket.OPEN not in ends[k]), s.most)
             if not self.add(c, value, max(1, min(max(least, min(self.runs.jobs, sure)), s.most - p.n))):
                 c.why = SPENT.text
                 return
 
     def fill(self, c, points, fields):
-        """The curve between the values of the search."""
+        """Run the curve between the values of the search."""
         for value in np.linspace(c.search.start, c.search.end, points) if points > 1 else ():
             value = float(value)
             while c.search.point(value).n < fields and not c.search.point(value).spent:
                 if not self.add(c, value, fields - c.search.point(value).n):
                     return
-        # what speaks against the bracket is decided, or stays as it is where the budget does not reach
+        # values that contradict the bracket are decided, or left as they are if the budget is insufficient
         while p := next((p for p in c.search.against() if c.search.more(p.value)), None):
             if not self.add(c, p.value, min(self.runs.jobs, c.search.most - p.n)):
                 return
@@ -203,7 +203,7 @@ class Search:
 
 
 def row_of(c, value, least):
-    """Numbers of a value of a condition."""
+    """The numbers of a value of a condition."""
     some = c.trials[value][:1] if value in c.alike else c.trials[value]
     out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
@@ -219,7 +219,7 @@ def row_of(c, value, least):
 
 
 def contradiction(s):
-    """What speaks against the bracket of a search, "" where nothing does."""
+    """Evidence against the bracket of a search, "" if there is none."""
     if not (against := s.against()):
         return ""
     p = max(against, key=lambda p: s.judged(p.value) != bracket.OPEN)
@@ -228,7 +228,7 @@ def contradiction(s):
 
 
 def failures(s):
-    """Of a value at the limit that only the runs that failed leave undecided, "" where there is none."""
+    """A value at the limit that is undecided only because of failed runs, "" if there is none."""
     return next((f"at {p.value:.4g} {p.failed} of {p.n + p.failed} runs failed, which leaves it undecided"
                  for p in s.points.values() if p.failed and s.judged(p.value) == s.expected(p.value) == bracket.OPEN
                  and not s.more(p.value) and s.decidable(p, 0)), "")
@@ -255,7 +255,7 @@ def found_of(c, least):
 
 
 def resolved(binary, case, sets):
-    """{key: text} of the case with keys replaced, as the program reads it. Errors: RunError in the program's words."""
+    """{key: text} of the case with keys replaced, as the program reads it. Raises RunError in the program's words."""
     return parse_case(checked(binary, case, sets, "--scale", "1"))
 
 
@@ -269,7 +269,7 @@ def with_number(binary, case, sets, key, text):
 
 
 def conditions(a, binary, given, start, end, resolution):
-    """Those of --for, or the case alone."""
+    """The conditions of --for, or only the case."""
     def search():
         return bracket.Bracket(start, end, resolution, a.share, a.fields)
     if not a.conditions:
@@ -286,7 +286,7 @@ def conditions(a, binary, given, start, end, resolution):
 
 
 def check(case, key):
-    """A case whose tow may stop. Errors: RunError."""
+    """Check that the tow of a case can stop. Raises RunError."""
     mode, load = case.get("tow.mode"), case_value(case, "tow.line.breaking_load", 0.0)
     if mode != "thrust" and not (mode == "line" and load > 0):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
@@ -327,7 +327,7 @@ def options(p):
 
 
 def number(option, text, unit):
-    """A number of an option with a unit, read as the program reads it. Errors: RunError."""
+    """A number with a unit from an option, read as the program reads it. Raises RunError."""
     try:
         return read(text, unit)
     except BergtowError as error:

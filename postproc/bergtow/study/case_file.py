@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The files of a case as YAML: its file and the files that it is based on. Only the program interprets them."""
+"""The files of a case as YAML: its own file and the files that it is based on. Only the program interprets them."""
 import os
 
 import yaml
@@ -9,7 +9,7 @@ from bergtow.errors import CASE, RunError
 
 
 def contents(path):
-    """The file as YAML. Errors: RunError."""
+    """Read the file as YAML. Raises RunError."""
     try:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
@@ -21,7 +21,7 @@ def contents(path):
 
 
 def files(path):
-    """[(path, contents)] of a case and of the files that it is based on, the case first. Errors: RunError."""
+    """[(path, contents)] of a case and of the files that it is based on, the case first. Raises RunError."""
     found = [(path, contents(path))]
     while isinstance(found[-1][1].get("base"), str):
         path = path.parent / found[-1][1]["base"]
@@ -32,12 +32,12 @@ def files(path):
 
 
 def is_study(path):
-    """Is this the file of a study, and not of a case?"""
+    """Is this the file of a study, not of a case?"""
     return _library.library().bt_file_holds(os.fsencode(path)) == b"study"
 
 
 def section(layers, name):
-    """The keys of a section of a case, of all its files."""
+    """The keys of a section of a case, merged over all its files."""
     out = {}
     for _, found in reversed(layers):
         keys = found.get(name)

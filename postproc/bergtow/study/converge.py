@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Does a result depend on numerical choices: the width and length of the domain, the time step, the tolerance, the
+"""Does a result depend on numerical settings: the width and length of the domain, the time step, the tolerance, the
 window, the start, the number of fields?
 
     bergtow converge CASE.yml -o DIR --budget 10        DIR/converge.json, the ensembles DIR/converge/NAME,
-                                                        a verdict a line
+                                                        one verdict per line
 
-One value is changed at a time, and the case is run with it and without it on the same seeds, so that both are
-compared on the same ice. For a width or length the field of the smaller domain is that of the larger one, cut to it
-(ice.extent): they share all floes but those of a strip. The table shows the gain: the error of the effect / the error
-with separate fields, from the scatter of either. The effect is the relative change of a mean over fields; its interval
-is the jackknife over pairs (stats/load.py). Two checks need no other run: the second half of the window against all of
-it, and the largest tow force of the start-up against the largest of the window, which it should not exceed; where it
-does, the ramp is made longer. Fields are added, in LOOKS looks, until
+One value is changed at a time, and the case is run with and without the change on the same seeds, so that both are
+compared on the same ice. For a width or length the field of the smaller domain is that of the larger one, cut to size
+(ice.extent): they share all floes except those of a strip. The table shows the gain: the error of the effect / the
+error with separate fields, from the scatter of each. The effect is the relative change of a mean over fields; its
+interval is the jackknife over pairs (stats/load.py). Two checks need no extra runs: the second half of the window
+against the whole, and the largest tow force of the start-up against the largest in the window, which it should not
+exceed; if it does, the ramp is lengthened. Fields are added, in LOOKS looks, until
 
     the interval lies within +- margin             resolved: no effect that matters
-    it lies outside of it altogether               resolved: it matters, and the next value is compared with this one
+    it lies entirely outside                       resolved: it matters, and the next value is compared with this one
     neither, and the budget is spent               not resolved
 
-Looking again and again finds an effect sooner or later [Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132]: each
-look is made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rejected: a fixed number of fields, which is
-too small where floes jam and too large where nothing happens; a last look at 64, which left a paired effect of 6 % with
-an error of 2 % open while most of the budget was still there.
+Repeated looks find an effect sooner or later [Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132]: each look is
+therefore made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rejected: a fixed number of fields, which
+is too small where floes jam and too large where nothing happens; a last look at 64, which left a paired effect of 6 %
+with an error of 2 % open while most of the budget was still there.
 
-A tow that starts at its full speed (tow.ramp of 0) is compared with a ramp during which the body moves by its size.
+A tow that starts at full speed (tow.ramp of 0) is compared with a ramp during which the body moves by its size.
 """
 import argparse
 import time
@@ -42,29 +42,29 @@ from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 import numpy as np
 import scipy
 
-FIELDS = (4, 8, 16, 32, 64, 128, 256)  # of each look
+FIELDS = (4, 8, 16, 32, 64, 128, 256)  # number at each look
 LOOKS = len(FIELDS)
-TRIES = 3                   # values of a quantity after each other, at most
+TRIES = 3                   # successive values of a quantity, at most
 MARGIN = 0.1
 UNSOLVED = 0.01             # share of unconverged steps above which a comparison is not judged
 BUDGET = 10.0               # min
 WINDOW_TOO_EARLY = "no longer ramp ends before the window: tow for longer, with a later window"
 EFFORT = 0.05               # relative error of the mean that the number of fields has to reach
-RAMP = 4.0                  # the ramp is made so many times as long
-LATEST = 0.8                # of the beginning of the window: where a ramp ends at the latest
+RAMP = 4.0                  # factor by which the ramp is lengthened
+LATEST = 0.8                # relative to the start of the window: where a ramp must end at the latest
 
 
-# ---- quantities that are varied
+# ---- varied quantities
 
 
 def times(key, factor):
-    """The next value of one key as {key: value}."""
+    """Function that returns the k-th next value of a key as {key: value}."""
     return lambda run, k: {key: run.value(key) * factor ** k}
 
 
 def slower_start(run, k):
-    """RAMP times as long each time; without a ramp, first the time that the body takes to move by its size. It
-    ends well before the window."""
+    """Lengthen the ramp by RAMP each time; without a ramp, start with the time that the body takes to move by its size.
+    It ends well before the window."""
     first = run.value("tow.ramp")
     own = np.ptp(run.bodies[run.towed].vertices, axis=0).max() / run.value("tow.speed")
     ramp = first * RAMP ** k if first > 0 else own * RAMP ** (k - 1)
@@ -72,9 +72,9 @@ def slower_start(run, k):
 
 
 def ice_to(run, moved):
-    """Ends of the ice region that the case gives where the domain ends, which go with it: {key: value}. Left where they
-    are, the pack would be the same with open water beside it, and no ice would be wider or longer. One that ends before
-    the domain does has an extent of its own. moved: {key of such an end: (where the domain ends, where it is to end)}.
+    """Move ends of the ice region that the case places at the ends of the domain: {key: value}. If they stayed, a
+    larger domain would add open water beside the same pack, not wider or longer ice. A region that ends inside the
+    domain has its own extent and is not moved. moved: {key of such an end: (current end of the domain, its new end)}.
     """
     said = annotated(run.case_text)
     return {key: to for key, (end, to) in moved.items() if {key, f"{BESIDE}{key}"} & set(said)
@@ -82,8 +82,8 @@ def ice_to(run, moved):
 
 
 def longer(run, k):
-    """Half the length more ahead of the body; the end behind it stays where it is. Errors: RunError for a tow that does
-    not go along the domain."""
+    """Add half the length ahead of the body for each try; the end behind it stays in place. Raises RunError for a tow
+    that is not along the domain."""
     length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.headings[:, 0]
     if np.abs(along).min() < np.sqrt(0.5) or np.ptp(np.sign(along)):
         raise RunError(run.path, "the tow does not go along the domain, whose length is not ahead of the body",
@@ -105,12 +105,12 @@ def wider(run, k):
 
 
 def cut_from(run, larger):
-    """Keys that cut the field of a domain from that of a larger domain, of these values: the ice region's ends
-    that move. {} where the ice is not made.
+    """Keys that cut the field of a domain from that of a larger domain with these values: the ends of the ice region
+    that move. {} if the ice is not generated.
 
-    The smaller domain is run once more for it: its own field is another, and so would be that cut from a still larger
-    domain. Rejected: the largest domain of all tries as the extent of each, eight times the ice of the case to be made
-    for a comparison that mostly ends with the first try."""
+    The smaller domain must be run again for this, because its own field is different, as would be one cut from a still
+    larger domain. Rejected: the largest domain of all tries as the extent of each, eight times the ice of the case to
+    be generated for a comparison that mostly ends with the first try."""
     if run.case.get("ice.field", "none") != "none" or run.case.get("ice.outlines", "none") != "none" or not (
             run.value("ice.concentration") > 0):
         return {}
@@ -127,15 +127,15 @@ def cut_from(run, larger):
 
 
 def mean_resistance(run):
-    """Mean ice resistance, N. NaN where the tow ends within the window, since the rest of the window is no tow, and
-    where steps of it have no solution: two lower bounds cannot be compared."""
+    """Mean ice resistance, N. NaN if the tow ends within the window, since the rest of the window is not a tow, or if
+    steps in it have no solution: two lower bounds cannot be compared."""
     towed = run.window and run.adrift >= run.window[1] and not run.at_least
     return run.number("mean_ice_resistance_n") if towed else np.nan
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A quantity that is varied: its key, its values of try k, and the measure by which runs are compared."""
+    """A varied quantity: its key, its values at try k, and the measure that compares runs."""
 
     name: str
     key: str
@@ -143,8 +143,8 @@ class Kind:
     measure: object
     what: str
     same_ice: bool
-    finer: str            #: comparative for the next value, such as "wider"
-    own: object = None    #: measure of the same runs to compare with, in place of runs with the next value
+    finer: str            #: comparative describing the next value, such as "wider"
+    own: object = None    #: measure of the same runs to compare with, instead of runs with the next value
 
 
 KINDS = (
@@ -164,8 +164,8 @@ NAMES = tuple(k.name for k in KINDS) + ("window", "fields")
 
 
 def effect(base, other, looks=LOOKS):
-    """(mean(other)/mean(base) - 1, (low, high)) of pairs, at the level of one of so many looks; on the logarithm of the
-    ratio where it has one."""
+    """(mean(other)/mean(base) - 1, (low, high)) from pairs, at the level of one of this many looks; on the logarithm of
+    the ratio if that is defined."""
     n, value = len(base), other.mean() / base.mean()
     without = (other.sum() - other) / (base.sum() - base)
     logs = value > 0 and np.all(without > 0)
@@ -176,14 +176,14 @@ def effect(base, other, looks=LOOKS):
 
 
 def pairing(base, other):
-    """Error of the effect / its error from two independent samples of this scatter; None where that is 0 or NaN."""
+    """Error of the effect / its error from two independent samples with this scatter; None if that is 0 or NaN."""
     a, b = base / base.mean(), other / other.mean()
     alone = np.var(a, ddof=1) + np.var(b, ddof=1)
     return float(np.sqrt(np.var(b - a, ddof=1) / alone)) if np.isfinite(alone) and alone > 0 else None
 
 
 def judged(interval, margin, one_sided=False):
-    """"none", "matters" or "open". one_sided: only what is above zero matters."""
+    """"none", "matters" or "open". one_sided: only effects above zero matter."""
     low, high = interval
     if one_sided:
         return "none" if high <= margin else "matters" if low > margin else "open"
@@ -193,14 +193,14 @@ def judged(interval, margin, one_sided=False):
 
 
 def unsolved(study, name, n):
-    """Share of the steps of n runs that did not reach the tolerance: their results do not depend on it."""
+    """Share of the steps of n runs that did not reach the tolerance, so that results do not depend on it."""
     missed, steps = (study.measured(name, range(n), lambda run, key=key: run.number(key)).sum()
                      for key in ("unconverged_steps", "n_steps"))
     return missed / steps if steps > 0 else 0.0
 
 
 def compare(study, kind, base_name, base_values, name, values, margin):
-    """A row of one value against the next, with as many fields as it takes."""
+    """The row that compares one value with the next, with as many fields as needed."""
     row = {"quantity": kind.what, "effect": np.nan, "interval_95": (np.nan, np.nan), "fields": 0, "judged": "open",
            "same_ice": kind.same_ice or any(key.startswith("ice.extent.") for key in base_values)}
     for n in FIELDS:
@@ -227,14 +227,14 @@ def compare(study, kind, base_name, base_values, name, values, margin):
 
 
 def vary(study, kind, margin, most=TRIES):
-    """Rows of a quantity: from the case's value on until the next one changes nothing."""
+    """Rows of a quantity, from the case's value on until the next one has no effect."""
     with Run(study.path("case", 0)) as run:
         tries = [{}] + [kind.values(run, k + 1) for k in range(most)]
         first, unit = run.value(kind.key), run.case.get(kind.key, "").partition(" ")[2]
         walls = kind.name == "width" and run.case.get("domain.sides") == "wall"
         programme = run.case.get("tow.programme", "none") != "none"
         extents = [{} if kind.same_ice else cut_from(run, larger) for larger in tries[1:]]
-    if kind.name == "start" and programme:  # which stands in place of the ramp
+    if kind.name == "start" and programme:  # the programme replaces the ramp
         return [{"name": kind.name, "key": kind.key, "judged": "open",
                  "why": "the start is that of tow.programme; make its first rows slower by hand"}]
     if not np.isfinite(first) or (first <= 0 and kind.name != "start"):
@@ -257,7 +257,7 @@ def vary(study, kind, margin, most=TRIES):
 
 
 def window(study, margin):
-    """The mean over the second half of the window against that of all of it, on the runs that are there."""
+    """Compare the mean over the second half of the window with that over the whole, using the runs of the case."""
     for n in FIELDS:
         if not study.there("case", n, {}):
             break
@@ -297,8 +297,8 @@ def window(study, margin):
 
 
 def fields_row(study):
-    """How many fields the mean needs, from those that are there."""
-    kept = [i for i in range(FIELDS[-1]) if study.kept("case", i)]  # one in between may have met the budget
+    """How many fields the mean requires, from those that have been run."""
+    kept = [i for i in range(FIELDS[-1]) if study.kept("case", i)]  # the budget may have ended one in between
     x = study.measured("case", kept, mean_resistance)
     n = len(x)
     if not np.isfinite(x).all():
@@ -381,7 +381,7 @@ def perform(a):
                      began + 60 * a.budget)
     with locked(folder / "converge") as study.lock:
         rows = converge(study, a.vary, a.margin, a.tries)
-        values = None  # of the case: not known where the budget was spent before its first run was through
+        values = None  # the values of the case are unknown if the budget was spent before its first run ended
         if study.kept("case", 0):
             with Run(study.path("case", 0)) as run:
                 values = run.case

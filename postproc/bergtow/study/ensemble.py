@@ -32,7 +32,7 @@ class Ensemble:
         ensemble.dataframe.groupby("tow.speed")["mean_ice_resistance_n"].agg(["mean", "sem", "count"])
         ensemble.dataset.ice_resistance.sel(member=0)                 # the series of a member, N
 
-    Members that have failed or wait are in it, too; their numbers are NaN.
+    Failed and waiting members are included; their numbers are NaN.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -45,17 +45,17 @@ class Ensemble:
     def run(cls, study: str | os.PathLike[str], out: str | os.PathLike[str], *,
             overrides: Mapping[str, Any] | None = None, threads: int = 0, retry_failed: bool = False,
             progress: bool = True, client: Any = None, tasks: int = 0) -> Ensemble:
-        """Run the members of a study that are open, and return the Ensemble.
+        """Run the open members of a study, and return the Ensemble.
 
-        out: the folder, made or gone on with. overrides: {key: value} for all members, values as of a Case. progress:
-        print a line for each member. Ctrl-C stops it as `bergtow ensemble` stops: with checkpoints, to be gone on with.
-        Errors: BergtowError with the messages of the program; also where a member has failed, and the others are
-        finished.
+        out: the folder, new or to be continued. overrides: {key: value} for all members, with values as for a Case.
+        progress: print a line for each member. Ctrl-C stops it like `bergtow ensemble`: with checkpoints, so that it
+        can be continued. Raises BergtowError with the messages of the program, also if a member has failed after all
+        others have finished.
 
-        client: a dask.distributed.Client whose workers see the same folders and the same program; without one it is one
-        process for all cores here. tasks: how many calls of the program share the members, of `threads` (1) each;
-        default as many as the workers have threads for. If a worker dies, its members lose the steps since their last
-        checkpoint: another task continues them, or the last call, which is made here.
+        client: a dask.distributed.Client whose workers see the same folders and the same program; without it a single
+        process uses all cores here. tasks: number of calls of the program that share the members, with `threads` (1)
+        each; by default as many as the workers have threads for. If a worker dies, its members lose the steps since
+        their last checkpoint, and are continued by another task or by the final call, which is made here.
         """
         command = [program_path(), "ensemble", os.path.abspath(study), "-o", os.path.abspath(out)]
         for key, value in (overrides or {}).items():
@@ -65,7 +65,7 @@ class Ensemble:
             on_workers(client, [*command, "--threads", str(threads or 1), "--no-wait"], out, tasks, threads, progress)
             command = [word for word in command if word != "--retry-failed"]
         command += ["--threads", str(threads)] if threads else []
-        # a group of its own: a Ctrl-C comes here, and reaches the program once
+        # in a separate process group, so that a Ctrl-C is handled here and reaches the program only once
         code, errors = called(command, lambda text: progress and print(text, end="", flush=True),
                                    start_new_session=True)
         if code != OK:
@@ -79,13 +79,13 @@ class Ensemble:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many members there are of each status: {"finished": 8, "failed": 0, "waiting": 0}."""
+        """Number of members with each status: {"finished": 8, "failed": 0, "waiting": 0}."""
         with self._open() as file:
             status = file["members/status"][()].tolist()
         return {word: status.count(code) for code, word in STATUS.items()}
 
     def result(self, name: str) -> Result:
-        """The Result of a member by its name, as "c001-r001"."""
+        """The Result of a member by its name, such as "c001-r001"."""
         folder = self.folder / "members" / name
         if not folder.is_dir():
             raise BergtowError(f"{self.folder}: has no member {name}", IO)
@@ -93,9 +93,9 @@ class Ensemble:
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """An xarray.Dataset, read when it is used: close it as any.
+        """An xarray.Dataset that is read lazily; close it like any Dataset.
 
-        Dimensions: member, and sample (entries of the series). Coordinates: name, condition, repeat, seed of each
+        Dimensions: member, and sample (samples of the series). Coordinates: name, condition, repeat, seed of each
         member, and the keys that the study varies. Variables: the numbers of summary.json, the series, state_hash,
         status and reason. All have units and a long_name.
         """
@@ -123,7 +123,8 @@ class Ensemble:
 
     @property
     def dataframe(self) -> pandas.DataFrame:
-        """A pandas.DataFrame: a row for each member, by its name; what varies, then the numbers of summary.json."""
+        """A pandas.DataFrame, one row per member, indexed by name: the varied keys, then the numbers of
+        summary.json."""
         pandas = _imported("pandas")
         with self.dataset as d:
             flat = {name: v.values for name, v in d.variables.items() if v.dims == ("member",)}

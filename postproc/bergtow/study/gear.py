@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Vessel and line of a tow: the client's choice, the needs of the tow force, and the largest speed where the vessel
-holds it.
+"""Vessel and line of a tow: the client's choice, the requirements of the tow force, and the largest speed at which the
+vessel holds it.
 
-A vessel is a class of the library (bergtow/towing) or a bollard pull, "110 t" or "1.1 MN"; a line is one of the library
-or a breaking load. What neither the call nor the case says is assumed, and named so: the free-running speed. The
-efficiency of the vessel and the safety factor of the line are the user's: no clause of a standard could be read, so
-none is applied unless it is given.
+A vessel is a class of the library (bergtow/towing) or a bollard pull, "110 t" or "1.1 MN"; a line comes from the
+library or is given by a breaking load. The free-running speed is assumed, and marked as such, if neither the call nor
+the case gives it. The efficiency of the vessel and the safety factor of the line are the user's: no clause of a
+standard could be read, so none is applied unless it is given.
 """
 import re
 from dataclasses import dataclass
@@ -17,31 +17,31 @@ from bergtow.result.run import case_value
 
 import numpy as np
 
-FREE_SPEED = 14 * 1852 / 3600   # m/s, assumed where neither the vessel nor the case says it, as in cases/fullscale
+FREE_SPEED = 14 * 1852 / 3600   # m/s, assumed if neither the vessel nor the case gives it, as in cases/fullscale
 TONNE = 1000 * towing.vessel.STANDARD_GRAVITY  # N, tonne-force
 
 
 @dataclass(frozen=True)
 class Vessel:
     name: str
-    pull: float          #: N, bollard pull; NaN where no vessel is named
+    pull: float          #: N, bollard pull; NaN if no vessel is named
     free_speed: float    #: m/s
     free_from: str       #: "library", "case" or "assumed"
-    beam: float          #: m, NaN where it is not known
+    beam: float          #: m, NaN if unknown
     mass: float          #: kg
 
 
 @dataclass(frozen=True)
 class Line:
     name: str
-    breaking: float      #: N, NaN where it is not known
+    breaking: float      #: N, NaN if unknown
     stiffness: float     #: EA, N
     length: float        #: m
 
 
 def force(text, option):
-    """N of "110 t" (tonnes-force), "1.1 MN"; None where the text is no number with such a unit. Errors: BergtowError
-    where it is none above zero, or has no unit: 110 may be meant as tonnes."""
+    """N from "110 t" (tonnes-force) or "1.1 MN"; None if the text is not a number with such a unit. Raises BergtowError
+    if it is not above zero, or has no unit: 110 may be meant as tonnes."""
     tonnes = re.sub(r"(?<=[\d.\s])(t|tonnes?)\s*$", "tf", text)
     try:
         value = read(tonnes, "N")
@@ -54,7 +54,7 @@ def force(text, option):
 
 
 def known(table, text, option, what):
-    """A row of the library. Errors: BergtowError."""
+    """Look up a row of the library. Raises BergtowError."""
     if text not in table:
         raise BergtowError(f"{option} {text}: is no {what}, as \"110 t\" or \"1.1 MN\", and none of "
                            f"{', '.join(table)}; name one of these, or add a table of your own with {option}s", USAGE)
@@ -62,8 +62,8 @@ def known(table, text, option, what):
 
 
 def vessel(text, case, library=None):
-    """The vessel of the call (text or None), or that of the case. Errors: BergtowError, of a library that is not asked,
-    too."""
+    """The vessel of the call (text or None), or that of the case. Raises BergtowError, also for a faulty library that
+    is not needed."""
     table = towing.vessels(library)
     own = {k: case_value(case, f"tow.vessel.{k}", 0.0) for k in ("bollard_pull", "free_speed", "mass")}
     thrust = case.get("tow.mode") == "thrust"
@@ -82,7 +82,7 @@ def vessel(text, case, library=None):
 
 
 def line(text, case, library=None, own_length=None):
-    """The line of the call (text or None), or that of the case; own_length, m, in place of the case's. Errors:
+    """The line of the call (text or None), or that of the case; own_length, m, replaces the length in the case. Raises
     BergtowError, as above."""
     table = towing.lines(library)
     there = case.get("tow.mode") in ("line", "thrust")
@@ -99,8 +99,8 @@ def line(text, case, library=None, own_length=None):
 
 
 def needed_pull(v, load, speed, efficiency, own=0.0):
-    """Bollard pull, N, for a tow force at a speed; inf from the free-running speed on. A load that is not finite is
-    returned unchanged."""
+    """Bollard pull, N, for a tow force at a speed; inf at and above the free-running speed. A load that is not finite
+    is returned unchanged."""
     if not np.isfinite(load):
         return load
     return towing.needed_bollard_pull(load, speed, free_speed=v.free_speed, weather=efficiency, own_resistance=own)
@@ -113,8 +113,8 @@ def pull_at(v, speed, efficiency, own=0.0):
 
 
 def verdict(load, interval, has):
-    """Does a pull hold a load? "yes", "no", "open" where it lies within the interval, "not_asked" without a vessel. A
-    load without an interval counts as it is; an end that is None or infinite is no bound."""
+    """Does a pull hold a load? "yes", "no", "open" if it lies within the interval, "not_asked" without a vessel. A load
+    without an interval is taken as exact; an end that is None or infinite means no bound."""
     if not np.isfinite([load, has]).all():
         return "not_asked" if not np.isfinite(has) else "open"
     low, high = interval or (load, load)
@@ -132,8 +132,8 @@ def own_resistance(v, thickness, concentration, speed):
 
 
 def limit_speed(speeds, needs, has):
-    """Speed, m/s, where the need first exceeds the vessel's pull, linear between speeds; None if it never does, or does
-    so at the first speed."""
+    """Speed, m/s, at which the required pull first exceeds the vessel's, linear between speeds; None if it never does,
+    or already does at the first speed."""
     gap = np.asarray(has) - np.asarray(needs)
     if gap[0] < 0:
         return None
@@ -144,8 +144,8 @@ def limit_speed(speeds, needs, has):
 
 
 def limit_by_drag(v, efficiency, speed, load, drag):
-    """The same of a single speed: the drag goes with the square of the speed, all else of the load is held as it is,
-    which is assumed. None where the vessel cannot hold the load at that speed, or holds it at any."""
+    """The same from a single speed: the drag scales with the square of the speed, and the rest of the load is assumed
+    to stay constant. None if the vessel cannot hold the load at that speed, or holds it at any speed."""
     def gap(u):
         return pull_at(v, u, efficiency) - (load + drag * ((u / speed) ** 2 - 1))
     if not np.isfinite(v.pull) or gap(speed) < 0:

@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""The load cases of a tow beside the steady one: start, course change, stop, loss of thrust, a line that parts, head
-current and wind. Each is a row with its load, by short runs of its own or by a closed form; the row says which.
+"""The load cases of a tow in addition to the steady one: start, course change, stop, loss of thrust, a line that parts,
+head current and wind. Each is a row with its load, from short separate runs or a closed form; the row names the method.
 
-With M the mass of the body with that of the water that it carries, V the speed, D the drag of water and wind at V, R
-the mean ice resistance, F the design value of the steady tow, k = EA/L of the line:
+With M the mass of the body including added mass, V the speed, D the drag of water and wind at V, R the mean ice
+resistance, F the design value of the steady tow, k = EA/L of the line:
 
-    start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that asks for no more
-                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for, of the
+    start            at the end of a linear ramp of T seconds  F_s = D + R + M V/T; the ramp that requires no more
+                     than F is T = M V/(F - D - R), on a line no less than that of towing.ramp_for, for the
                      ice alone under F - D. Runs with that ramp, and with shorter ones as long as these hold,
-                     show what the ice makes of it
-    course change    on a line its tension in runs through a bend of radius r; else along the course as in such runs,
-                     across it M V^2/r: the root of the squares
-    stop             the line stays taut as long as the ordered stop takes at least M V/(D + R)
-    loss of thrust   the body goes on by  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if ice and water
-                     alone stop it; where the line is taken up again at a relative speed of V, which bounds it, the load
+                     show the effect of the ice
+    course change    on a line its tension in runs through a bend of radius r; otherwise the force along the course in
+                     such runs, across it M V^2/r: the root of the sum of squares
+    stop             the line stays taut if the ordered stop takes at least M V/(D + R)
+    loss of thrust   the body coasts for  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if only ice and
+                     water stop it; if the line is taken up again at a relative speed of V, an upper bound, the load
                      is towing.snap_load
-    a line parts     of a bridle of two like branches, the pull held: the other one is loaded from F/2, and swings, as
-                     nothing damps it, to 3/2 F. A single line: the tow is lost, and the body goes on as above
-    head sea         paired runs with current and wind against the tow: as stats/assumed takes a value that changes
+    a line parts     of a bridle with two equal branches, at constant pull: the other is loaded from F/2, and swings,
+                     without damping, to 3/2 F. A single line: the tow is lost, and the body coasts as above
+    head sea         paired runs with current and wind against the tow, as for a changed value in study/assumed.py
 
-Angle and radius of the bend are assumed unless the call gives them, and so are current and wind. These decide the load
-- a head current of half the speed doubles the drag - so where they are assumed the row stands beside the design value,
-and is not in it.
+Angle and radius of the bend are assumed unless the call gives them, and so are current and wind. These determine the
+load: a head current of half the speed doubles the drag. So if they are assumed, the row is shown beside the design
+value, but is not included in it.
 """
 import functools
 import math
@@ -40,24 +40,24 @@ from bergtow.table import quantity
 
 import numpy as np
 
-SHORTER = 0.6            # of a ramp that holds: the next that is tried
-LONGER = 1.5             # of one that does not
-RAMPS = 3                # that are tried, at most
+SHORTER = 0.6            # factor from a ramp that holds to the next one tried
+LONGER = 1.5             # factor from one that does not
+RAMPS = 3                # tried at most
 HEAD_CURRENT, HEAD_WIND = 0.25, 15.0  # m/s at full scale, assumed
 SETTLE = 300.0           # s at full scale, before and after a bend
-BEND_WIDTHS = 10.0       # radius of the bend / length of the body, assumed
-PARTED = 1.5             # load of the branch that is left / pull
-NO_WIND = 1e-3           # of the load: air drag below it is that of the body's own way
+BEND_WIDTHS = 10.0       # radius of the bend / width of the body across the flow, assumed
+PARTED = 1.5             # load of the remaining branch / pull
+NO_WIND = 1e-3           # of the load: smaller air drag is due to the body's own motion
 
 
 @dataclass
 class Tow:
-    """The steady tow that the load cases are of, in SI units."""
+    """The steady tow to which the load cases refer, in SI units."""
 
     case: dict             #: {key: text}, as the program reads it
     speed: float
     direction: float       #: rad
-    mass: float            #: with the water carried along
+    mass: float            #: including added mass
     water: float           #: drag
     wind: float
     ice: float             #: mean resistance
@@ -66,13 +66,13 @@ class Tow:
     interval: tuple | None
     width: float           #: across the flow, m
     area: float            #: of the waterline, m2
-    case_ramp: float       #: s, of the case as it is
-    case_start: float      #: largest mean over `scale` before the window with it; NaN where it is not known
+    case_ramp: float       #: s, of the unchanged case
+    case_start: float      #: largest mean over `scale` before the window with that ramp; NaN if unknown
     scale: float           #: s, over which loads are averaged
     slower: float          #: time at full scale / time of the case
     distance: float        #: of the tow, m
     line: object           #: gear.Line
-    vessel_mass: float     #: kg, NaN where it is not known
+    vessel_mass: float     #: kg, NaN if unknown
 
     @property
     def mean(self):
@@ -80,26 +80,26 @@ class Tow:
 
     @property
     def spring(self):
-        """EA/L, N/m; NaN without a line that is known."""
+        """EA/L, N/m; NaN without a known line."""
         return self.line.stiffness / self.line.length if self.line.length > 0 else np.nan
 
 
 @dataclass
 class Runs:
-    """The runs of load cases and ranges: study/runs.py, with a count, and without an end where one fails."""
+    """The runs of load cases and ranges: study/runs.py, with a count, and without aborting if one fails."""
 
     runs: object
-    fields: range           #: of paired runs, whose interval is that of these fields
-    few: range              #: of those of which the largest value is taken
+    fields: range           #: for paired runs, whose interval is that over these fields
+    few: range              #: for runs whose largest value is taken
     duration: float         #: s, of the case
-    pace: float             #: s of a core / s of a run, as measured in the fields of the case
-    left_out: bool = False  #: none is to be made
+    pace: float             #: core s / s of simulated time, measured in the fields of the case
+    left_out: bool = False  #: make no runs
     count: int = 0
     own: dict = field(default_factory=dict)  #: {name: pace of these runs}: a head sea takes several times as long
 
     def make(self, some, fields=None):
-        """Runs of {name: sets}. They begin only if, at the pace measured so far, all end in time. None where they are
-        there, or the code of why they are not: "budget", "run_failed"."""
+        """Make the runs of {name: sets}. They start only if, at the pace measured so far, all would end in time. None
+        if they are done, or the code of the reason why not: "budget", "run_failed"."""
         if self.left_out:
             return "left_out"
         fields = fields or self.fields
@@ -122,13 +122,13 @@ class Runs:
         return None
 
     def takes(self, name, sets, fields):
-        """s for the runs that are not there yet."""
+        """Time for the runs that are missing, s."""
         missing = sum(not self.runs.kept(name, i) for i in fields)
         seconds = float(sets["run.duration"].split()[0]) if "run.duration" in sets else self.duration
         return -(-missing // self.runs.jobs) * self.own.get(name, self.pace) * seconds
 
     def measured(self, name, measure, fields=None):
-        """[measure(run)] of the fields."""
+        """[measure(run)] for the fields."""
         out = []
         for i in fields or self.fields:
             with Run(self.runs.path(name, i)) as run:
@@ -138,19 +138,19 @@ class Runs:
 
 @functools.cache
 def drag_estimate():
-    """The name of the estimate of the drag in open water, which comes on top of the ice resistance."""
+    """The name of the estimate of the open-water drag, which is added to the ice resistance."""
     return next(e["name"] for e in quantities()["estimates"] if e["kind"] == "on top")
 
 
 def mean_parts(run):
-    """Mean ice resistance and water speed in the window of a run, its drag of the water and its whole drag."""
+    """Mean ice resistance in the window of a run, the drag of the water, and the total drag."""
     water = run.number(f"estimates.{drag_estimate()}.force_n")
     return {"ice": float(run.number("mean_ice_resistance_n")), "water": water,
             "drag": run.number("mean_drag_force_n")}
 
 
 def largest_mean(run, scale, start, end, name="tow_force"):
-    """Largest mean over `scale` of the tow force, or of another load, between two times, N; NaN where there is none."""
+    """Largest mean over `scale` of the tow force, or of another load, between two times, N; NaN if there is none."""
     some, time = stat_loads.of_run(run)
     x = next((x for load, x in some if load.name == name), None)
     if x is None:
@@ -162,8 +162,8 @@ def largest_mean(run, scale, start, end, name="tow_force"):
 
 
 def mass_of(run, direction):
-    """Mass of the body with the water that it carries, kg: its inertia over its acceleration along the tow; NaN where
-    it is never accelerated."""
+    """Mass of the body including added mass, kg: inertia force over acceleration along the tow; NaN if it is never
+    accelerated."""
     v = np.cos(direction) * run["body_vx"] + np.sin(direction) * run["body_vy"]
     a, f = np.diff(v) / np.diff(run["time"]), run["inertia_force"][1:]
     some = np.isfinite(a) & np.isfinite(f) & (np.abs(a) > 0.05 * np.nanmax(np.abs(a), initial=0.0))
@@ -184,12 +184,12 @@ def none(name, reason, **more):
 
 
 def start_ramp(t):
-    """Seconds of the ramp that asks for no more than the steady tow does; inf where its value is not above the mean."""
+    """Ramp in seconds that requires no more than the steady tow does; inf if its value is not above the mean."""
     above = t.value - t.mean
     by_inertia = t.mass * t.speed / above if above > 0 else np.inf
     if np.isfinite(t.spring):
-        # the ice holds a body at rest; drag grows with its way, over many periods of the line, and sets off no swing.
-        # Rejected: drag as part of what holds it, which takes hours where drag is most of the load
+        # The ice holds a body at rest; drag grows as it gathers way, over many periods of the line, and excites no
+        # swing. Rejected: counting drag as part of the holding force, which takes hours where drag is most of the load
         drag = t.water + t.wind
         return max(by_inertia, towing.ramp_for(t.value - drag, t.speed, t.spring, t.mass, resistance=t.ice))
     return by_inertia
@@ -200,7 +200,7 @@ def taut_stop(t):
 
 
 def coasting(t):
-    """(m, s) that the body goes on for without thrust; (nan, nan) where no ice stops it."""
+    """(m, s) that the body coasts without thrust; (nan, nan) if there is no ice to stop it."""
     drag, ice = t.water + t.wind, t.ice
     if not (drag > 0 and ice > 0):
         return np.nan, np.nan
@@ -240,12 +240,12 @@ def line_parted(t):
 
 
 def few(runs):
-    """What the largest of the runs of a load case says of such tows: a lower bound, as that of the steady tows."""
+    """What the largest of the runs of a load case shows about such tows: a lower bound, as for the steady tows."""
     return {"n_tows": len(runs.few), "share_below": stat_largest.share_below(len(runs.few))}
 
 
 def start(t, runs, say):
-    """(row, ramp): the shortest ramp tried whose start takes no more than the steady tow."""
+    """(row, ramp): the shortest tried ramp whose start requires no more than the steady tow."""
     first = start_ramp(t)
     own = {"case_s": t.case_ramp, "case_n": t.case_start}
     ramp = {"id": "ramp", "s": first, "n": t.value, "limit_n": t.value, "by": "closed_form", "closed_form_s": first,
@@ -294,16 +294,16 @@ def start(t, runs, say):
 
 
 def inside(case, place, margin):
-    """Does a place, [x, y], keep this distance, m, from the ends and sides that the domain has?"""
+    """Is a position, [x, y], at least this distance, m, from the ends and sides of the domain?"""
     first, size = ([case_value(case, f"domain.{key}") for key in keys] for keys in (("x0", "y0"), ("length", "width")))
     return all(case.get(f"domain.{kind}") in ("periodic", "moving") or a + margin <= at <= a + b - margin
                for kind, at, a, b in zip(("ends", "sides"), place, first, size))
 
 
 def course_change(t, runs, degrees, radius):
-    """Through a bend. On a line the towing end leads by its length, and a vessel looks ahead, so that the bend begins
-    as far ahead, and the tension holds the body in the bend, too; a body whose speed is prescribed is held across by no
-    series."""
+    """Through a bend. On a line the towing end leads by its length, and a vessel looks ahead, so the bend begins that
+    far ahead, and the tension also holds the body in the bend; for a body whose speed is prescribed, no series contains
+    the force across the course."""
     if t.case.get("tow.waypoints", "none") != "none" or t.case.get("tow.programme", "none") != "none":
         return none("course_change", "case_has_path")
     r = radius or BEND_WIDTHS * t.width
@@ -340,8 +340,8 @@ def course_change(t, runs, degrees, radius):
 
 
 def combined_interval(t, n, ends, r):
-    """The interval of a changed load with that of the steady tow in it, whose sides change by R'/R: the root of the
-    squares of either; None where one of the two is not known."""
+    """The interval of a changed load, combined with that of the steady tow, whose sides scale by R'/R: the root of the
+    sum of squares of the two; None if one of the two is unknown."""
     if not np.isfinite(ends).all() or t.interval is None or np.isnan(t.interval).any():
         return None
     return tuple(n + sign * math.hypot(end - n, r * (own - t.value))
@@ -349,16 +349,16 @@ def combined_interval(t, n, ends, r):
 
 
 def changed(t, base, other):
-    """(load, (low, high) of the paired fields, parts) of the steady tow in another run: F' = W' + w R'/R. base, other:
-    mean_parts of the fields."""
+    """(load, (low, high) of the paired fields, parts) of the steady tow under other conditions: F' = W' + w R'/R. base,
+    other: mean_parts of the fields."""
     r, ends = assumed.ratio([b["ice"] for b in base], [o["ice"] for o in other])
     fixed, rest = np.mean([o["drag"] for o in other]), t.value - t.water - t.wind
     return fixed + rest * r, tuple(fixed + rest * x for x in ends), {"ice_ratio": r, "drag_n": fixed, "rest_n": rest}
 
 
 def head_sea(t, runs, current=None, wind=None):
-    """Current and wind against the tow, m/s, on the fields of the base. Where both are None they are assumed, at model
-    scale by Froude's law."""
+    """Current and wind against the tow, m/s, on the fields of the base runs. If both are None they are assumed, at
+    model scale by Froude's law."""
     given = current is not None or wind is not None
     current, wind = (x if x is not None else 0.0 if given else y / t.slower
                      for x, y in ((current, HEAD_CURRENT), (wind, HEAD_WIND)))
@@ -386,7 +386,7 @@ def head_sea(t, runs, current=None, wind=None):
 
 
 def effect(t, r, runs):
-    """The row of one range. A drag coefficient by its closed form, all else by paired runs."""
+    """The row of one range: a drag coefficient by its closed form, anything else by paired runs."""
     key, at = r.key, t.case.get(r.key, "")
     out = {"id": f"range.{key}", "key": key, "at": at, "low": r.low, "high": r.high, "source": r.source,
            "distribution": r.distribution or None, "n_low": None, "n_high": None, "n_low_95": None, "n_high_95": None,
@@ -411,7 +411,7 @@ def effect(t, r, runs):
 
 
 def in_one_unit(*texts):
-    """Numbers of texts with the same unit, as "5 m" or "0.3"; NaN of all where their units differ."""
+    """Numbers from texts with the same unit, such as "5 m" or "0.3"; NaN for all if their units differ."""
     parts = [str(text).split(None, 1) for text in texts]
     try:
         return [float(p[0]) for p in parts] if len({tuple(p[1:]) for p in parts}) == 1 else [np.nan] * len(parts)
@@ -420,6 +420,6 @@ def in_one_unit(*texts):
 
 
 def form_drag(t):
-    """The part of the water's drag that its form coefficient makes, N: the rest is friction under the body."""
+    """The part of the water drag due to its form coefficient, N: the rest is friction under the body."""
     form = 0.5 * float(t.case["body.drag.water_form"]) * case_value(t.case, "body.draft") * t.width
     return t.water * form / (form + float(t.case["body.drag.water_skin"]) * t.area)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Runs of one case with some keys replaced, as studies that `bergtow ensemble` runs: bergtow converge, capability,
-design and route base their decisions on them. What they need of it: "Many runs" in docs/architecture.md.
+"""Runs of one case with some keys replaced, as studies that `bergtow ensemble` runs. bergtow converge, capability,
+design and route base their decisions on them. Their requirements are under "Many runs" in docs/architecture.md.
 
-    DIR/SUBJECT/NAME.yml        the study of the values that NAME stands for
+    DIR/SUBJECT/NAME.yml        the study with the values that NAME stands for
     DIR/SUBJECT/NAME/           its ensemble; field NNN in members/c001-rNNN
 
-The program keeps runs, resumes those that were stopped, and makes damaged ones again. A folder of another study, or of
-another version of the program, is removed; so one call at a time works in DIR/SUBJECT: it and its runs hold the lock of
-the folder.
+The program keeps runs, resumes those that were stopped, and repeats damaged ones. A folder of another study, or of
+another version of the program, is removed. So only one call at a time works in DIR/SUBJECT: it and its runs hold the
+lock of the folder.
 """
 import ctypes
 import json
@@ -32,9 +32,9 @@ import numpy as np
 import yaml
 
 DONE, STOPPED = 0, 6  # exit codes of the program
-SPENT = Message("the budget is spent", "budget")  # of a run that met its limit
+SPENT = Message("the budget is spent", "budget")  # for a run that met its limit
 WAITING, FINISHED, FAILED = range(3)  # bt_member_state
-MESSAGES = {"BERGTOW_MESSAGES": "json"}  # as messages() reads them
+MESSAGES = {"BERGTOW_MESSAGES": "json"}  # so that messages() can read them
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 FIRST_SEED = 1000  # of the fields
 
@@ -47,13 +47,13 @@ def _message(line):
 
 
 def messages(said):
-    """The messages of the program; what others write there, such as MPI, is an error without a code."""
+    """The messages of the program; output of others on that stream, such as MPI, is an error without a code."""
     return [_message(line) for line in said.splitlines() if line]
 
 
 def stopped_by_limit(code, took, limit):
-    """Has a call of the program met its limit of wall time, s, which it took? Errors: KeyboardInterrupt where a signal
-    or a file `stop` has ended it before: whoever wants that one ended wants no others."""
+    """Did a call of the program, which took this long, end at its limit of wall time, s? Raises KeyboardInterrupt if a
+    signal or a `stop` file ended it earlier: whoever stops one run wants no others to start."""
     if code == STOPPED and took < limit:
         raise KeyboardInterrupt
     return code == STOPPED
@@ -61,8 +61,8 @@ def stopped_by_limit(code, took, limit):
 
 @contextmanager
 def locked(folder):
-    """One call at a time in a folder; yields the descriptor of its lock, which runs inherit: it holds for as long as
-    one of them is left. Errors: BergtowError."""
+    """Allow one call at a time in a folder. Yields the descriptor of its lock, which runs inherit, so that it holds
+    until the last of them has ended. Raises BergtowError."""
     folder.mkdir(parents=True, exist_ok=True)
     lock = ctypes.c_int()
     _library.library().bt_folder_lock(os.fsencode(folder), ctypes.byref(lock))
@@ -73,7 +73,7 @@ def locked(folder):
 
 
 def state_of(folder):
-    """(state, exit code, Message why) of a member, as the program has it (bergtow/ensemble.h)."""
+    """(state, exit code, Message with the reason) of a member, from the program (bergtow/ensemble.h)."""
     code, texts = ctypes.c_int(), [ctypes.c_void_p(), ctypes.c_void_p()]
     state = _library.library().bt_ensemble_state(os.fsencode(folder), ctypes.byref(code), *map(ctypes.byref, texts))
     failure, why = (_library.take_text(text.value) if text.value else "" for text in texts)
@@ -86,20 +86,20 @@ class CaseRuns:
 
     case: Path
     folder: Path
-    subject: str           #: name of the folder that holds them
+    subject: str           #: name of the folder that contains them
     program: Path
-    given: list            #: --set of the user's
+    given: list            #: --set options of the user
     jobs: int
-    end: float             #: of the time for a quantity, by time.monotonic()
-    last: float            #: of the budget
-    seconds: dict = field(default_factory=dict)  #: of a run, by setting
-    made: int = 0          #: runs that were made, and not there before
+    end: float             #: end of the time for a quantity, as time.monotonic()
+    last: float            #: end of the budget
+    seconds: dict = field(default_factory=dict)  #: per run, by setting
+    made: int = 0          #: runs made now, not found in the folder
     failed: dict = field(default_factory=dict)   #: {folder: (why, exit code)} of runs that failed in this call
     lock: int = -1         #: of the folder, as locked() gives it
-    _ends: dict = field(default_factory=dict)    #: {name: None, or why it failed, of each run that was asked for}
-    _alike: set = field(default_factory=set)     #: names whose ice no seed changes: all fields are one run
-    _sound: set = field(default_factory=set)     #: folders of runs that fit their record
-    _told: set = field(default_factory=set)      #: runs that are reported
+    _ends: dict = field(default_factory=dict)    #: {name: for each requested run, None or why it failed}
+    _alike: set = field(default_factory=set)     #: names whose ice the seed does not change: all fields are one run
+    _sound: set = field(default_factory=set)     #: folders of runs that match their record
+    _told: set = field(default_factory=set)      #: warnings already printed
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
@@ -117,7 +117,7 @@ class CaseRuns:
         return self.home(name) / "members" / self.member(0 if name in self._alike else i)
 
     def alike(self, name):
-        """Does no seed change the ice of these runs? All fields are then one run."""
+        """Does the seed leave the ice of these runs unchanged? All fields are then one run."""
         return name in self._alike
 
     def member(self, i):
@@ -131,7 +131,7 @@ class CaseRuns:
                 "fields": "numbered", "seed": FIRST_SEED, "repeats": n}
 
     def write(self, name, n, values):
-        """NAME.yml; runs of another version of the program are removed."""
+        """Write NAME.yml; runs of another version of the program are removed."""
         path = Path(f"{self.home(name)}.yml")
         path.parent.mkdir(parents=True, exist_ok=True)
         study = {"base": os.path.relpath(self.case.resolve(), path.parent.resolve()), **self.study(n, values)}
@@ -144,7 +144,7 @@ class CaseRuns:
         return path
 
     def kept(self, name, i):
-        """Is this run there, with its files unchanged?"""
+        """Does this run exist, with its files unchanged?"""
         ends, path = self._ends.get(name, ()), self.path(name, i)
         if i < len(ends):
             return ends[i] is None
@@ -155,16 +155,16 @@ class CaseRuns:
         return path in self._sound
 
     def tell(self, what, words):
-        """A warning, once."""
+        """Print a warning, but only once."""
         if what not in self._told:
             print(f"bergtow {self.subject}: warning: {words}", file=sys.stderr)
         self._told.add(what)
 
     def call(self, name, n, values, line):
-        """Let the program make those of n runs that are missing, until the budget is spent."""
+        """Let the program make the missing ones of n runs, until the budget is spent."""
         study, began = self.write(name, 1 if name in self._alike else n, values), time.monotonic()
         before = [state_of(self.path(name, i))[0] for i in range(n)]
-        # failed ones are tried once in each call
+        # each call retries failed ones once
         more = ["--retry-failed"] if FAILED in before[len(self._ends.get(name, ())):] else []
         try:
             _, said = run_members(self.program, study, self.home(name), [], self.jobs, self.last - began, not line,
@@ -192,7 +192,7 @@ class CaseRuns:
             self.seconds[name] = (time.monotonic() - began) / -(-new // self.jobs)
 
     def fail(self, name, n, error):
-        """The program refuses a case with these values: each of its runs has failed."""
+        """The program rejects a case with these values: count each of its runs as failed."""
         why = error.errors[0]
         self._ends[name] = [why] * n
         self.failed |= {self.path(name, i): (why, error.status) for i in range(n)}
@@ -206,8 +206,8 @@ class CaseRuns:
         return {WAITING: SPENT, FAILED: why, FINISHED: None}[state]
 
     def make(self, name, fields, values, line=None):
-        """The runs of these fields, and of those before them: None, or why it failed, of each of these. line: gets each
-        line that the program prints."""
+        """Make the runs of these fields, and of those before them; returns for each of these fields None, or why it
+        failed. line: called with each line that the program prints."""
         n = max(fields, default=-1) + 1
         if len(self._ends.get(name, ())) < n or SPENT in self._ends[name][:n]:
             self.call(name, n, values, line)
@@ -216,8 +216,8 @@ class CaseRuns:
         return [self._ends[name][i] for i in fields]
 
     def refuse_ice(self, name):
-        """Errors: RunError where there is ice that no seed changes, whose scatter is none and decides nothing. Fields
-        without floes are alike, and pass."""
+        """Raises RunError if there is ice that the seed does not change: it has no scatter, and decides nothing. Fields
+        without floes are equal, and pass."""
         if json.loads((self.path(name, 0) / "summary.json").read_text())["n_floes"]:
             raise RunError(self.case, "the ice is read or given floe by floe, and no seed changes it", "let the "
                            "program make the ice, by removing ice.outlines, ice.field or floes", CASE)
@@ -227,14 +227,14 @@ class CaseRuns:
         return next((code for _, (_, code) in sorted(self.failed.items())), 4)
 
     def tell_failed(self):
-        """Errors: RunError where a run of this call has failed."""
+        """Raises RunError if a run of this call has failed."""
         for path, (why, code) in sorted(self.failed.items())[:1]:
             more = f", and {len(self.failed) - 1} more" if len(self.failed) > 1 else ""
             raise RunError(path, f"this run failed{more}: {why}",
                            "the result is without it; remove the cause of the failure", code)
 
     def there(self, name, n, values):
-        """Are n runs there now, or could they be made? False where the budget does not reach so far."""
+        """Do n runs exist, or could they be made? False if the budget is insufficient."""
         missing = sum(not self.kept(name, i) for i in range(n))
         expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-missing // self.jobs)
         if missing and time.monotonic() + expected > self.end:
@@ -248,7 +248,7 @@ class CaseRuns:
         return True
 
     def measured(self, name, fields, measure):
-        """Of runs that are there, one for all fields where no seed changes the ice."""
+        """Measures of existing runs; a single one for all fields if the seed does not change the ice."""
         out = []
         for i in fields[:1] if self.alike(name) else fields:
             with Run(self.path(name, i)) as run:
@@ -257,7 +257,7 @@ class CaseRuns:
 
 
 def ensemble_made(folder):
-    """When ensemble.h5 of a folder was made, None where it is not there."""
+    """Time at which ensemble.h5 of a folder was written, None if it does not exist."""
     try:
         return (folder / "ensemble.h5").stat().st_mtime_ns
     except FileNotFoundError:
@@ -265,10 +265,10 @@ def ensemble_made(folder):
 
 
 def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(), line=None, **options):
-    """Run the members of a study that are not there yet, a process of one thread a core, for so many seconds (inf: as
-    long as it takes): whether all have settled, finished or failed, and the Messages of the program. more: words of the
-    call; line and options: as of called(). Errors: RunError where the program refuses the study; a member that fails
-    is none, and the others are gathered as ever."""
+    """Run the members of a study that have not been run, one single-threaded process per core, for this many seconds
+    (inf: no limit). Returns whether all have settled, i.e. finished or failed, and the Messages of the program. more:
+    words added to the call; line and options: as for called(). Raises RunError if the program rejects the study, but
+    not if a member fails: the others are gathered as usual."""
     call = [str(binary), "ensemble", str(study), "-o", str(folder), "--threads", "1", "--jobs", str(jobs), *more]
     call += [part for text in sets for part in ("--set", text)]
     limit = round(max(1.0, seconds), 3) if np.isfinite(seconds) else np.inf
@@ -285,7 +285,7 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
 
 
 def checked(binary, case, sets, *words):
-    """What `bergtow check` prints of a case with keys replaced. Errors: RunError in the program's words."""
+    """Output of `bergtow check` for a case with keys replaced. Raises RunError with the program's message."""
     done = subprocess.run([str(binary), "check", str(case), *words, *(w for t in sets for w in ("--set", t))],
                           capture_output=True, text=True, env=os.environ | MESSAGES)
     if done.returncode:

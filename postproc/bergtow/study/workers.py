@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Members of an ensemble on the workers of Dask.
+"""Run members of an ensemble on Dask workers.
 
-Each task is a call of `bergtow ensemble --no-wait` on the one folder; the calls share the members by the locks of the
-program, as the jobs of an array do (cases/studies/slurm-array.sh). Rejected: a task for each member, which would need a
+Each task is a call of `bergtow ensemble --no-wait` on the same folder; the calls share the members through the locks of
+the program, like the jobs of an array (cases/studies/slurm-array.sh). Rejected: one task per member, which would need a
 second list of members, a second rule for finished members, and a start of the program for each member. Its advantage,
-that Dask moves members between workers, the locks give as well.
+that Dask moves members between workers, is also provided by the locks.
 """
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from typing import Any
 
 from bergtow.errors import IO, BergtowError
 
-#: seconds between two looks for the end of a call, and for the wish to stop
+#: seconds between two checks for the end of a call, and for a request to stop
 _LOOK = 0.2
 
 
 def _share(command: list[str], stop: str) -> tuple[int, str]:
-    """On a worker: a call of the program. stop: a file that asks it to end with checkpoints when it goes away. Returns
-    exit code and messages."""
+    """On a worker: call the program. stop: a file whose removal asks it to end with checkpoints. Returns exit code and
+    messages."""
     with tempfile.TemporaryFile("w+") as errors:
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, stdin=subprocess.DEVNULL,
                               start_new_session=True) as process:
@@ -44,8 +44,8 @@ def _finished(out: Path) -> int:
 
 def on_workers(client: Any, command: list[str], out: str | os.PathLike[str], tasks: int, threads: int,
                progress: bool) -> None:
-    """Run calls of the program on the workers, until no member is left to begin. The last call of the caller reports
-    the state of the members. Errors: BergtowError when no call could be made at all."""
+    """Run calls of the program on the workers, until no member is left to start. The caller's final call reports the
+    state of the members. Raises BergtowError if no call could be made at all."""
     if not client.nthreads():
         raise BergtowError("the Dask client has no workers; start some, or leave out client", IO)
     count = tasks or max(sum(client.nthreads().values()) // max(threads, 1), 1)
@@ -64,7 +64,7 @@ def on_workers(client: Any, command: list[str], out: str | os.PathLike[str], tas
                     print(f"{now} members finished", flush=True)
                     said = now
         finally:
-            running.unlink()  # an interrupt: the calls end with checkpoints, and are waited for
+            running.unlink()  # on an interrupt, the calls end with checkpoints, which is awaited
             wrong = [f.exception() for f in futures]
     if all(wrong):
         raise BergtowError(f"no worker of the Dask client could run {command[0]}: {wrong[0]}", IO)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Tables and sentences of results, at the terminal and as Markdown."""
+"""Tables and sentences of results, for the terminal and as Markdown."""

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The answer of `bergtow design` in words: the sentence, and its tables. answer: that of study/answer.py, as it comes
-back from answer.json, where what is not finite is None."""
+"""The answer of `bergtow design` in words: the sentence, and its tables. answer: that of study/answer.py, as read back
+from answer.json, where numbers that are not finite are None."""
 import math
 
 from bergtow.table import Table, designed, level, number, short, written
@@ -18,7 +18,7 @@ PARTS = {"ice": "ice", "water": "water drag", "wind": "wind", "coriolis": "Corio
 KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at_least": "at least",
          "closed_form": "closed form", "bound": "upper bound", "changed": "changed from the steady tow",
          "constant": "does not vary", "none": "–"}
-#: what stands for the code of a reason
+#: words for the code of a reason
 REASONS = {
     "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above",
     "no_window": "no window that is long enough", "no_member": "no run",
@@ -35,7 +35,7 @@ REASONS = {
     "value_not_above_mean": "the value is not above the mean", "no_ramp_held": "no ramp that was tried holds",
     "left_out": "left out"
 }
-#: why there is no single figure for fields and ranges together
+#: why there is no combined figure for fields and ranges
 NOT_COMBINED = {"range_without_distribution": "some ranges have no distribution",
                 "range_without_effect": "the effect of some ranges is not known",
                 "no_interval_of_fields": "the value has no interval", "no_range": "no range was looked at"}
@@ -46,17 +46,17 @@ def known(x):
 
 
 def kn(n):
-    """N as kN, to three digits, without unit."""
+    """N as kN, to three digits, without a unit."""
     return number(n / 1e3) if known(n) else "–"
 
 
 def force(n):
-    """A load that is designed for."""
+    """A design load."""
     return f"{number(designed(n) / 1e3)} kN" if known(n) else "no value"
 
 
 def ends(n, interval):
-    """"620 to 700", the interval of a load n in kN, with the digits that it is worth, as in the report; "" without
+    """"620 to 700", the interval of a load n in kN, with the digits that it justifies, as in the report; "" without
     one."""
     if interval is None or interval[0] is None:
         return ""
@@ -68,7 +68,7 @@ def speed(v):
 
 
 def plain(x):
-    """A number that was given or assumed: without the zeros that would make it look measured."""
+    """A given or assumed number, without the trailing zeros that would make it look measured."""
     return f"{float(short(x)):g}"
 
 
@@ -89,7 +89,7 @@ def _over(a):
 
 
 def _in_case(v, a):
-    """Of which load case a value is, and of which condition, where there are several of that speed."""
+    """The load case of a value, and its condition if there are several at that speed."""
     case = "" if v["case"] == "case.steady" else f" in the load case \"{CASES[v['case']]}\""
     of = next((c.get("of") for c in a["load_cases"] if c.get("of")), None)
     here = [c for c in a["conditions"] if c["speed_m_s"] == a["asked"]["speed_m_s"] or c["id"] == of]
@@ -201,7 +201,7 @@ def sentence(answer):
     out = []
     for part in answer["sentence"]:
         text = WORDS[part["code"]](part["values"], answer)
-        if part["code"] == "line":  # goes on where the vessel stops
+        if part["code"] == "line":  # continues the sentence about the vessel
             out[-1] = f"{out[-1][:-1]} and {text}."
         else:
             out.append(f"{text}.")
@@ -212,7 +212,7 @@ def sentence(answer):
 
 
 def _behind(row):
-    """What stands behind a load case."""
+    """Details of a load case, in words."""
     v, said = row["values"], []
     def add(key, words):
         if known(v.get(key)):
@@ -276,7 +276,7 @@ def speeds(a):
 
 
 def plan(p):
-    """Before the first run: what a value takes, and what the budget gives."""
+    """Before the first run: the cost of a value, and what the budget allows."""
     each = f"{p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min"
     fields = each if p["window_hours"] > 0 else "a window"
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
@@ -295,7 +295,7 @@ def took(a):
 
 
 def tables(answer):
-    """[(heading, parts)] of all but what it took."""
+    """[(heading, parts)] of everything except the cost."""
     return [(HEADINGS[name], make(answer)) for name, key, make in (
         ("load_cases", "load_cases", load_cases), ("parts", "conditions", parts), ("assumed", "assumed", assumed),
         ("speeds", "speeds", speeds)) if answer[key]]
@@ -308,7 +308,7 @@ def text(answer):
 
 
 def remarks(answer):
-    """What speaks against the numbers, in words."""
+    """Reservations about the numbers, in words."""
     out = [f"{CASES[c['id']]}: {REASONS.get(c['reason'], c['reason'])}" for c in answer["load_cases"]
            if c["kind"] == "none"]
     v = answer["vessel"]
@@ -320,7 +320,7 @@ def remarks(answer):
 
 
 def warnings(answer):
-    """Those of the statistics, as bergtow statistics has them."""
+    """The warnings of the statistics, as in bergtow statistics."""
     return loads_text.warnings({"conditions": [
         {"label": c["label"], "design": {"tow": {"value": c["value"]["n"] or 0.0}, "warnings": c["warnings"]}}
         for c in answer["conditions"]]})

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The uncertainty budget of bergtow budget as one table, in parts of bergtow/table.py, and one picture."""
+"""The result of bergtow budget as one table, in parts of bergtow/table.py, and one picture."""
 from bergtow.result.members import listed
 from bergtow.table import Table, Warned, number, quantity, scale
 from bergtow.text.converge import percent
 
 import numpy as np
 
-TRUSTED_Q2 = 0.7  # below, shares are a rough guide
+TRUSTED_Q2 = 0.7  # below this, shares are only a rough guide
 
 
 def _force(found, x):
@@ -99,7 +99,7 @@ def notes(found):
 
 
 def warnings(found):
-    """Lines on members and effects that the numbers leave out."""
+    """Lines on members and effects that the numbers do not include."""
     wanted, out = found["wanted"], []
     left = found.get("waiting", wanted - found["members"])
     if left:
@@ -130,7 +130,7 @@ def warnings(found):
 
 
 def content(found):
-    """The table of each number, one below the other."""
+    """The tables of all numbers, one below the other."""
     return [part for one in (found, *found.get("more", [])) for part in _content(one)]
 
 
@@ -141,7 +141,7 @@ def _content(found):
 
 
 def figure(found):
-    """Standard deviations of the parts, and the indices of the parameters."""
+    """Plot the standard deviations of the parts, and the indices of the parameters."""
     from bergtow.plot import style
 
     indices = found["shares"].get("indices", {})

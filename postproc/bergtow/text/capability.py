@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""What bergtow capability found, as parts of bergtow/table.py and as a picture."""
+"""The results of bergtow capability, as parts of bergtow/table.py and as a picture."""
 from bergtow.result.members import reading
 from bergtow.table import Table, Warned, number, quantity, scale, short
 
 import numpy as np
 
-FAR_LOAD = 2  # times the largest tension: a breaking load beyond is not in the picture
+FAR_LOAD = 2  # times the largest tension: a larger breaking load is not shown in the picture
 
 
 def value(found, x):
-    """A value of the searched key with its unit, a concentration in %, an angle in degrees."""
+    """A value of the searched key with its unit: concentration in %, angles in degrees."""
     if x is None:
         return "–"
     factor, unit = reading(found["search"], found["unit"])
@@ -21,7 +21,7 @@ def force(x):
 
 
 def condition(found, c):
-    """Words for a condition below a head that names its key."""
+    """Words for a condition, under a heading that names its key."""
     return c["label"].removeprefix(f"{found['for']} ")
 
 
@@ -36,7 +36,7 @@ def limits(found):
 
 
 def least_of(values):
-    """What bounds an interval of their mean: 0, unless some are below, as speeds are where a body was driven back."""
+    """Lower limit for an interval of their mean: 0, unless some are below, as speeds of a body driven back."""
     return min((x for x in values if x is not None and x < 0), default=0.0)
 
 
@@ -77,7 +77,7 @@ def meaning(found):
 
 
 def narrow(found):
-    """Where the domain is too narrow for its ice, a sentence; "" where it is not, or where nothing tells."""
+    """A sentence where the domain is too narrow for its ice; "" if it is not, or if unknown."""
     few = [(p["value"], p["body_widths"], p["body_widths_needed"]) for c in found["conditions"] for p in c["points"]
            if (p.get("body_widths_needed") or 0) > (p.get("body_widths") or np.inf)]
     if not few:
@@ -90,7 +90,7 @@ def narrow(found):
 
 
 def wider(found):
-    """Where the domain was made wider for its ice, a sentence; "" where it was not."""
+    """A sentence where the domain was widened for its ice; "" if it was not."""
     made = [(p["value"], p["wider"]) for c in found["conditions"] for p in c["points"] if p.get("wider")]
     if not made:
         return ""
@@ -122,8 +122,8 @@ def _curve(axes, c, name, colour, factor, unit):
 
 
 def figure(found):
-    """Speed and largest tension over the searched key, and the limit over the values of --for where they are
-    numbers."""
+    """Plot speed and largest tension against the searched key, and the limit against the values of --for if these are
+    numeric."""
     from bergtow.plot import style
 
     colours = style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT

@@ -6,7 +6,7 @@ WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it ma
 
 
 def percent(value):
-    """To a tenth below 20 %, where the margin lies, and to two digits beyond."""
+    """Percentage to a tenth below 20 %, where the margin lies, and to two digits above."""
     if value is None:
         return "–"
     x = 100 * value
@@ -23,7 +23,7 @@ def value(row, which):
 
 
 def advice(row):
-    """What to take."""
+    """The recommended value."""
     at = value(row, "recommended")
     if row["name"] == "fields":
         return f"{value(row, 'recommended')} fields for {100 * row['wanted_error']:g} %"
@@ -47,14 +47,14 @@ def cells(row):
     on = f"{row['fields']}, {'the same ice' if row['same_ice'] else 'other ice'}"
     if row.get("pairing") is not None:
         on += f", error x {row['pairing']:.2g}"
-    # the same twice: a start whose ramp can be no longer, looked at as it is
+    # equal for a start whose ramp cannot be made longer
     values = " -> ".join(dict.fromkeys((value(row, "from"), value(row, "to"))))
     return [row["name"], values, row["quantity"],
             f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
 
 
 def doubtful(found):
-    """[[a line on windows of the case that are not those of a steady tow]]; [] without one."""
+    """[[a line on windows of the case whose tow is not steady]]; [] if there are none."""
     verdicts = found.get("verdicts") or {}
     some = [f"{verdicts[kind]} {kind}" for kind in ("not steady", "too short") if verdicts.get(kind)]
     if not some:

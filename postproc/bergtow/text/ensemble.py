@@ -12,7 +12,7 @@ DOUBT_LETTERS = {"unconverged": "U", "unbounded": "B", "jammed": "J", "unsteady"
 
 
 def doubts(c):
-    """"2 U, 1 J": how many of the fields carry which doubt."""
+    """"2 U, 1 J": number of fields with each doubt."""
     counts = [f"{n} {DOUBT_LETTERS[kind]}" for kind, n in c["members"]["doubts"].items() if n]
     return ", ".join(counts) or "none"
 
@@ -24,7 +24,7 @@ def fields_cell(c):
 
 
 def unit_of(s):
-    """Factor and unit in which the middle one of the conditions reads well."""
+    """Factor and unit that suit the median of the conditions."""
     means = [c["resistance"]["mean"] for c in s["conditions"] if c["resistance"]["n"]]
     return scale([np.median(means)] if means else [], "N")
 
@@ -95,7 +95,7 @@ def estimates(s):
 
 
 def fits(s):
-    # of few fields no means are fitted
+    # for few fields no means are fitted
     of_means = any("refused" not in f for c in s["conditions"] for f in c["fits_of_means"][:2])
     head = ["condition", *["means: best fit", "p", "second", "p"] * of_means, "samples: best fit", "p", "second", "p",
             "samples", "at or below 0"]
@@ -272,7 +272,7 @@ def members(s, markdown):
 
 
 def sections(s, markdown):
-    """{heading: parts}; markdown: not for a terminal, so without the options to take."""
+    """{heading: parts}; markdown: omit advice on options, which is for a terminal."""
     return {"Design tow force": loads_text.design(s), "Members": [members(s, markdown)],
             **({"Convergence": converge_text.content(s["convergence"])} if s["convergence"] else {}),
             "Loads": loads_text.signals(s), "Quantiles of loads": loads_text.quantiles(s),

@@ -19,8 +19,8 @@ def _towed(s):
 
 
 def asked(s):
-    """"Design tow force: exceeded with a probability of 5 % in a tow of 24 h, as the moving mean over 30 s"; the range
-    where conditions differ. "" where nothing is towed."""
+    """"Design tow force: exceeded with a probability of 5 % in a tow of 24 h, as the moving mean over 30 s"; a range if
+    conditions differ. "" if nothing is towed."""
     some = [c["design"]["tow"] for c in _towed(s)]
     if not some:
         return ""
@@ -45,7 +45,7 @@ def ends(d, factor):
 
 
 def design(s):
-    """The design statement: a row a condition, the conditions that it holds for, and the warnings."""
+    """The design statement: one row per condition, the conditions for which it holds, and the warnings."""
     some = _towed(s)
     if not some:
         first, *more = map(marked, warnings(s) or [""])
@@ -86,7 +86,7 @@ def steps(s):
 
 
 def holds_for(s):
-    """"Holds for: ...", what is the same for all conditions once, and of what is not, the conditions; "" of none."""
+    """"Holds for: ...": facts common to all conditions once, others with their conditions; "" if there are none."""
     some = [c for c in s["conditions"] if c["design"]["holds_for"]]
     if not some:
         return ""
@@ -95,8 +95,8 @@ def holds_for(s):
 
 
 def shared(found):
-    """Each text of [(condition, text)] once: [(text, the conditions that it is of)], these "" where it is that of all;
-    without texts that are "". Where the texts differ by the value of one key alone, that value names the conditions."""
+    """Each distinct text of [(condition, text)] once: [(text, its conditions)], with "" as the conditions if all have
+    it; empty texts are dropped. If the texts differ only with the value of one key, that value names the conditions."""
     names, where = [c["label"] for c, _ in found], {}
     for key in found[0][0]["values"] if found else ():
         of = {}
@@ -111,12 +111,12 @@ def shared(found):
 
 
 def qualified(some):
-    """Texts of shared() with their conditions behind them."""
+    """Texts of shared(), each followed by its conditions."""
     return [f"{text} ({where})" if where else text for text, where in some]
 
 
 def _governs(c):
-    """Conditions by this have the largest design value first: a list that is cut keeps those that govern."""
+    """Sort key that puts the largest design value first, so that a shortened list keeps the governing conditions."""
     tow = c["design"]["tow"] or {}
     return -tow.get("value", tow.get("largest", 0.0))
 
@@ -140,19 +140,19 @@ def warnings(s):
 
 
 def sentence(text):
-    """With a capital letter."""
+    """Capitalise the first letter."""
     return text[:1].upper() + text[1:]
 
 
 def several(some):
-    """A list of texts as one, of a long one the first alone: a page of conditions is not read. What matters most comes
-    first."""
+    """Join a list of texts; of a long list only the first ones, since nobody reads a page of conditions. The most
+    important come first."""
     return "; ".join(some if len(some) <= MOST_NAMED else
                      [*some[:MOST_NAMED - 1], f"and {len(some) - MOST_NAMED + 1} more conditions"])
 
 
 def _rows_of(s, name, cells):
-    """A row for each condition that has the load."""
+    """One row for each condition that has the load."""
     return [[c["label"], *cells(c["loads"][name])] for c in s["conditions"] if name in c["loads"]]
 
 
@@ -188,7 +188,7 @@ def signals(s):
 
 
 def nothing(s):
-    """Why there is no row of any load."""
+    """Why no load has a row."""
     if any(c["loads_left_out"] for c in s["conditions"]):
         return "No statistics of a load."
     return "No loads: no member has a window with a towed body."
@@ -213,7 +213,7 @@ def left_out(s):
 
 
 def estimate(found, factor):
-    """Cells of a number and its interval."""
+    """Cells with a number and its interval."""
     return number(found["value"] / factor), pair(found["interval_95"], factor)
 
 
@@ -240,7 +240,7 @@ def conversions(s):
 
 
 def panel_lines(s):
-    """The hull panel that bears most, a sentence a condition."""
+    """The most heavily loaded hull panel, one sentence per condition."""
     out = []
     for c in s["conditions"]:
         p = c["panels"]
@@ -257,12 +257,12 @@ def panel_lines(s):
     return out
 
 
-CUT = 0.9  # of the hours: where the blocks have less, it is said
+CUT = 0.9  # of the hours: if the blocks cover less, a note is added
 
 
 def cut(name, f, hours):
-    """["NAME: 12 of 20 h, and none of 3 fields"] of a fit by blocks that leaves out more than a little; [] of others.
-    name: of what, hours: of all fields."""
+    """["NAME: 12 of 20 h, and none of 3 fields"] for a fit by blocks that leaves out more than a small part; otherwise
+    []. name: subject of the fit; hours: of all fields."""
     used, none = f.get("hours", hours), f.get("without_block", 0)
     if used >= CUT * hours and not none:
         return []
@@ -274,7 +274,7 @@ def cut_note(some):
 
 
 def returns(s, markdown):
-    """Return levels of the whole signal by both models of the tail."""
+    """Return levels of the whole signal from both models of the tail."""
     hours = sorted({level["hours"] for c in s["conditions"] for x in c["loads"].values()
                     for kind in NAMES for level in x[kind].get("levels", [])})
     if not hours:
@@ -308,14 +308,14 @@ def returns(s, markdown):
             "-0.5: the levels "
             "are little more than the largest value seen. No bound: the upper end is more than "
             f"{text_table.FAR:g} times the level.")
-    # what to do about it is for a terminal
+    # advice on the remedy is only for a terminal
     said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
             for (load, tail), some in refused.items())
     return [Table(head, rows, 1), [note, *cut_note(short), *said]]
 
 
 def level(found, factor):
-    """A return level as the statistics have it, None where there is none."""
+    """A return level from the statistics, "–" if there is none."""
     if found is None or not np.isfinite(found["level"]):
         return "–"
     value, ends = text_table.level(found["level"], found["level_95"], factor)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What bergtow route found, as tables and sentences. found: as route.json has it."""
+"""The results of bergtow route, as tables and sentences. found: as in route.json."""
 from bergtow.table import number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
@@ -20,7 +20,7 @@ def amount(x, unit):
 
 
 def plan(found, markdown=False):
-    """The routes as planned."""
+    """The planned routes."""
     head = ["route", "length", "time", "ice in the swath", "mean force", "work", "remarks"]
     rows = []
     for r in found["routes"]:
@@ -36,7 +36,7 @@ def percent(x):
 
 
 def verified(found, markdown=False):
-    """The tows against the straight line."""
+    """The tows compared with the straight line."""
     verdict, unit = found["verdict"], UNITS[found["objective"]]
     head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak", "time",
             "remarks"]
@@ -58,7 +58,7 @@ def verified(found, markdown=False):
 
 
 def answer(found):
-    """The sentence."""
+    """The sentence with the verdict."""
     v, by_name = found.get("verdict"), {r["name"]: r for r in found["routes"]}
     if v is None:
         return "Planned, not towed: no number here is of a simulation."
@@ -94,7 +94,7 @@ def interval(c):
 
 
 def meaning(found):
-    """How the numbers came about."""
+    """How the numbers were obtained."""
     v, e = found["verdict"], found["map_errors"]
     if v["members"] < 2:
         members = "One member: the map as it is, without errors. "
@@ -131,7 +131,7 @@ def text(found, markdown=False):
 
 
 def rounds(found, markdown=False):
-    """The receding horizon."""
+    """The rounds of the receding horizon."""
     h = found["horizon"]
     head = ["look at", "age of the map", "way to go", "predicted work", "plan"]
     rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"),

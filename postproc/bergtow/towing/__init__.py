@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Line, vessel and berg of a tow in closed form: what the line holds, how a start and a slack line load it, which
-bollard pull a force takes, and whether the berg stands upright. SI units throughout: N, m, s, kg, N/m, rad.
+"""Line, vessel and berg of a tow in closed form: the load that a line holds, how a start and a slack line load it, the
+bollard pull that a force requires, and whether the berg stays upright. SI units throughout: N, m, s, kg, N/m, rad.
 
-A line's pull is the horizontal part of its tension: what acts on the berg.
+A line's pull is the horizontal component of its tension, which acts on the berg.
 """
 from .catenary import Catenary
 from .library import (Line, Vessel, find_line, find_vessel, lightest_line, lines, smallest_vessel, vessels)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The elastic catenary of a tow line, the law that tow.line.weight gives the simulated one; equations in
+"""The elastic catenary of a tow line, the law that tow.line.weight gives the simulated line; equations in
 include/bergtow/catenary.h and docs/theory.md."""
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ._given import above_zero
 
 @dataclass(frozen=True)
 class Catenary:
-    """A uniform line between two ends of the same height, in water that is deep enough for its sag."""
+    """A uniform line between two ends at the same height, in water that is deep enough for its sag."""
     length: float  #: unstretched, m
     stiffness: float  #: EA, N
     weight: float  #: in water, N/m
@@ -23,7 +23,7 @@ class Catenary:
         above_zero(length=self.length, stiffness=self.stiffness, weight=self.weight)
 
     def span(self, pull: float) -> float:
-        """Distance of the ends, m."""
+        """Distance between the ends, m."""
         above_zero(pull=pull)
         return float(_library.library().bt_catenary_span(self.length, self.stiffness, self.weight, pull))
 
@@ -40,11 +40,11 @@ class Catenary:
         return self._at(span)[0]
 
     def stiffness_at(self, pull: float) -> float:
-        """Derivative of the pull by the span, N/m; a line that is all but straight has EA / length."""
+        """Derivative of the pull with respect to the span, N/m; for an almost straight line EA / length."""
         return self._at(self.span(pull))[1]
 
     def tension(self, pull: float) -> float:
-        """Tension at the ends, the largest, N."""
+        """Tension at the ends, where it is largest, N."""
         return math.hypot(pull, 0.5 * self.weight * self.length)
 
     def sag(self, pull: float) -> float:
@@ -54,11 +54,11 @@ class Catenary:
         return self.length * (0.5 * u / (math.sqrt(1 + u * u) + 1) + 0.125 * self.weight * self.length / self.stiffness)
 
     def energy(self, pull: float) -> float:
-        """Work that the line has taken up, stretch and lifted weight, from ends that meet on, J: the integral of the
-        pull over the span."""
+        """Work stored in the line, stretch and lifted weight, starting from ends that meet, J: the integral of the pull
+        over the span."""
         above_zero(pull=pull)
         half = 0.5 * self.weight * self.length
-        # ∫ H dl = H l − ∫ l dH; H² asinh(half/H) − half √(H² + half²) + half², without the difference of large numbers
+        # ∫ H dl = H l − ∫ l dH; H² asinh(half/H) − half √(H² + half²) + half², without differences of large numbers
         u = half / pull
         taken = pull * pull * (math.asinh(u) - u) - half * half * (half / (math.hypot(pull, half) + pull) - 1)
         return taken / self.weight + 0.5 * pull * pull * self.length / self.stiffness

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Lines and vessels by name, from the tables of the package and from those of one's own.
+"""Lines and vessels by name, from the tables of the package and from user tables.
 
-lines.csv and vessels.csv have a source in each row. A table of one's own has the same head; its rows are added, and
-replace those of the same name. Values of lines are those of new ones. A cell of a vessel that is empty is not known.
+Each row of lines.csv and vessels.csv has a source. A user table has the same head; its rows are added, and replace rows
+of the same name. Values of lines are those of new ones. An empty cell of a vessel means unknown.
 """
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Line:
     source: str
 
     def weight(self, water_density: float = 1025.0) -> float:
-        """In water, N/m; 0 of a line that floats."""
+        """Weight in water, N/m; 0 for a line that floats."""
         return max(0.0, self.mass * GRAVITY * (1 - water_density / self.density))
 
 
@@ -42,14 +42,14 @@ class Line:
 class Vessel:
     name: str
     bollard_pull: float  #: N
-    length: float  #: m; this and those below: nan = not known
+    length: float  #: m; here and below: nan = unknown
     beam: float  #: m
     free_speed: float  #: m/s
     mass: float  #: kg
     source: str
 
 
-#: head of a table: column, member, factor to SI (None: a text), may it be empty
+#: head of a table: column, member, factor to SI (None: a text), may the cell be empty?
 _LINES = (("name", "name", None, False), ("material", "material", None, False),
           ("diameter_mm", "diameter", 1e-3, False), ("mass_kg_m", "mass", 1, False),
           ("density_kg_m3", "density", 1, False),
@@ -111,12 +111,12 @@ def _table(name: str, columns: tuple[tuple[str, str, float | None, bool], ...], 
 
 
 def lines(library: PathLike = None) -> dict[str, Line]:
-    """{name: line}; library: a table of one's own. Errors: BergtowError with file, line and column."""
+    """{name: line}; library: a user table. Raises BergtowError with file, line and column."""
     return _table("lines.csv", _LINES, Line, library)
 
 
 def vessels(library: PathLike = None) -> dict[str, Vessel]:
-    """{name: vessel}; library: a table of one's own. Errors: BergtowError with file, line and column."""
+    """{name: vessel}; library: a user table. Raises BergtowError with file, line and column."""
     return _table("vessels.csv", _VESSELS, Vessel, library)
 
 
@@ -127,25 +127,25 @@ def _named(name: str, table: dict[str, Kind], kind: str) -> Kind:
 
 
 def find_line(name: str, library: PathLike = None) -> Line:
-    """The line of this name. Errors: BergtowError, with the names that there are."""
+    """The line of this name. Raises BergtowError, with the available names."""
     return _named(name, lines(library), "line")
 
 
 def find_vessel(name: str, library: PathLike = None) -> Vessel:
-    """The vessel of this name. Errors: BergtowError, with the names that there are."""
+    """The vessel of this name. Raises BergtowError, with the available names."""
     return _named(name, vessels(library), "vessel")
 
 
 def lightest_line(needed_breaking: float, library: PathLike = None, material: str | None = None) -> Line | None:
-    """The line of least mass that holds at least this breaking load, N; None where there is none."""
+    """The line of least mass with at least this breaking load, N; None if there is none."""
     fit = [x for x in lines(library).values() if x.breaking >= needed_breaking and material in (None, x.material)]
     return min(fit, key=lambda x: x.mass, default=None)
 
 
 def smallest_vessel(needed_bollard_pull: float, library: PathLike = None,
                     known: tuple[str, ...] = ()) -> Vessel | None:
-    """The vessel of least bollard pull that has at least this, N, and of which these members are known, as
-    "free_speed"; None where there is none."""
+    """The vessel of least bollard pull that has at least this pull, N, and for which these members are known, such as
+    "free_speed"; None if there is none."""
     fit = [x for x in vessels(library).values()
            if x.bollard_pull >= needed_bollard_pull and not any(math.isnan(getattr(x, member)) for member in known)]
     return min(fit, key=lambda x: x.bollard_pull, default=None)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Does a berg stand upright under tow?
+"""Does a berg stay upright under tow?
 
-A floating body is stable against rolling while its metacentre lies above its centre of gravity [Bass 1980, Annals of
+A floating body is stable in roll while its metacentre lies above its centre of gravity [Bass 1980, Annals of
 Glaciology, "Stability of icebergs"]: GM = BM − BG > 0, BM = I/V with I the second moment of the waterline about the
 weak axis and V the displaced volume. For a column of uniform density with vertical sides, draft D and sail s, BG = s/2
 and BM = (I/A)/D. For a block of width W and height H = D + s that floats freely, D/H = ρ_i/ρ_w, this is
@@ -9,7 +9,7 @@ and BM = (I/A)/D. For a block of width W and height H = D + s that floats freely
     W/H > √(6 ρ_i/ρ_w (1 − ρ_i/ρ_w)),   0.80 for 900 and 1025 kg/m³
 
 the hydrostatic criterion that Burton et al. 2012 (doi 10.1029/2011JF002055) found to agree with blocks in a tank. A
-berg that tapers, or has a foot, is another body: for it the number is a first look.
+berg that tapers, or has a foot, is a different body: for it the number is a first estimate.
 """
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GRAVITY = 9.81  #: m/s2
 
 
 def metacentric_height(width: float, draft: float, sail: float, gyration: float | None = None) -> float:
-    """GM of a column, m. gyration: √(I/A) of its waterline about the weak axis, m; default that of a block,
+    """GM of a column, m. gyration: √(I/A) of its waterline about the weak axis, m; by default that of a block,
     width/√12 (a disc: width/4)."""
     above_zero(width=width, draft=draft)
     not_below_zero(sail=sail)
@@ -42,7 +42,7 @@ def critical_ratio(density: float, water_density: float = 1025.0) -> float:
 
 @dataclass(frozen=True)
 class RollStability:
-    """Of a block: GM m, width/height, and the ratio below which it rolls over."""
+    """Stability of a block: GM m, width/height, and the ratio below which it rolls over."""
     gm: float
     ratio: float
     critical: float
@@ -50,7 +50,7 @@ class RollStability:
 
 
 def roll_stability(width: float, draft: float, density: float = 900.0, water_density: float = 1025.0) -> RollStability:
-    """Of a free block of this width (its least) and draft."""
+    """Stability of a free block of this width (its least) and draft."""
     critical = critical_ratio(density, water_density)
     height = draft * water_density / density
     gm = metacentric_height(width, draft, height - draft)
@@ -58,16 +58,16 @@ def roll_stability(width: float, draft: float, density: float = 900.0, water_den
 
 
 def overturning_moment(pull: float, line_height: float, draft: float, resistance_depth: float | None = None) -> float:
-    """Moment, N m, of the pull of a line at this height above the waterline (below: negative) and the drag of the water
-    on the hull, which acts at resistance_depth below it; default half the draft, as of a column in a uniform flow."""
+    """Moment, N m, of the pull of a line at this height above the waterline (below: negative) and the water drag on the
+    hull, which acts at resistance_depth below it; by default half the draft, as for a column in uniform flow."""
     not_below_zero(pull=pull)
     above_zero(draft=draft)
     return pull * (line_height + (0.5 * draft if resistance_depth is None else resistance_depth))
 
 
 def heel_angle(moment: float, mass: float, gm: float) -> float:
-    """Angle at which a moment holds a body upright, rad: sin φ = M/(m g GM); inf where none does. Small angles: beyond
-    10° the shape of the hull counts."""
+    """Heel angle at which the righting moment balances a moment, rad: sin φ = M/(m g GM); inf if none does. Small
+    angles only: beyond 10° the shape of the hull matters."""
     above_zero(mass=mass)
     if not gm > 0:
         return math.inf

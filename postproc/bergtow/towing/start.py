@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What a start and a slack line do to the tension, and the ramp that keeps a start below a load.
+"""The effect of a start and of a slack line on the tension, and the ramp that keeps a start below a load.
 
 Two masses on an elastic line move as one, m = a b/(a + b), on a spring, m x'' + k x = S, with x the stretch and S the
-tension that the outer forces hold in the end; a line whose far end is led has the mass of the berg. Without damping,
-and with forces that do not change while the line swings: upper bounds of what a line with damping bears. k = EA/L,
-which a line with weight comes up to as it is pulled straight. Added mass counts as mass.
+tension that the outer forces hold in the end; a line whose far end has a prescribed motion has the mass of the berg.
+There is no damping, and forces do not change while the line swings, so results are upper bounds for a line with
+damping. k = EA/L, which a line with weight approaches as it is pulled straight. Added mass counts as mass.
 """
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .catenary import Catenary
 
 
 def effective_mass(one: float, other: float = math.inf) -> float:
-    """Of two bodies at the ends of a line, kg; other = inf: an end that is led."""
+    """Effective mass of two bodies at the ends of a line, kg; other = inf: an end with prescribed motion."""
     above_zero(one=one)
     if not other > 0:
         raise BergtowError(f"other: {other:g} kg is no mass; give a number above 0, or inf for an end that is led")
@@ -24,9 +24,9 @@ def effective_mass(one: float, other: float = math.inf) -> float:
 
 
 def snap_load(speed: float, stiffness: float, mass: float, static: float = 0.0, initial: float = 0.0) -> float:
-    """Largest tension, N, of a line whose ends part at this speed (m/s) while it bears `initial`, 0 for one that has
-    been slack; `static` is the tension that the outer forces hold in the end, initial = static that of a taut line at
-    rest. From the energy of the swing about static:
+    """Largest tension, N, of a line whose ends separate at this speed (m/s) while it carries `initial`, 0 for a line
+    that has been slack. `static` is the tension that the outer forces hold in the end; initial = static for a taut line
+    at rest. From the energy of the swing about static:
 
         F = S + √((F0 − S)² + v² k m)
     """
@@ -36,8 +36,8 @@ def snap_load(speed: float, stiffness: float, mass: float, static: float = 0.0, 
 
 
 def snap_load_catenary(line: Catenary, speed: float, mass: float, pull: float, static: float = 0.0) -> float:
-    """The same for a line with weight that bears `pull` (> 0) when its ends part at this speed: the pull, N, at which
-    the work of the line beyond that of the static force has used up the motion, E(F) − E(F0) − S (l − l0) = m v²/2."""
+    """The same for a line with weight that carries `pull` (> 0) when its ends separate at this speed: the pull, N,
+    where the work of the line beyond that of the static force equals the motion, E(F) − E(F0) − S (l − l0) = m v²/2."""
     not_below_zero(speed=speed, static=static)
     above_zero(mass=mass, pull=pull)
     before, at_rest = line.energy(pull), line.span(pull)
@@ -45,7 +45,7 @@ def snap_load_catenary(line: Catenary, speed: float, mass: float, pull: float, s
     def left(force: float) -> float:
         return line.energy(force) - before - static * (line.span(force) - at_rest) - 0.5 * mass * speed * speed
 
-    low = max(pull, static)  # beyond it `left` rises; by there at least the swing goes
+    low = max(pull, static)  # beyond it `left` increases; the swing reaches at least this far
     high = low + snap_load(speed, line.stiffness / line.length, mass, static, 0.0)
     while left(high) < 0:
         high *= 2
@@ -63,9 +63,9 @@ def _frequency(stiffness: float, mass: float) -> float:
 
 
 def swing_after(ramp: float, speed: float, stiffness: float, mass: float) -> float:
-    """Amplitude of the tension, N, that a linear ramp of the led end from 0 to this speed leaves behind:
-    m v ω |sin(ωT/2)/(ωT/2)|, which is 0 after whole periods. Where the swing begins downwards the line goes slack, and
-    bears none of it until something has slowed the berg."""
+    """Amplitude of the tension, N, that remains after a linear ramp of the prescribed end from 0 to this speed: m v ω
+    |sin(ωT/2)/(ωT/2)|, which is 0 after whole periods. If the swing begins downwards the line goes slack, and carries
+    none of it until something has slowed the berg."""
     not_below_zero(ramp=ramp, speed=speed)
     omega = _frequency(stiffness, mass)
     half = 0.5 * omega * ramp
@@ -73,15 +73,15 @@ def swing_after(ramp: float, speed: float, stiffness: float, mass: float) -> flo
 
 
 def start_load(ramp: float, speed: float, stiffness: float, mass: float, resistance: float = 0.0) -> float:
-    """Largest tension of a start from a taut line without tension, N, of a body that a constant resistance R (N) holds
-    until the line pulls as hard. One that grows with the speed, and is R at the full speed, loads the line no more:
-    while the berg gathers way it is below both R and the pull. With a = v/T the acceleration of the led end:
+    """Largest tension, N, in a start with a taut line at zero tension, for a body that a constant resistance R (N)
+    holds until the line pulls as hard. If the resistance grows with speed, to R at full speed, it loads the line no
+    more: as the berg gathers way it is below both R and the pull. With a = v/T the acceleration of the prescribed end:
 
         v0 = √(2 a R/k)                       its speed when the berg begins to move
-        F = R + m a + √((m a)² + k m v0²)     when the swing reaches this within the ramp
-        F = R + √(k² x² + k m v1²)            of the stretch x beyond R/k and its rate v1 at the end of a shorter one
+        F = R + m a + √((m a)² + k m v0²)     if the swing reaches this within the ramp
+        F = R + √(k² x² + k m v1²)            from the stretch x beyond R/k and its rate v1 at the end of a shorter one
 
-    without R 2 m a for ramps of half a period and more, swing_after for shorter ones; without a ramp R + m v ω.
+    Without R: 2 m a for ramps of at least half a period, swing_after for shorter ones; without a ramp: R + m v ω.
     """
     not_below_zero(ramp=ramp, speed=speed, resistance=resistance)
     omega = _frequency(stiffness, mass)
@@ -98,8 +98,8 @@ def start_load(ramp: float, speed: float, stiffness: float, mass: float, resista
 
 
 def ramp_for(load: float, speed: float, stiffness: float, mass: float, resistance: float = 0.0) -> float:
-    """Shortest ramp, s, of a start with at most this load, the inverse of start_load, which falls as the ramp grows;
-    0 where a start without a ramp bears no more, inf where the resistance alone is as large."""
+    """Shortest ramp, s, of a start with at most this load, the inverse of start_load, which decreases as the ramp
+    grows; 0 if a start without a ramp carries no more, inf if the resistance alone is as large."""
     above_zero(load=load)
     not_below_zero(speed=speed, resistance=resistance)
     room = load - resistance

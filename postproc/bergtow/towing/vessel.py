@@ -2,7 +2,7 @@
 """From a tow force to bollard pull and breaking load.
 
 Efficiencies and the safety factor have no default that claims a standard: those of ISO 19906, ISO 35106 and DNV-ST-N001
-have not been read here. The caller gives them, and names his source.
+have not been read here. The caller gives them, and names the source.
 """
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ._given import above_zero, not_below_zero
 
 STANDARD_GRAVITY = 9.80665  #: m/s2, by definition: a tonne of bollard pull is 9.80665 kN
 
-#: a name, or points (speed m/s, share), speeds rising; linear between, constant outside
+#: a name, or points (speed m/s, share) with increasing speeds; linear between, constant outside
 Curve = Union[str, Sequence[tuple[float, float]]]
 
 
@@ -43,7 +43,7 @@ def needed_breaking(load: float, safety_factor: float) -> float:
 
 
 def read_curve(path: str | os.PathLike[str]) -> list[tuple[float, float]]:
-    """Points of a CSV file with the head speed_m_s,share. Errors: BergtowError with file, line and column."""
+    """Points of a CSV file with the head speed_m_s,share. Raises BergtowError with file, line and column."""
     try:
         with open(path, newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file))
@@ -74,9 +74,9 @@ def read_curve(path: str | os.PathLike[str]) -> list[tuple[float, float]]:
 
 
 def pull_share(speed: float, free_speed: float | None = None, curve: Curve = "quadratic") -> float:
-    """What is left of the bollard pull at a speed through the water (m/s), the vessel's own resistance in open water
-    deducted. "quadratic", 1 − (v/v_f)², as the simulated vessel has it, and "linear", 1 − v/v_f, both 0 at the
-    free-running speed v_f and assumed; or points of a curve of one's own."""
+    """Share of the bollard pull that is left at a speed through the water (m/s), after the vessel's own resistance in
+    open water. "quadratic", 1 − (v/v_f)², as for the simulated vessel, and "linear", 1 − v/v_f, are both 0 at the
+    free-running speed v_f and assumed; or points of a user's curve."""
     not_below_zero(speed=speed)
     if not isinstance(curve, str):
         (first, share), last = curve[0], curve[-1]
@@ -98,12 +98,12 @@ def pull_share(speed: float, free_speed: float | None = None, curve: Curve = "qu
 def needed_bollard_pull(tow_force: float, speed: float, *, free_speed: float | None = None,
                         curve: Curve = "quadratic", weather: float = 1.0, tow: float = 1.0,
                         own_resistance: float = 0.0) -> float:
-    """Bollard pull, N, of a vessel that gives the line this force at this speed through the water:
+    """Bollard pull, N, of a vessel that exerts this force on the line at this speed through the water:
 
         (force + own resistance in ice) / (share left at the speed × efficiencies)
 
-    weather and tow are efficiencies in (0, 1], what waves, wind and a line that is not in line with the thrust leave;
-    1 = none is taken into account. inf where the vessel has nothing left at this speed.
+    weather and tow are efficiencies in (0, 1] for the effects of waves, wind and a line that is not aligned with the
+    thrust; 1 = not taken into account. inf if the vessel has no pull left at this speed.
     """
     not_below_zero(tow_force=tow_force, own_resistance=own_resistance)
     for name, value in (("weather", weather), ("tow", tow)):
@@ -115,7 +115,7 @@ def needed_bollard_pull(tow_force: float, speed: float, *, free_speed: float | N
 
 @dataclass(frozen=True)
 class IceResistance:
-    """An estimate of a vessel's own resistance in ice, N: from a slender to a blunt bow, and where it is from."""
+    """An estimate of a vessel's own resistance in ice, N: from a slender to a blunt bow, with its source."""
     low: float
     high: float
     source: str
@@ -123,8 +123,8 @@ class IceResistance:
 
 def ice_resistance(beam: float, thickness: float, concentration: float, speed: float,
                    ice_density: float = 910.0) -> IceResistance:
-    """A ship through pack ice, by the regression of ships that the estimates have, too. The source gives no range of
-    ice and speed, and the hulls differ by a factor of more than ten at a knot: an order of magnitude."""
+    """A ship in pack ice, by the regression for ships that is also among the estimates. The source gives no range of
+    ice and speed, and the hulls differ by a factor of more than ten at one knot: an order of magnitude."""
     above_zero(beam=beam, ice_density=ice_density)
     not_below_zero(thickness=thickness, speed=speed)
     if not 0 <= concentration <= 1:
