@@ -40,16 +40,8 @@ typedef struct bt_snapshot {
     bt_errors *err;   ///< where bt_snapshot_take complains
     bool faulty;      ///< it has
     int64_t rows;     ///< put into the array that was added last
-    const struct bt_snapshot_sink *sink; ///< where arrays go as they are added (bt_snapshot_create), NULL = into memory
-    struct bt_snapshot_file *file;       ///< of the sink
+    struct bt_snapshot_file *file; ///< where arrays go as they are added (bt_snapshot_create), NULL = into memory
 } bt_snapshot;
-
-/// What takes the arrays of a set in place of memory.
-typedef struct bt_snapshot_sink {
-    void (*begin)(bt_snapshot *snap); ///< the array added last
-    void (*put)(bt_snapshot *snap, int64_t n, const void *rows); ///< the next rows of it
-    void (*drop)(bt_snapshot *snap); ///< the set is given up: nothing of it stays
-} bt_snapshot_sink;
 
 /// What each number of a member must be by itself: COUNT from 0 to 1e15, SHARE from 0 to 1, FAR within 1e9 of 0.
 typedef enum {
@@ -127,6 +119,10 @@ typedef const char *bt_item_meaning(const char *name, const char **units, const 
 /// An HDF5 file that takes all arrays added to `snap` from here on, each with its meaning unless that is NULL.
 /// `snap` is empty before. What fails here or on the way, bt_snapshot_close returns.
 void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *meaning, bt_errors *err);
+/// For snapshot.c: the array added last begins, the next rows of it, and the end of a set that is given up.
+void bt_snapshot_file_begin(bt_snapshot *snap);
+void bt_snapshot_file_put(bt_snapshot *snap, int64_t n, const void *rows);
+void bt_snapshot_file_drop(bt_snapshot *snap);
 /// Nothing more comes: the file is completed, protected by a checksum, and closed.
 void bt_snapshot_end(bt_snapshot *snap, bt_errors *err);
 /// The same, unless it has been, and the file stays: without this call bt_snapshot_free removes it. Errors: BT_ERR_IO.
