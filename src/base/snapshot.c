@@ -187,16 +187,21 @@ static bool sound(bt_row_check check, double x)
     }
 }
 
-static double number_of(const bt_item *item, int64_t at)
+/// Of an array of whole numbers.
+static int64_t whole_number(const bt_item *item, int64_t at)
 {
     switch (item->type) {
-    case BT_ITEM_F64: return ((const double *)item->data)[at];
-    case BT_ITEM_I64: return (double)((const int64_t *)item->data)[at];
+    case BT_ITEM_I64: return ((const int64_t *)item->data)[at];
     case BT_ITEM_I32: return ((const int32_t *)item->data)[at];
     case BT_ITEM_U32: return ((const uint32_t *)item->data)[at];
     case BT_ITEM_U16: return ((const uint16_t *)item->data)[at];
     default: return ((const uint8_t *)item->data)[at];
     }
+}
+
+static double number_of(const bt_item *item, int64_t at)
+{
+    return item->type == BT_ITEM_F64 ? ((const double *)item->data)[at] : (double)whole_number(item, at);
 }
 
 void bt_snapshot_take_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n, void *to)
@@ -254,15 +259,8 @@ void bt_snapshot_share(const bt_comm *comm, bt_snapshot *snap)
 
 const char *bt_item_number(const bt_item *item, int64_t at, char out[40])
 {
-    const void *d = item->data;
-    switch (item->type) {
-    case BT_ITEM_F64: snprintf(out, 40, "%.17g", ((const double *)d)[at]); break;
-    case BT_ITEM_I64: snprintf(out, 40, "%" PRId64, ((const int64_t *)d)[at]); break;
-    case BT_ITEM_I32: snprintf(out, 40, "%" PRId32, ((const int32_t *)d)[at]); break;
-    case BT_ITEM_U32: snprintf(out, 40, "%" PRIu32, ((const uint32_t *)d)[at]); break;
-    case BT_ITEM_U16: snprintf(out, 40, "%d", (int)((const uint16_t *)d)[at]); break;
-    default: snprintf(out, 40, "%d", (int)((const uint8_t *)d)[at]); break;
-    }
+    if (item->type == BT_ITEM_F64) snprintf(out, 40, "%.17g", number_of(item, at));
+    else snprintf(out, 40, "%" PRId64, whole_number(item, at));
     return out;
 }
 
