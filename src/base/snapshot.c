@@ -27,7 +27,7 @@ void *bt_snapshot_begin(bt_snapshot *snap, const char *name, bt_item_type type, 
     bt_item *item = &snap->item[snap->n++];
     *item = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
     snap->rows = 0;
-    if (snap->sink) snap->sink->begin(snap);
+    if (snap->file) bt_snapshot_file_begin(snap);
     else item->data = bt_alloc(bytes_of(item), 1);
     return item->data;
 }
@@ -36,7 +36,7 @@ void bt_snapshot_put(bt_snapshot *snap, int64_t n, const void *rows)
 {
     const bt_item *item = &snap->item[snap->n - 1];
     const size_t row = (size_t)item->width * bt_item_size(item->type);
-    if (snap->sink) snap->sink->put(snap, n, rows);
+    if (snap->file) bt_snapshot_file_put(snap, n, rows);
     else if (n > 0) memcpy((char *)item->data + (size_t)snap->rows * row, rows, (size_t)n * row);
     snap->rows += n;
 }
@@ -83,7 +83,7 @@ void bt_snapshot_add_rows(bt_snapshot *snap, const char *group, const bt_state_r
 
 void bt_snapshot_free(bt_snapshot *snap)
 {
-    if (snap->sink) snap->sink->drop(snap);
+    if (snap->file) bt_snapshot_file_drop(snap);
     for (int k = 0; k < snap->n; k++) {
         free(snap->item[k].name);
         free(snap->item[k].data);
@@ -187,16 +187,21 @@ static bool sound(bt_row_check check, double x)
     }
 }
 
-static double number_of(const bt_item *item, int64_t at)
+/// Of an array of whole numbers.
+static int64_t whole_number(const bt_item *item, int64_t at)
 {
     switch (item->type) {
-    case BT_ITEM_F64: return ((const double *)item->data)[at];
-    case BT_ITEM_I64: return (double)((const int64_t *)item->data)[at];
+    case BT_ITEM_I64: return ((const int64_t *)item->data)[at];
     case BT_ITEM_I32: return ((const int32_t *)item->data)[at];
     case BT_ITEM_U32: return ((const uint32_t *)item->data)[at];
     case BT_ITEM_U16: return ((const uint16_t *)item->data)[at];
     default: return ((const uint8_t *)item->data)[at];
     }
+}
+
+static double number_of(const bt_item *item, int64_t at)
+{
+    return item->type == BT_ITEM_F64 ? ((const double *)item->data)[at] : (double)whole_number(item, at);
 }
 
 void bt_snapshot_take_row(bt_snapshot *snap, const char *group, const bt_state_row *row, int64_t n, void *to)
@@ -254,15 +259,8 @@ void bt_snapshot_share(const bt_comm *comm, bt_snapshot *snap)
 
 const char *bt_item_number(const bt_item *item, int64_t at, char out[40])
 {
-    const void *d = item->data;
-    switch (item->type) {
-    case BT_ITEM_F64: snprintf(out, 40, "%.17g", ((const double *)d)[at]); break;
-    case BT_ITEM_I64: snprintf(out, 40, "%" PRId64, ((const int64_t *)d)[at]); break;
-    case BT_ITEM_I32: snprintf(out, 40, "%" PRId32, ((const int32_t *)d)[at]); break;
-    case BT_ITEM_U32: snprintf(out, 40, "%" PRIu32, ((const uint32_t *)d)[at]); break;
-    case BT_ITEM_U16: snprintf(out, 40, "%d", (int)((const uint16_t *)d)[at]); break;
-    default: snprintf(out, 40, "%d", (int)((const uint8_t *)d)[at]); break;
-    }
+    if (item->type == BT_ITEM_F64) snprintf(out, 40, "%.17g", number_of(item, at));
+    else snprintf(out, 40, "%" PRId64, whole_number(item, at));
     return out;
 }
 

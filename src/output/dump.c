@@ -191,27 +191,13 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
     out[3] += s * (inv.m * c + inv.i * rt * qt);  // t·t'
 }
 
-/// Sheets: rows along x and y, after the points of the pair.
-static row sheets_of(const bt_world *world, const bt_cell *cell, bt_idx j)
+/// What the rows of a contact have in common: of its point i, or (0) of its sheets.
+static row begin_row(const bt_world *world, const bt_contact *contact, int i)
 {
-    const bt_contact *contact = &cell->contacts[j];
-    const bt_limit *limit = &cell->laws->limits[j];
-    return (row){.gid_a = world->bodies.gid[contact->a],
-                 .gid_b = world->bodies.gid[contact->b],
-                 .point = 2,
-                 .a = contact->a,
-                 .b = contact->b,
-                 .nx = contact->nx,
-                 .ny = contact->ny,
-                 .ran = contact->ran[0],
-                 .rbn = contact->rbn[0],
-                 .rat = contact->rat,
-                 .rbt = contact->rbt,
-                 .ln = contact->ln[0],
-                 .lt = contact->lt,
-                 .bound = INFINITY,
-                 .disc = limit->flat[0],
-                 .ends = {limit->ends[0], limit->ends[1]}};
+    return (row){.gid_a = world->bodies.gid[contact->a], .gid_b = world->bodies.gid[contact->b], .point = i,
+                 .a = contact->a, .b = contact->b, .nx = contact->nx, .ny = contact->ny,
+                 .ran = contact->ran[i], .rbn = contact->rbn[i], .rat = contact->rat, .rbt = contact->rbt,
+                 .ln = contact->ln[i], .lt = contact->lt, .bound = INFINITY, .disc = NAN};
 }
 
 /// Normal and tangential row of every contact point, in the order of the gids.
@@ -227,28 +213,20 @@ static row *rows_of(const bt_world *world, int *n)
             const bt_contact *contact = &ts->cell[k].contacts[j];
             const double total = contact->ln[0] + contact->ln[1];
             if (ts->cell[k].gaps[j].row == BT_ROW_RELEASED) continue; // the two pass each other
-            if (contact->n == 0) rows[(*n)++] = sheets_of(world, &ts->cell[k], j);
-            for (int i = 0; i < contact->n; i++) // one friction impulse for both: distributed like the normal impulses
-                rows[(*n)++] = (row){.gid_a = world->bodies.gid[contact->a],
-                                     .gid_b = world->bodies.gid[contact->b],
-                                     .point = i,
-                                     .a = contact->a,
-                                     .b = contact->b,
-                                     .nx = contact->nx,
-                                     .ny = contact->ny,
-                                     .ran = contact->ran[i],
-                                     .rbn = contact->rbn[i],
-                                     .rat = contact->rat,
-                                     .rbt = contact->rbt,
-                                     .bias = contact->bias[i],
-                                     .mu = contact->mu,
-                                     .ln = contact->ln[i],
-                                     .lt = total > 0 ? contact->lt * (contact->ln[i] / total) : 0,
-                                     .disc = NAN,
-                                     .bound = ts->cell[k].laws->limits
-                                                  ? bt_limit_bound(&ts->cell[k].laws->limits[j], contact, i,
-                                                                   world->bodies.vel)
-                                                  : INFINITY};
+            const bt_limit *limits = ts->cell[k].laws->limits;
+            if (contact->n == 0) { // sheets: rows along x and y, after the points of the pair
+                row *p = &rows[(*n)++];
+                *p = begin_row(world, contact, 0);
+                p->point = 2, p->disc = limits[j].flat[0];
+                memcpy(p->ends, limits[j].ends, sizeof p->ends);
+            }
+            for (int i = 0; i < contact->n; i++) { // one friction impulse for both: distributed like the normal impulses
+                row *p = &rows[(*n)++];
+                *p = begin_row(world, contact, i);
+                p->bias = contact->bias[i], p->mu = contact->mu;
+                p->lt = total > 0 ? contact->lt * (contact->ln[i] / total) : 0;
+                if (limits) p->bound = bt_limit_bound(&limits[j], contact, i, world->bodies.vel);
+            }
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
     return rows;

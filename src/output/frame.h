@@ -3,6 +3,8 @@
 #ifndef BT_FRAME_H
 #define BT_FRAME_H
 
+#include <stddef.h>
+
 #include "bergtow/comm.h"
 #include "bergtow/field.h"
 #include "bergtow/world.h"
@@ -41,7 +43,20 @@ enum { BT_FRAME_ROW = sizeof(bt_frame_row) / sizeof(double) };
 typedef struct bt_piece_row {
     double piece;            ///< number of the piece, from 0
     bt_frame_row row;
+    double thickness;        ///< m
 } bt_piece_row;
+enum { BT_PIECE_ROW = sizeof(bt_piece_row) / sizeof(double) };
+
+/// Numbers that lie side by side in one of these rows and are recorded together: n, from this byte on.
+typedef struct bt_frame_part {
+    size_t at;
+    int n;
+} bt_frame_part;
+#define BT_FRAME_PART(type, member, n) {offsetof(type, member), n}
+static inline const double *bt_frame_numbers(const void *row, bt_frame_part part)
+{
+    return (const void *)((const char *)row + part.at);
+}
 
 /// The tow line in a frame: each branch from the hull to its towing end, or at the hull alone once it is broken.
 enum { BT_FRAME_BRANCHES = 2 };

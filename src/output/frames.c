@@ -158,27 +158,29 @@ static void keep_outlines(bt_frames *frames, const bt_record_bodies *bodies)
     for (int64_t v = 0; v < 2 * nv; v++) frames->vertices[v] = (float)bodies->vertices[v];
 }
 
-/// Quantities of a frame that are written row by row.
-enum quantity { POINTS, POSE, FORCE, SPEED, VELOCITY, NET, FORCE_4, SPEED_4, VELOCITY_4, NET_4 };
+#define PART(member, n) BT_FRAME_PART(bt_frame_row, member, n)
+enum form { DOUBLE, SINGLE, DRAWN };
 
 enum { FLOES = 1, OTHERS = 2 };
 static const struct {
     const char *name, *axes, *units, *text;
-    enum quantity quantity;
-    bool single; ///< precision
-    int width, of;
+    bt_frame_part part;
+    enum form form;
+    int of;
 } columns[BT_FRAME_COLUMNS] = {
-    {"/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe", POSE, false, 3, FLOES},
-    {"/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies", POSE, false, 3, OTHERS},
+    {"/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe", PART(x, 3), DOUBLE, FLOES},
+    {"/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies", PART(x, 3), DOUBLE,
+     OTHERS},
     {"/frames/contact_force", "time floe", "N",
-     "largest normal contact force on the floe in the step, NaN where that has no solution", FORCE, false, 0, FLOES},
-    {"/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies", SPEED, false, 0,
-     FLOES | OTHERS},
-    {"/frames/velocity", "time floe_or_body xy", "m/s", "velocity of the centroid: floes, then /bodies", VELOCITY,
-     true, 2, FLOES | OTHERS},
+     "largest normal contact force on the floe in the step, NaN where that has no solution", PART(contact_force, 1),
+     DOUBLE, FLOES},
+    {"/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies", PART(speed, 1),
+     DOUBLE, FLOES | OTHERS},
+    {"/frames/velocity", "time floe_or_body xy", "m/s", "velocity of the centroid: floes, then /bodies",
+     PART(vx, 2), SINGLE, FLOES | OTHERS},
     {"/frames/net_force", "time floe_or_body xy", "N",
-     "sum of all contact forces in the step, NaN where that has no solution: floes, then /bodies", NET, true, 2,
-     FLOES | OTHERS},
+     "sum of all contact forces in the step, NaN where that has no solution: floes, then /bodies", PART(fx, 2),
+     SINGLE, FLOES | OTHERS},
 };
 
 /// The number of rows of a column, with this many floes and other bodies.
@@ -194,9 +196,9 @@ static void create_datasets(bt_frames *frames)
     frames->time = bt_h5_growing(h5, "/frames/time", H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){256, 1}, false);
     bt_h5_describe(h5, "/frames/time", "time", "s", "time of each frame, since the start of the run");
     for (int k = 0; k < BT_FRAME_COLUMNS; k++) {
-        frames->column[k] = bt_slab_growing(h5, columns[k].name, columns[k].single ? H5T_NATIVE_FLOAT
+        frames->column[k] = bt_slab_growing(h5, columns[k].name, columns[k].form == SINGLE ? H5T_NATIVE_FLOAT
                                             : H5T_NATIVE_DOUBLE, rows_of(k, frames->n_floes, frames->n_others),
-                                            columns[k].width);
+                                            columns[k].part.n > 1 ? columns[k].part.n : 0);
         bt_h5_describe(h5, columns[k].name, columns[k].axes, columns[k].units, columns[k].text);
     }
     if (!frames->branches) return;
@@ -234,33 +236,17 @@ void bt_frames_create(bt_frames *frames, bt_h5 *h5, const bt_comm *comm, const b
     create_datasets(frames);
 }
 
-/// ParaView's vectors have three components.
-static void draw_vector(const bt_frames *frames, double x, double y, float to[3])
-{
-    double drawn[2];
-    bt_map_axes_vector(&frames->axes, x, y, drawn);
-    to[0] = (float)drawn[0], to[1] = (float)drawn[1], to[2] = 0;
-}
-
-/// Write bodies from .. from + n of the block to rows first .. first + n.
-static void write_rows(const bt_frames *frames, bt_slab *slab, enum quantity q, int64_t first, const bt_frame_row *row,
-                       int64_t n, char *buffer)
+/// Write part of the bodies [n] in row to rows first .. first + n.
+static void write_rows(const bt_frames *frames, bt_slab *slab, bt_frame_part part, enum form form, int64_t first,
+                       const bt_frame_row *row, int64_t n, char *buffer)
 {
     bt_rows rows = bt_rows_from(slab, first, buffer);
     for (int64_t i = 0; i < n; i++) {
+        const double *x = bt_frame_numbers(&row[i], part);
         void *to = bt_rows_next(&rows);
-        switch (q) {
-        case POINTS: break; // write_points
-        case POSE: memcpy(to, (const double[3]){row[i].x, row[i].y, row[i].yaw}, 3 * sizeof(double)); break;
-        case FORCE: *(double *)to = row[i].contact_force; break;
-        case SPEED: *(double *)to = row[i].speed; break;
-        case VELOCITY: memcpy(to, (const float[2]){(float)row[i].vx, (float)row[i].vy}, 2 * sizeof(float)); break;
-        case NET: memcpy(to, (const float[2]){(float)row[i].fx, (float)row[i].fy}, 2 * sizeof(float)); break;
-        case FORCE_4: *(float *)to = (float)row[i].contact_force; break;
-        case SPEED_4: *(float *)to = (float)row[i].speed; break;
-        case VELOCITY_4: draw_vector(frames, row[i].vx, row[i].vy, to); break;
-        case NET_4: draw_vector(frames, row[i].fx, row[i].fy, to); break;
-        }
+        if (form == DRAWN) bt_map_axes_value(&frames->axes, x, part.n, to);
+        else if (form == DOUBLE) memcpy(to, x, slab->row_bytes);
+        else for (int k = 0; k < part.n; k++) ((float *)to)[k] = (float)x[k];
     }
     bt_rows_end(&rows);
 }
@@ -302,17 +288,17 @@ static void write_points(const bt_frames *frames, bt_slab *slab, int64_t first, 
     bt_rows_end(&rows);
 }
 
-/// Datasets of the frame in single precision, see xdmf.c; the last for floes only.
+/// Datasets of the frame in single precision, see xdmf.c: the points, and parts of the rows; the last for floes only.
 static const struct {
     const char *name, *units, *text;
-    enum quantity quantity;
     int width;
+    bt_frame_part part;
 } drawn[] = {
-    {"points", "m", "every vertex, along the axes of /xdmf, from its origin", POINTS, 2},
-    {"speed", "m/s", "speed of the centroid", SPEED_4, 0},
-    {"velocity", "m/s", "velocity of the centroid along these axes, and 0", VELOCITY_4, 3},
-    {"net_force", "N", "sum of all contact forces in the step along these axes, and 0", NET_4, 3},
-    {"force", "N", "largest normal contact force in the step", FORCE_4, 0},
+    {"points", "m", "every vertex, along the axes of /xdmf, from its origin", 2, {0}},
+    {"speed", "m/s", "speed of the centroid", 0, PART(speed, 1)},
+    {"velocity", "m/s", "velocity of the centroid along these axes, and 0", 3, PART(vx, 2)},
+    {"net_force", "N", "sum of all contact forces in the step along these axes, and 0", 3, PART(fx, 2)},
+    {"force", "N", "largest normal contact force in the step", 0, PART(contact_force, 1)},
 };
 enum { N_DRAWN = sizeof drawn / sizeof *drawn };
 
@@ -322,8 +308,7 @@ static void create_drawn(bt_frames *frames, const char *kind, int64_t cells, int
     for (int k = 0; k < n; k++) {
         char path[64];
         snprintf(path, sizeof path, "/xdmf/%06lld/%s_%s", (long long)frames->n, kind, drawn[k].name);
-        slab[k] = bt_slab_fixed(frames->h, path, H5T_NATIVE_FLOAT, drawn[k].quantity == POINTS ? points : cells,
-                                drawn[k].width, true);
+        slab[k] = bt_slab_fixed(frames->h, path, H5T_NATIVE_FLOAT, k == 0 ? points : cells, drawn[k].width, true);
         bt_h5_attr_text(frames->h, path, "units", drawn[k].units);
         bt_h5_attr_text(frames->h, path, "long_name", drawn[k].text);
     }
@@ -335,14 +320,14 @@ static void write_frame(bt_frames *frames, bt_slab *floes, bt_slab *others, cons
     const int64_t nf = frames->own_floes, nb = frames->own_others;
     for (int k = 0; k < BT_FRAME_COLUMNS; k++) {
         const bool some = columns[k].of & FLOES;
-        write_rows(frames, &frames->column[k], columns[k].quantity, some ? frames->first : 0, rows + (some ? 0 : nf),
-                   rows_of(k, nf, nb), buffer);
+        write_rows(frames, &frames->column[k], columns[k].part, columns[k].form, some ? frames->first : 0,
+                   rows + (some ? 0 : nf), rows_of(k, nf, nb), buffer);
     }
     write_points(frames, &floes[0], frames->vertices_before, rows, 0, nf, 0, buffer);
     write_points(frames, &others[0], 0, rows, nf, nb, frames->floe_vertices - frames->vertices_before, buffer);
     for (int k = 1; k < N_DRAWN; k++) {
-        write_rows(frames, &floes[k], drawn[k].quantity, frames->first, rows, nf, buffer);
-        if (k < N_DRAWN - 1) write_rows(frames, &others[k], drawn[k].quantity, 0, rows + nf, nb, buffer);
+        write_rows(frames, &floes[k], drawn[k].part, DRAWN, frames->first, rows, nf, buffer);
+        if (k < N_DRAWN - 1) write_rows(frames, &others[k], drawn[k].part, DRAWN, 0, rows + nf, nb, buffer);
     }
     free(buffer);
 }
@@ -394,6 +379,25 @@ bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows
     if (frames->branches) frames->lines[frames->n] = *line;
     frames->times[frames->n++] = time;
     return BT_OK;
+}
+
+void bt_frames_read(const bt_frames *frames, bt_h5_reader *old, int64_t k, double *time, bt_frame_row *rows,
+                    bt_frame_line *line)
+{
+    double *x = bt_alloc((size_t)(frames->n_floes + frames->n_others), 3 * sizeof *x);
+    bt_h5_read(old, "/frames/time", H5T_NATIVE_DOUBLE, k, 1, 1, time);
+    for (int c = 0; c < BT_FRAME_COLUMNS; c++) {
+        const size_t width = (size_t)columns[c].part.n;
+        const int64_t first = columns[c].of & FLOES ? 0 : frames->n_floes,
+                      n = rows_of(c, frames->n_floes, frames->n_others);
+        bt_h5_read(old, columns[c].name, H5T_NATIVE_DOUBLE, k, 1, (int64_t)width * n, x);
+        for (int64_t i = 0; i < n; i++)
+            memcpy((char *)&rows[first + i] + columns[c].part.at, x + width * (size_t)i, width * sizeof *x);
+    }
+    free(x);
+    if (frames->branches == 0) return;
+    bt_h5_read(old, "/frames/line_points", H5T_NATIVE_DOUBLE, k, 1, 4 * frames->branches, line->point);
+    bt_h5_read(old, "/frames/line_tension", H5T_NATIVE_DOUBLE, k, 1, frames->branches, line->tension);
 }
 
 void bt_frames_close(bt_frames *frames)

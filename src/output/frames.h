@@ -6,6 +6,7 @@
 #include "output/xdmf.h"
 #include "output/frame.h"
 #include "base/h5dataset.h"
+#include "base/h5read.h"
 
 enum { BT_FRAME_COLUMNS = 6 };
 
@@ -41,6 +42,9 @@ char *bt_frames_group(const bt_frames *frames, char path[64]);
 /// Collective. Add a frame, whose group must exist: rows of this rank's block. Returns the same status on all ranks;
 /// after a failure the file stays as at the last flush.
 bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows, const bt_frame_line *line);
+/// Read frame k of an older file, for bt_frames_add: rows of all bodies.
+void bt_frames_read(const bt_frames *frames, bt_h5_reader *old, int64_t k, double *time, bt_frame_row *rows,
+                    bt_frame_line *line);
 void bt_frames_close(bt_frames *frames); ///< datasets and memory
 
 #endif

@@ -184,9 +184,10 @@ static bt_piece_row *gather_pieces(const bt_comm *comm, const bt_world *world, c
     for (bt_idx i = 0; i < bodies->n; i++) {
         const bt_gid k = bodies->gid[i] - splitting->first;
         if (k < 0 || k >= splitting->reserve || !bt_domain_owns(world, i)) continue;
-        mine[count++] = (bt_piece_row){(double)k, row_of(bodies, i, force, net)};
+        mine[count++] = (bt_piece_row){(double)k, row_of(bodies, i, force, net),
+                                       bt_splitting_birth(splitting, k)->thickness};
     }
-    bt_piece_row *all = (bt_piece_row *)(void *)bt_comm_gather(comm, count, 1 + BT_FRAME_ROW,
+    bt_piece_row *all = (bt_piece_row *)(void *)bt_comm_gather(comm, count, BT_PIECE_ROW,
                                                                (const double *)(const void *)mine, n);
     free(mine);
     if (*n > 0) qsort(all, (size_t)*n, sizeof *all, by_piece);

@@ -30,17 +30,22 @@ static const column splits[BT_SPLIT_COLUMNS] = {
     [CRACK] = {"/splits/crack", false, 4, "split end_of_crack", "m", "x, y of the end at the load, then of the other"},
 };
 
-/// A column of the pieces in the frames.
-static const struct { const char *name; bool single; hsize_t width; const char *axes, *units, *text; }
+/// A column of the pieces in the frames, and its name where ParaView draws it; the first one is of integers.
+#define PART(member, n) BT_FRAME_PART(bt_piece_row, member, n)
+static const struct { const char *name; bt_frame_part part; bool single; const char *drawn, *axes, *units, *text; }
     pieces[BT_PIECE_COLUMNS] = {
-    {"/frames/piece", false, 0, "piece_in_frame", "1", "the piece, a row of /pieces"},
-    {"/frames/piece_pose", false, 3, "piece_in_frame component", "m, m, rad", "x, y, yaw of each piece"},
-    {"/frames/piece_contact_force", false, 0, "piece_in_frame", "N",
+    {"/frames/piece", PART(piece, 1), false, NULL, "piece_in_frame", "1", "the piece, a row of /pieces"},
+    {"/frames/piece_pose", PART(row.x, 3), false, NULL, "piece_in_frame component", "m, m, rad",
+     "x, y, yaw of each piece"},
+    {"/frames/piece_contact_force", PART(row.contact_force, 1), false, "_force", "piece_in_frame", "N",
      "largest normal contact force on the piece in the step, NaN where that has no solution"},
-    {"/frames/piece_speed", false, 0, "piece_in_frame", "m/s", "speed of the centroid"},
-    {"/frames/piece_velocity", true, 2, "piece_in_frame xy", "m/s", "velocity of the centroid"},
-    {"/frames/piece_net_force", true, 2, "piece_in_frame xy", "N", "sum of all contact forces in the step"},
-    {"/frames/piece_thickness", false, 0, "piece_in_frame", "m", "thickness of the piece"},
+    {"/frames/piece_speed", PART(row.speed, 1), false, "_speed", "piece_in_frame", "m/s", "speed of the centroid"},
+    {"/frames/piece_velocity", PART(row.vx, 2), true, "_velocity", "piece_in_frame xy", "m/s",
+     "velocity of the centroid"},
+    {"/frames/piece_net_force", PART(row.fx, 2), true, "_net_force", "piece_in_frame xy", "N",
+     "sum of all contact forces in the step"},
+    {"/frames/piece_thickness", PART(thickness, 1), false, "_thickness", "piece_in_frame", "m",
+     "thickness of the piece"},
 };
 
 static hid_t grow(bt_h5 *h5, const char *name, hid_t type, hsize_t width)
@@ -71,7 +76,7 @@ void bt_piece_store_create(bt_piece_store *store, bt_h5 *h5, const bt_splitting 
     bt_h5_describe(h5, "/frames/piece_end", "time", "1", "end of the rows of each frame in piece, piece_pose, ...");
     for (int k = 0; k < BT_PIECE_COLUMNS; k++) {
         const hid_t type = k == 0 ? H5T_NATIVE_INT64 : pieces[k].single ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
-        store->piece[k] = grow(h5, pieces[k].name, type, pieces[k].width);
+        store->piece[k] = grow(h5, pieces[k].name, type, pieces[k].part.n > 1 ? (hsize_t)pieces[k].part.n : 0);
         bt_h5_describe(h5, pieces[k].name, pieces[k].axes, pieces[k].units, pieces[k].text);
     }
 }
@@ -110,31 +115,10 @@ void bt_piece_store_write(bt_piece_store *store)
     }
 }
 
-/// Fill a column of the frames from rows of the world.
-static void fill(const bt_piece_store *store, int k, const bt_piece_row *rows, int64_t n, void *to)
-{
-    double *d = to;
-    float *f = to;
-    for (int64_t i = 0; i < n; i++) {
-        const bt_frame_row *row = &rows[i].row;
-        switch (k) {
-        case 0: ((int64_t *)to)[i] = (int64_t)rows[i].piece; break;
-        case 1: d[3 * i] = row->x, d[3 * i + 1] = row->y, d[3 * i + 2] = row->yaw; break;
-        case 2: d[i] = row->contact_force; break;
-        case 3: d[i] = row->speed; break;
-        case 4: f[2 * i] = (float)row->vx, f[2 * i + 1] = (float)row->vy; break;
-        case 5: f[2 * i] = (float)row->fx, f[2 * i + 1] = (float)row->fy; break;
-        default: d[i] = bt_splitting_birth(store->s, (bt_gid)rows[i].piece)->thickness;
-        }
-    }
-}
-
 /// Write polygons for ParaView: topology and points.
-static void draw(const bt_piece_store *store, const bt_piece_row *rows, int64_t n, int64_t n_points, int32_t *topology,
-                 float *points)
+static void draw(const bt_piece_store *store, const bt_piece_row *rows, int64_t n, int32_t *topology, float *points)
 {
     int64_t at = 0, t = 0;
-    (void)n_points;
     for (int64_t i = 0; i < n; i++) {
         const int64_t k = (int64_t)rows[i].piece, corners = store->s->split[k / 2].corners[k % 2];
         const double *v = bt_splitting_outline(store->s, k / 2, (int)(k % 2)), c = bt_cos(rows[i].row.yaw),
@@ -157,48 +141,40 @@ static void write_paraview(const bt_piece_store *store, const bt_piece_row *rows
     char path[64];
     const size_t cells = (size_t)n;
     int32_t *topology = bt_alloc((size_t)n_points + 2 * cells, sizeof *topology), *id = bt_alloc(cells, sizeof *id);
-    float *points = bt_alloc(2 * (size_t)n_points, sizeof *points), *one = bt_alloc(cells, sizeof *one),
-          *three = bt_alloc(3 * cells, sizeof *three);
-    draw(store, rows, n, n_points, topology, points);
-#define NAMED(name) (snprintf(path, sizeof path, "/xdmf/%06lld/piece" name, (long long)store->n_frames), path)
+    float *points = bt_alloc(2 * (size_t)n_points, sizeof *points), *value = bt_alloc(cells, 3 * sizeof *value);
+    draw(store, rows, n, topology, points);
+#define NAMED(name) (snprintf(path, sizeof path, "/xdmf/%06lld/piece%s", (long long)store->n_frames, name), path)
     bt_h5_write(store->h, NAMED("s"), H5T_NATIVE_INT32, (hsize_t)(n_points + 2 * n), 0, topology);
     bt_h5_write(store->h, NAMED("_points"), H5T_NATIVE_FLOAT, (hsize_t)n_points, 2, points);
-    for (size_t i = 0; i < cells; i++) one[i] = (float)rows[i].row.speed;
-    bt_h5_write(store->h, NAMED("_speed"), H5T_NATIVE_FLOAT, cells, 0, one);
-    for (size_t i = 0; i < cells; i++) one[i] = (float)rows[i].row.contact_force;
-    bt_h5_write(store->h, NAMED("_force"), H5T_NATIVE_FLOAT, cells, 0, one);
-    for (int net = 0; net < 2; net++) {
-        for (size_t i = 0; i < cells; i++) {
-            const bt_frame_row *row = &rows[i].row;
-            double drawn[2];
-            bt_map_axes_vector(&store->axes, net ? row->fx : row->vx, net ? row->fy : row->vy, drawn);
-            three[3 * i] = (float)drawn[0], three[3 * i + 1] = (float)drawn[1], three[3 * i + 2] = 0;
-        }
-        bt_h5_write(store->h, net ? NAMED("_net_force") : NAMED("_velocity"), H5T_NATIVE_FLOAT, cells, 3, three);
+    for (int k = 0; k < BT_PIECE_COLUMNS; k++) {
+        if (!pieces[k].drawn) continue;
+        const bt_frame_part part = pieces[k].part;
+        const size_t width = part.n > 1 ? 3 : 1;
+        for (size_t i = 0; i < cells; i++)
+            bt_map_axes_value(&store->axes, bt_frame_numbers(&rows[i], part), part.n, value + width * i);
+        bt_h5_write(store->h, NAMED(pieces[k].drawn), H5T_NATIVE_FLOAT, cells, width > 1 ? width : 0, value);
     }
-    for (size_t i = 0; i < cells; i++) one[i] = (float)bt_splitting_birth(store->s, (bt_gid)rows[i].piece)->thickness;
-    bt_h5_write(store->h, NAMED("_thickness"), H5T_NATIVE_FLOAT, cells, 0, one);
     for (size_t i = 0; i < cells; i++) id[i] = (int32_t)(store->roster->n_floes + (int64_t)rows[i].piece);
     bt_h5_write(store->h, NAMED("_id"), H5T_NATIVE_INT32, cells, 0, id);
 #undef NAMED
     free(topology);
     free(id);
     free(points);
-    free(one);
-    free(three);
+    free(value);
 }
 
 void bt_piece_store_frame(bt_piece_store *store, const bt_piece_row *rows, int64_t n)
 {
     if (!store->h) return;
     bt_piece_store_write(store);
-    void *buffer = bt_alloc((size_t)n, 3 * sizeof(double));
+    double *x = bt_alloc((size_t)n, 3 * sizeof *x);
     for (int k = 0; k < BT_PIECE_COLUMNS; k++) {
-        const hid_t type = k == 0 ? H5T_NATIVE_INT64 : pieces[k].single ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
-        fill(store, k, rows, n, buffer);
-        bt_h5_append(store->h, store->piece[k], type, (hsize_t)store->n_rows, (hsize_t)n, buffer);
+        const size_t width = (size_t)pieces[k].part.n;
+        for (int64_t i = 0; i < n; i++)
+            memcpy(x + width * (size_t)i, bt_frame_numbers(&rows[i], pieces[k].part), width * sizeof *x);
+        bt_h5_append(store->h, store->piece[k], H5T_NATIVE_DOUBLE, (hsize_t)store->n_rows, (hsize_t)n, x);
     }
-    free(buffer);
+    free(x);
     int64_t points = 0;
     for (int64_t i = 0; i < n; i++) {
         const int64_t k = (int64_t)rows[i].piece;
@@ -218,25 +194,14 @@ bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n)
     else bt_h5_read(old, "/frames/piece_end", H5T_NATIVE_INT64, 0, 1, 1, &ends[1]);
     *n = old->status == BT_OK ? ends[1] - ends[0] : 0;
     bt_piece_row *rows = bt_alloc((size_t)*n, sizeof *rows);
-    void *buffer = bt_alloc((size_t)*n, 3 * sizeof(double));
-    const double *d = buffer;
-    const float *f = buffer;
-    for (int c = 0; c < BT_PIECE_COLUMNS - 1 && *n > 0; c++) {
-        const hid_t type = c == 0 ? H5T_NATIVE_INT64 : pieces[c].single ? H5T_NATIVE_FLOAT : H5T_NATIVE_DOUBLE;
-        bt_h5_read(old, pieces[c].name, type, ends[0], *n, pieces[c].width ? (int64_t)pieces[c].width : 1, buffer);
-        for (int64_t i = 0; i < *n; i++) {
-            bt_frame_row *row = &rows[i].row;
-            switch (c) {
-            case 0: rows[i].piece = (double)((const int64_t *)buffer)[i]; break;
-            case 1: row->x = d[3 * i], row->y = d[3 * i + 1], row->yaw = d[3 * i + 2]; break;
-            case 2: row->contact_force = d[i]; break;
-            case 3: row->speed = d[i]; break;
-            case 4: row->vx = (double)f[2 * i], row->vy = (double)f[2 * i + 1]; break;
-            default: row->fx = (double)f[2 * i], row->fy = (double)f[2 * i + 1];
-            }
-        }
+    double *x = bt_alloc((size_t)*n, 3 * sizeof *x);
+    for (int c = 0; c < BT_PIECE_COLUMNS && *n > 0; c++) {
+        const size_t width = (size_t)pieces[c].part.n;
+        bt_h5_read(old, pieces[c].name, H5T_NATIVE_DOUBLE, ends[0], *n, (int64_t)width, x);
+        for (int64_t i = 0; i < *n; i++)
+            memcpy((char *)&rows[i] + pieces[c].part.at, x + width * (size_t)i, width * sizeof *x);
     }
-    free(buffer);
+    free(x);
     return rows;
 }
 

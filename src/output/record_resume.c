@@ -288,42 +288,6 @@ static void load_series(bt_record *record, const bt_snapshot *snap, bt_h5_reader
     record->written = n;
 }
 
-static void read_velocities_and_forces(bt_h5_reader *old, int64_t k, bt_idx n, bt_frame_row *rows)
-{
-    float *v = bt_alloc((size_t)n, 2 * sizeof *v);
-    bt_h5_read(old, "/frames/velocity", H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
-    for (bt_idx i = 0; i < n; i++) rows[i].vx = (double)v[2 * i], rows[i].vy = (double)v[2 * i + 1];
-    bt_h5_read(old, "/frames/net_force", H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
-    for (bt_idx i = 0; i < n; i++) rows[i].fx = (double)v[2 * i], rows[i].fy = (double)v[2 * i + 1];
-    free(v);
-}
-
-/// Read the tow line of frame k.
-static void read_line(bt_h5_reader *old, int64_t k, int branches, bt_frame_line *line)
-{
-    if (branches == 0) return;
-    bt_h5_read(old, "/frames/line_points", H5T_NATIVE_DOUBLE, k, 1, 4 * branches, &line->point[0][0][0]);
-    bt_h5_read(old, "/frames/line_tension", H5T_NATIVE_DOUBLE, k, 1, branches, line->tension);
-}
-
-/// Read frame k of the old file as rows of all bodies; on rank 0.
-static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bodies, double *time, bt_frame_row *rows)
-{
-    double *x = bt_alloc((size_t)n_bodies, 3 * sizeof *x);
-    bt_h5_read(old, "/frames/time", H5T_NATIVE_DOUBLE, k, 1, 1, time);
-    bt_h5_read(old, "/frames/pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)n_floes, x);
-    bt_h5_read(old, "/frames/body_pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)(n_bodies - n_floes),
-               x + 3 * (size_t)n_floes);
-    for (bt_idx i = 0; i < n_bodies; i++)
-        rows[i] = (bt_frame_row){.x = x[3 * (size_t)i], .y = x[3 * (size_t)i + 1], .yaw = x[3 * (size_t)i + 2]};
-    bt_h5_read(old, "/frames/contact_force", H5T_NATIVE_DOUBLE, k, 1, n_floes, x);
-    for (bt_idx i = 0; i < n_floes; i++) rows[i].contact_force = x[i];
-    bt_h5_read(old, "/frames/speed", H5T_NATIVE_DOUBLE, k, 1, n_bodies, x);
-    for (bt_idx i = 0; i < n_bodies; i++) rows[i].speed = x[i];
-    free(x);
-    read_velocities_and_forces(old, k, n_bodies, rows);
-}
-
 /// Collective. Copy the first n frames, through the function that adds any frame.
 static bt_status load_frames(bt_record *record, bt_h5_reader *old, int64_t n, bt_errors *err)
 {
@@ -342,8 +306,7 @@ static bt_status load_frames(bt_record *record, bt_h5_reader *old, int64_t n, bt
     for (int64_t k = 0; k < n && status == BT_OK; k++) {
         double time = 0;
         bt_frame_line line = {0};
-        if (first) read_frame(old, k, n_floes, n_bodies, &time, rows);
-        if (first) read_line(old, k, record->frames.branches, &line);
+        if (first) bt_frames_read(&record->frames, old, k, &time, rows, &line);
         int64_t n_pieces = 0;
         bt_piece_row *pieces = first && record->pieces.h ? bt_piece_store_read(old, k, &n_pieces) : NULL;
         status = bt_comm_agree(record->comm, first ? old->status : BT_OK);

@@ -36,11 +36,11 @@ static inline void bt_map_axes_point(const bt_map_axes *axes, double x, double y
     drawn[!axes->swapped] = y - axes->origin[1];
 }
 
-/// Components of a vector as drawn.
-static inline void bt_map_axes_vector(const bt_map_axes *axes, double vx, double vy, double drawn[2])
+/// A number (n = 1) or a vector (2) as drawn; ParaView's vectors have three components.
+static inline void bt_map_axes_value(const bt_map_axes *axes, const double *x, int n, float *drawn)
 {
-    drawn[axes->swapped] = vx;
-    drawn[!axes->swapped] = vy;
+    if (n == 1) drawn[0] = (float)x[0];
+    else drawn[axes->swapped] = (float)x[0], drawn[!axes->swapped] = (float)x[1], drawn[2] = 0;
 }
 
 /// Pieces of floes in a frame.

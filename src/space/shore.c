@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "body/bodies.h"
 
 static const double CONE = 1e-6; // rad; two pieces of a straight shore may both count, never neither
@@ -121,8 +122,7 @@ static void take_nearest(void *context, const bt_shore_polygon *p)
     if (bt_nearest_image(dx, c->period[0]) != dx + c->shift[0]) return;
     if (bt_nearest_image(dy, c->period[1]) != dy + c->shift[1]) return;
     bt_shore_list *list = c->list;
-    if (list->n == list->cap)
-        list->found = bt_realloc(list->found, list->cap = list->cap ? 2 * list->cap : 64, sizeof *list->found);
+    BT_MAKE_ROOM(list->found, list->n, list->cap, 64);
     list->found[list->n++] = *p;
 }
 

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "body/bodies.h"
 #include "contact/cell_contacts.h"
 #include "contact/law.h"
@@ -37,12 +38,6 @@ bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t 
     return gid;
 }
 
-static int ascending(const void *p, const void *q)
-{
-    const double a = *(const double *)p, b = *(const double *)q;
-    return (a > b) - (a < b);
-}
-
 double bt_splitting_size(const bt_splitting *splitting, bool before, double share)
 {
     if (splitting->n == 0) return NAN;
@@ -57,7 +52,7 @@ double bt_splitting_size(const bt_splitting *splitting, bool before, double shar
         for (int i = 0; i < 2; i++) size[n++] = sqrt(record->area[i]);
         if (record->generation > 1) size[record->parent - splitting->first] = 0;
     }
-    qsort(size, n, sizeof *size, ascending);
+    qsort(size, n, sizeof *size, bt_ascending);
     size_t gone = 0;
     while (size[gone] == 0) gone++;
     const double found = size[gone + (size_t)(share * (double)(n - 1 - gone))];

@@ -31,8 +31,7 @@ typedef struct {
 
 static void add(load_list *list, const load_row *row)
 {
-    if (list->n == list->cap)
-        list->row = bt_realloc(list->row, (list->cap = list->cap ? 2 * list->cap : 256), sizeof *list->row);
+    BT_MAKE_ROOM(list->row, list->n, list->cap, 256);
     list->row[list->n++] = *row;
 }
 
