@@ -605,7 +605,7 @@ def test_a_goal_at_the_start_or_next_to_it():
     assert found.routes[0].length == 1 and best(found).length == 1
 
 
-# --- weights, tug ----------------------------------------------------------------------------------------------------
+# --- weights ---------------------------------------------------------------------------------------------------------
 
 def test_weights_are_those_that_made_the_forces():
     rng = np.random.default_rng(3)
@@ -622,15 +622,3 @@ def test_weights_are_those_that_made_the_forces():
     assert math.isnan(planner.fit_weights(np.zeros((3, 5)), [1, 2, 3]).rank_correlation)
     with pytest.raises(BergtowError, match="1 tows"):
         planner.fit_weights(rows[:1], [1.0])
-
-
-def test_a_tug_leads_its_berg():
-    """A circle of the tug: the berg's from inside, of radius sqrt(R2 - L2); and its own path under its own line."""
-    a = np.linspace(0, 12 * np.pi, 24001)
-    x, y = planner.berg_track(1000 * np.cos(a), 1000 * np.sin(a), 600, (1000, -600))
-    assert math.isclose(np.hypot(x[-1], y[-1]), planner.berg_radius(1000, 600), rel_tol=1e-4)
-    assert planner.berg_radius(1000, 600) == 800 and planner.tug_radius(800, 600) == 1000
-    r = best(plan(NONE, BERG, (50, 80), (950, 500), extent=(0, 0, 1000, 600), routes=1))
-    tx, ty = planner.tug_track(r.x, r.y, r.heading, 200)
-    bx, by = planner.berg_track(tx, ty, 200, (r.x[0], r.y[0]))
-    np.testing.assert_allclose([bx, by], [r.x, r.y], atol=1e-6)

@@ -14,7 +14,6 @@ Trajectories: discrete sampling geometry of CF-1.8, in the classic NetCDF format
 """
 import argparse
 import csv
-import ctypes
 import datetime
 import json
 import math
@@ -24,10 +23,11 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import _library, arguments, writing
+from bergtow import arguments, writing
 from bergtow.errors import IO, USAGE, BergtowError, RunError
 from bergtow.maps import plane as map_plane
 from bergtow.maps import read as map_read
+from bergtow.result.frames import lonlat_of
 from bergtow.result.run import Run
 
 import numpy as np
@@ -82,7 +82,7 @@ class Place:
     def coordinates(self, xy):
         """Coordinates [..., 2] on the map: longitude and latitude, or east and north."""
         east_north = self.metres(np.asarray(xy, float))
-        return _degrees(east_north, self.zero) if self.degrees else east_north + self.zero
+        return lonlat_of(east_north, np.radians(self.zero)) if self.degrees else east_north + self.zero
 
     def ring(self, outline):
         """A closed ring, anticlockwise on the map, from an outline that is anticlockwise in x and y."""
@@ -106,19 +106,6 @@ class Place:
         if self.crs:
             return f"{self.crs}, metres east and north"
         return f"metres of no place on the earth, {'east and north' if self.geographic else 'x and y of the basin'}"
-
-
-def _degrees(east_north, zero):
-    """Longitude and latitude of metres about a reference point, computed by the library; NaN stays NaN."""
-    unproject = _library.library().bt_outline_unproject
-    lon0, lat0 = map(math.radians, zero)
-    lon, lat = ctypes.c_double(), ctypes.c_double()
-    out = np.full(east_north.shape, np.nan)
-    flat, to = east_north.reshape(-1, 2), out.reshape(-1, 2)
-    for k in np.flatnonzero(np.isfinite(flat).all(axis=1)):
-        unproject(flat[k, 1], flat[k, 0], lon0, lat0, lon, lat)
-        to[k] = lon.value, lat.value
-    return np.degrees(out)
 
 
 # ---- exported quantities

@@ -145,16 +145,12 @@ def force_limits(e, some_groups, log):
 def power_law(x, means):
     """(exponent, low, high, factor) of mean = factor x^exponent over fields: regression of ln mean on ln x, 95 %; None
     if undefined."""
-    lx = np.concatenate([np.full(len(y), np.log(v)) for v, y in zip(x, means)])
-    y = np.concatenate(means)
+    lx, y = np.log(np.repeat(x, [len(y) for y in means])), np.concatenate(means)
     if len(set(lx)) < 2 or len(y) < 4 or y.min() <= 0:
         return None
-    a = np.column_stack([np.ones(len(y)), lx])
-    c, *_ = np.linalg.lstsq(a, np.log(y), rcond=None)
-    rest = np.log(y) - a @ c
-    se = np.sqrt(np.dot(rest, rest) / (len(y) - 2) * np.linalg.inv(a.T @ a)[1, 1])
-    half = scipy.stats.t.ppf(0.975, len(y) - 2) * se
-    return c[1], c[1] - half, c[1] + half, np.exp(c[0])
+    fit = scipy.stats.linregress(lx, np.log(y))
+    half = scipy.stats.t.ppf(0.975, len(y) - 2) * fit.stderr
+    return fit.slope, fit.slope - half, fit.slope + half, np.exp(fit.intercept)
 
 
 def draw_speed(axes, e, some, key, factor):

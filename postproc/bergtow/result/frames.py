@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Floes and bodies of a run, and their positions in its frames: the part of Run (result/run.py) with outlines."""
+import ctypes
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.result.hdf5 import plain
 
@@ -26,6 +28,18 @@ def place(vertices, pose):
     """World coordinates [n, 2] m of vertices [n, 2] m (body frame) at pose (x m, y m, yaw rad)."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
     return np.asarray(vertices) @ np.array([[c, s], [-s, c]]) + np.asarray(pose[:2])
+
+
+def lonlat_of(east_north, origin):
+    """Longitude and latitude [..., 2] of metres about an origin (longitude, latitude in rad); NaN stays NaN."""
+    unproject = _library.library().bt_outline_unproject
+    lon, lat = ctypes.c_double(), ctypes.c_double()
+    out = np.full(east_north.shape, np.nan)
+    flat, to = east_north.reshape(-1, 2), out.reshape(-1, 2)
+    for k in np.flatnonzero(np.isfinite(flat).all(axis=1)):
+        unproject(flat[k, 1], flat[k, 0], *origin, lon, lat)
+        to[k] = lon.value, lat.value
+    return np.degrees(out)
 
 
 class Frames:

@@ -15,6 +15,7 @@ from bergtow import _library, writing
 from bergtow._calls import called
 from bergtow.case import Case
 from bergtow.errors import CASE, USAGE, Refused, RunError
+from bergtow.result.frames import lonlat_of
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
@@ -46,19 +47,13 @@ class Place:
 
     def degrees(self, xy):
         """[n, 2] longitude and latitude from metres of the case."""
-        lib, lon, lat, out = _library.library(), c_double(), c_double(), []
-        for east, north in self.map(xy):
-            lib.bt_outline_unproject(c_double(north), c_double(east), *map(c_double, self.origin), byref(lon),
-                                     byref(lat))
-            out.append(np.degrees([lon.value, lat.value]))
-        return np.array(out).reshape(-1, 2)
+        return lonlat_of(self.map(xy), self.origin)
 
     def metres(self, degrees):
         """Metres of the case, [n, 2], from longitude and latitude."""
         lib, north, east, out = _library.library(), c_double(), c_double(), []
         for lon, lat in np.radians(np.asarray(degrees, dtype=float).reshape(-1, 2)):
-            lib.bt_outline_project(c_double(lon), c_double(lat), *map(c_double, self.origin), byref(north),
-                                   byref(east))
+            lib.bt_outline_project(lon, lat, *self.origin, north, east)
             out.append((east.value, north.value))
         return self.map(out)
 

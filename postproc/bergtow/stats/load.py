@@ -89,9 +89,10 @@ def start_up(time, x, start, end, scale):
     return {"largest": float(y[k]), "time_s": float(time[n - 1 + k]), "scale": n * dt} if np.isfinite(y[k]) else None
 
 
-def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
-    """95 % interval of a value, within [low, high], from its values without each of the fields; NaN ends for one field.
-    scale: (function, its inverse); the interval is symmetric in the function if that is finite throughout."""
+def jackknife(value, without, low=-np.inf, high=np.inf, scale=None, level=stat_mean.LEVEL):
+    """Interval at this level of a value, within [low, high], from its values without each of the fields; NaN ends for
+    one field. scale: (function, its inverse); the interval is symmetric in the function if that is finite throughout.
+    """
     n, without = len(without), np.asarray(without)
     if n < 2 or not np.isfinite([value, *without]).all():
         return np.nan, np.nan
@@ -100,7 +101,7 @@ def jackknife(value, without, low=-np.inf, high=np.inf, scale=None):
         if not np.isfinite(there(np.array([value, *without]))).all():
             there, back = PLAIN
     x = there(without)
-    half = scipy.stats.t.ppf(0.5 + stat_mean.LEVEL / 2, n - 1) * np.sqrt((n - 1) / n * np.sum((x - x.mean()) ** 2))
+    half = scipy.stats.t.ppf(0.5 + level / 2, n - 1) * np.sqrt((n - 1) / n * np.sum((x - x.mean()) ** 2))
     return tuple(float(np.clip(back(there(value) + k * half), low, high)) for k in (-1, 1))
 
 

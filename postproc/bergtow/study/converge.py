@@ -35,12 +35,12 @@ from bergtow.arguments import above_zero, whole_from
 from bergtow.errors import SIGNAL, USAGE, RunError
 from bergtow.result.origins import BESIDE, annotated
 from bergtow.result.run import Run, within
+from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.study import analysis
 from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 
 import numpy as np
-import scipy
 
 FIELDS = (4, 8, 16, 32, 64, 128, 256)  # number at each look
 LOOKS = len(FIELDS)
@@ -50,6 +50,7 @@ UNSOLVED = 0.01             # share of unconverged steps above which a compariso
 BUDGET = 10.0               # min
 WINDOW_TOO_EARLY = "no longer ramp ends before the window: tow for longer, with a later window"
 EFFORT = 0.05               # relative error of the mean that the number of fields has to reach
+WINDOW = "window", "output.window_start"  # name and key of its row
 RAMP = 4.0                  # factor by which the ramp is lengthened
 LATEST = 0.8                # relative to the start of the window: where a ramp must end at the latest
 
@@ -166,13 +167,9 @@ NAMES = tuple(k.name for k in KINDS) + ("window", "fields")
 def effect(base, other, looks=LOOKS):
     """(mean(other)/mean(base) - 1, (low, high)) from pairs, at the level of one of this many looks; on the logarithm of
     the ratio if that is defined."""
-    n, value = len(base), other.mean() / base.mean()
-    without = (other.sum() - other) / (base.sum() - base)
-    logs = value > 0 and np.all(without > 0)
-    there, back = (np.log, np.exp) if logs else (np.asarray, np.asarray)
-    se = np.sqrt((n - 1) / n * np.sum((there(without) - there(without).mean()) ** 2))
-    half = scipy.stats.t.ppf(1 - 0.025 / looks, n - 1) * se
-    return float(value) - 1, (float(back(there(value) - half)) - 1, float(back(there(value) + half)) - 1)
+    value, without = other.mean() / base.mean(), (other.sum() - other) / (base.sum() - base)
+    low, high = stat_load.jackknife(value, without, scale=stat_load.LOG, level=1 - 0.05 / looks)
+    return float(value) - 1, (low - 1, high - 1)
 
 
 def pairing(base, other):
@@ -226,6 +223,11 @@ def compare(study, kind, base_name, base_values, name, values, margin):
     return row | {"why": f"{FIELDS[-1]} fields scatter too much"}
 
 
+def not_judged(name, key, why, **more):
+    """The rows of a quantity that could not be compared."""
+    return [{"name": name, "key": key, "judged": "open", **more, "why": why}]
+
+
 def vary(study, kind, margin, most=TRIES):
     """Rows of a quantity, from the case's value on until the next one has no effect."""
     with Run(study.path("case", 0)) as run:
@@ -235,10 +237,9 @@ def vary(study, kind, margin, most=TRIES):
         programme = run.case.get("tow.programme", "none") != "none"
         extents = [{} if kind.same_ice else cut_from(run, larger) for larger in tries[1:]]
     if kind.name == "start" and programme:  # the programme replaces the ramp
-        return [{"name": kind.name, "key": kind.key, "judged": "open",
-                 "why": "the start is that of tow.programme; make its first rows slower by hand"}]
+        return not_judged(kind.name, kind.key, "the start is that of tow.programme; make its first rows slower by hand")
     if not np.isfinite(first) or (first <= 0 and kind.name != "start"):
-        return [{"name": kind.name, "key": kind.key, "judged": "open", "why": f"the case has no {kind.key}"}]
+        return not_judged(kind.name, kind.key, f"the case has no {kind.key}")
     names, rows = ["case"] + [f"{kind.name}-{k + 1}" for k in range(most)], []
     for k in range(most):
         a, b = (tries[j].get(kind.key, first) for j in (k, k + 1))
@@ -265,14 +266,11 @@ def window(study, margin):
         for i in range(n):
             with Run(study.path("case", i)) as run:
                 if run.window is None:
-                    return [{"name": "window", "key": "output.window_start", "judged": "open",
-                             "why": "a run has no window"}]
+                    return not_judged(*WINDOW, "a run has no window")
                 if run.adrift < run.window[1]:
-                    return [{"name": "window", "key": "output.window_start", "judged": "open",
-                             "why": "the line of a run parts before the end of its window"}]
+                    return not_judged(*WINDOW, "the line of a run parts before the end of its window")
                 if run.at_least:
-                    return [{"name": "window", "key": "output.window_start", "judged": "open",
-                             "why": "the load of a run has no bound in some steps of its window"}]
+                    return not_judged(*WINDOW, "the load of a run has no bound in some steps of its window")
                 (start, end), t, x = run.window, run["time"], run["ice_resistance"]
                 first = start + (run.steps_per_sample - 1) * run.value("run.dt")
             middle = 0.5 * (start + end)
@@ -280,8 +278,7 @@ def window(study, margin):
             rows.append((x[inside].mean(), x[inside & (t > middle)].mean(), start, middle))
         base, late, starts, middles = np.array(rows).T
         if base.mean() == 0 or base.max() == base.sum():
-            return [{"name": "window", "key": "output.window_start", "judged": "open", "fields": n,
-                     "why": "nothing to hold the mean ice resistance against"}]
+            return not_judged(*WINDOW, "nothing to hold the mean ice resistance against", fields=n)
         value, interval = effect(base, late)
         row = {"name": "window", "key": "output.window_start", "unit": "s", "from": starts.mean(), "to": middles.mean(),
                "finer": "later", "quantity": "mean ice resistance", "effect": value, "interval_95": interval,
@@ -302,7 +299,7 @@ def fields_row(study):
     x = study.measured("case", kept, mean_resistance)
     n = len(x)
     if not np.isfinite(x).all():
-        return [{"name": "fields", "key": "repeats", "judged": "open", "why": "a run has no mean ice resistance"}]
+        return not_judged("fields", "repeats", "a run has no mean ice resistance")
     low, high = stat_mean.t_interval(x)
     needed = stat_mean.fields_needed(x.mean(), np.std(x, ddof=1), EFFORT)
     return [{"name": "fields", "key": "repeats", "fields": n, "quantity": "mean ice resistance", "mean": x.mean(),
@@ -330,7 +327,7 @@ def varied(study, kinds, margin, tries, end):
             try:
                 found[kind.name] = vary(study, kind, margin, tries)
             except RunError as error:
-                found[kind.name] = [{"name": kind.name, "key": kind.key, "judged": "open", "why": error.reason}]
+                found[kind.name] = not_judged(kind.name, kind.key, error.reason)
         waiting = [kind for kind in waiting if found[kind.name][-1].get("code") == SPENT.code]
     study.end = end
     return found
@@ -346,7 +343,7 @@ def converge(study, names, margin, tries=TRIES):
         try:
             rows += window(study, margin)
         except RunError as error:
-            rows.append({"name": "window", "key": "output.window_start", "judged": "open", "why": error.reason})
+            rows += not_judged(*WINDOW, error.reason)
     if "fields" in names:
         rows += fields_row(study)
     return rows

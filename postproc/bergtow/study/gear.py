@@ -14,6 +14,7 @@ from bergtow import towing
 from bergtow.arguments import read
 from bergtow.errors import USAGE, BergtowError
 from bergtow.result.run import case_value
+from bergtow.towing.start import bisected
 
 import numpy as np
 
@@ -150,8 +151,4 @@ def limit_by_drag(v, efficiency, speed, load, drag):
         return pull_at(v, u, efficiency) - (load + drag * ((u / speed) ** 2 - 1))
     if not np.isfinite(v.pull) or gap(speed) < 0:
         return None
-    low, high = speed, v.free_speed
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if gap(middle) >= 0 else (low, middle)
-    return low
+    return bisected(speed, v.free_speed, lambda u: gap(u) >= 0)[0]

@@ -9,6 +9,7 @@ damping. k = EA/L, which a line with weight approaches as it is pulled straight.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from ..errors import BergtowError
 from ._given import above_zero, not_below_zero
@@ -21,6 +22,16 @@ def effective_mass(one: float, other: float = math.inf) -> float:
     if not other > 0:
         raise BergtowError(f"other: {other:g} kg is no mass; give a number above 0, or inf for an end that is led")
     return one if math.isinf(other) else one * other / (one + other)
+
+
+def bisected(low: float, high: float, is_low: Callable[[float], bool]) -> tuple[float, float]:
+    """Neighbours between a low number and a high one: the last that is low, and the first that is not."""
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        low, high = (middle, high) if is_low(middle) else (low, middle)
+    return low, high
 
 
 def snap_load(speed: float, stiffness: float, mass: float, static: float = 0.0, initial: float = 0.0) -> float:
@@ -49,12 +60,7 @@ def snap_load_catenary(line: Catenary, speed: float, mass: float, pull: float, s
     high = low + snap_load(speed, line.stiffness / line.length, mass, static, 0.0)
     while left(high) < 0:
         high *= 2
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if left(middle) < 0 else (low, middle)
-    return high
+    return bisected(low, high, lambda force: left(force) < 0)[1]
 
 
 def _frequency(stiffness: float, mass: float) -> float:
@@ -107,10 +113,5 @@ def ramp_for(load: float, speed: float, stiffness: float, mass: float, resistanc
         return 0.0
     if room <= 0:
         return math.inf
-    low, high = 0.0, 2 * mass * speed * load / room ** 2  # where R + m a + √((m a)² + 2 m a R) is the load
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if start_load(middle, speed, stiffness, mass, resistance) > load else (low, middle)
-    return high
+    longest = 2 * mass * speed * load / room ** 2  # where R + m a + √((m a)² + 2 m a R) is the load
+    return bisected(0.0, longest, lambda ramp: start_load(ramp, speed, stiffness, mass, resistance) > load)[1]
