@@ -27,7 +27,7 @@ void *bt_snapshot_begin(bt_snapshot *snap, const char *name, bt_item_type type, 
     bt_item *item = &snap->item[snap->n++];
     *item = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
     snap->rows = 0;
-    if (snap->file) bt_snapshot_file_begin(snap);
+    if (snap->sink) snap->sink->begin(snap);
     else item->data = bt_alloc(bytes_of(item), 1);
     return item->data;
 }
@@ -36,7 +36,7 @@ void bt_snapshot_put(bt_snapshot *snap, int64_t n, const void *rows)
 {
     const bt_item *item = &snap->item[snap->n - 1];
     const size_t row = (size_t)item->width * bt_item_size(item->type);
-    if (snap->file) bt_snapshot_file_put(snap, n, rows);
+    if (snap->sink) snap->sink->put(snap, n, rows);
     else if (n > 0) memcpy((char *)item->data + (size_t)snap->rows * row, rows, (size_t)n * row);
     snap->rows += n;
 }
@@ -83,7 +83,7 @@ void bt_snapshot_add_rows(bt_snapshot *snap, const char *group, const bt_state_r
 
 void bt_snapshot_free(bt_snapshot *snap)
 {
-    if (snap->file) bt_snapshot_file_drop(snap);
+    if (snap->sink) snap->sink->drop(snap);
     for (int k = 0; k < snap->n; k++) {
         free(snap->item[k].name);
         free(snap->item[k].data);

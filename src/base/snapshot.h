@@ -40,8 +40,16 @@ typedef struct bt_snapshot {
     bt_errors *err;   ///< list for the complaints of bt_snapshot_take
     bool faulty;      ///< there was a complaint
     int64_t rows;     ///< rows put into the array added last
-    struct bt_snapshot_file *file; ///< takes the arrays as they are added (bt_snapshot_create), NULL = into memory
+    const struct bt_snapshot_sink *sink; ///< where arrays go as they are added (bt_snapshot_create), NULL = into memory
+    struct bt_snapshot_file *file;       ///< of the sink
 } bt_snapshot;
+
+/// Takes the arrays of a set in place of memory.
+typedef struct bt_snapshot_sink {
+    void (*begin)(bt_snapshot *snap); ///< begin the array added last
+    void (*put)(bt_snapshot *snap, int64_t n, const void *rows); ///< take the next rows of it
+    void (*drop)(bt_snapshot *snap); ///< the set is given up: leave nothing of it
+} bt_snapshot_sink;
 
 /// Condition on each number of a member by itself: COUNT from 0 to 1e15, SHARE from 0 to 1, FAR within 1e9 of 0.
 typedef enum {
@@ -118,10 +126,6 @@ typedef const char *bt_item_meaning(const char *name, const char **units, const 
 /// Send all arrays added to `snap` from here on to a new HDF5 file. meaning: for arrays without a row, may be NULL.
 /// `snap` must be empty. bt_snapshot_close returns the errors of this call and of those that follow.
 void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *meaning, bt_errors *err);
-/// For snapshot.c: begin the array added last, take the next rows of it, and leave nothing of a set that is given up.
-void bt_snapshot_file_begin(bt_snapshot *snap);
-void bt_snapshot_file_put(bt_snapshot *snap, int64_t n, const void *rows);
-void bt_snapshot_file_drop(bt_snapshot *snap);
 /// Complete the file after the last array: end it with a checksum, and close it.
 void bt_snapshot_end(bt_snapshot *snap, bt_errors *err);
 /// The same unless done before, and keep the file: without this call bt_snapshot_free removes it. Errors: BT_ERR_IO.

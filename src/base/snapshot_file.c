@@ -56,7 +56,7 @@ static const char *meaning_of(const struct bt_snapshot_file *file, const bt_item
 }
 
 /// Write some rows, or all at once, which takes a third of the HDF5 calls.
-void bt_snapshot_file_put(bt_snapshot *snap, int64_t n, const void *rows)
+static void put_rows(bt_snapshot *snap, int64_t n, const void *rows)
 {
     struct bt_snapshot_file *file = snap->file;
     const bt_item *item = &snap->item[snap->n - 1];
@@ -91,7 +91,7 @@ static void end_array(bt_snapshot *snap, int n)
     bt_h5_attr_text(&file->h, name, "long_name", text);
 }
 
-void bt_snapshot_file_begin(bt_snapshot *snap)
+static void begin_array(bt_snapshot *snap)
 {
     end_array(snap, snap->n - 1);
     enter(&snap->file->h, snap, snap->n - 1);
@@ -122,6 +122,7 @@ static void release(bt_snapshot *snap, bool keep)
     free(snap->file->path);
     free(snap->file);
     snap->file = NULL;
+    snap->sink = NULL;
 }
 
 bt_status bt_snapshot_close(bt_snapshot *snap, bt_errors *err)
@@ -132,7 +133,7 @@ bt_status bt_snapshot_close(bt_snapshot *snap, bt_errors *err)
     return status;
 }
 
-void bt_snapshot_file_drop(bt_snapshot *snap)
+static void drop(bt_snapshot *snap)
 {
     bt_errors unheard = {0};
     if (snap->file->dataset >= 0) H5Dclose(snap->file->dataset);
@@ -144,6 +145,8 @@ void bt_snapshot_file_drop(bt_snapshot *snap)
 
 void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *meaning, bt_errors *err)
 {
+    static const bt_snapshot_sink sink = {.begin = begin_array, .put = put_rows, .drop = drop};
+    snap->sink = &sink;
     struct bt_snapshot_file *file = snap->file = bt_alloc(1, sizeof *file);
     *file = (struct bt_snapshot_file){.path = bt_text_copy(path), .meaning = meaning, .dataset = -1};
     if (bt_h5_create(&file->h, path, err) == BT_OK) bt_h5_describe_file(&file->h, NULL);

@@ -220,7 +220,7 @@ static row *rows_of(const bt_world *world, int *n)
                 p->point = 2, p->disc = limits[j].flat[0];
                 memcpy(p->ends, limits[j].ends, sizeof p->ends);
             }
-            for (int i = 0; i < contact->n; i++) { // one friction impulse for both: distributed like the normal impulses
+            for (int i = 0; i < contact->n; i++) { // one friction impulse for both: shared like the normal impulses
                 row *p = &rows[(*n)++];
                 *p = begin_row(world, contact, i);
                 p->bias = contact->bias[i], p->mu = contact->mu;
