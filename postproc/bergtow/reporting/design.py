@@ -425,7 +425,7 @@ def options(p):
                                           "150 degrees, to either side"),
                    default=math.radians(answer.BEND), metavar="DEG", help="angle of the course change, degrees "
                    f"(default: {answer.BEND:g}, assumed)")
-    p.add_argument("--bend-radius", type=measure("m"), metavar="M", help="its radius (default: ten body lengths, "
+    p.add_argument("--bend-radius", type=measure("m"), metavar="M", help="its radius (default: ten body widths, "
                    "assumed)")
     p.add_argument("--no-load-cases", action="store_true", help="no runs of load cases and ranges: closed forms alone")
     domain_width.add_option(p)

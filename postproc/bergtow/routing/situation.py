@@ -89,7 +89,7 @@ def position(text, place, option):
         values = dict(zip(sides, (number(part[:-1], "", option) for part in parts)))
         degrees = [values.get("E", -values.get("W", 0.0)), values.get("N", -values.get("S", 0.0))]
         if abs(degrees[0]) > 360 or abs(degrees[1]) > 90:
-            raise RunError(f"{option} {text}", "is no place on the earth", "longitudes go to 180, latitudes to 90",
+            raise RunError(f"{option} {text}", "is no place on the earth", "longitudes go to 360, latitudes to 90",
                            USAGE)
         return tuple(map(float, place.metres([degrees])[0]))
     return tuple(number(part, "m", option) for part in parts)
