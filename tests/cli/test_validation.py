@@ -57,7 +57,7 @@ def test_every_value_says_where_it_is_from(name):
     assert marked > 8
 
 
-@pytest.mark.parametrize("heading", ["Arching", "Cover", "Ship"])
+@pytest.mark.parametrize("heading", ["Arching", "Ice cover", "Ship"])
 def test_a_section_has_all_it_needs(heading):
     section = re.search(rf"^## {heading}.*?\n(.*?)(?=^## |\Z)", PAGE, re.S | re.M)[1]
     for word in ("Source", "Set-up", "Assumed", "Expected", "Found", "Verdict"):
