@@ -28,7 +28,7 @@ def quantities() -> dict[str, Any]:
     return copy.deepcopy(_library.listed("quantities"))
 
 
-#: units in which values are read here, where a case file takes a bare number in another unit
+#: units of numbers in Python that differ from those of bare numbers in a case file
 _SI = {"deg": "rad", "deg/s": "rad/s", "-": ""}
 
 

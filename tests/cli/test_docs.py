@@ -16,6 +16,7 @@ from bergtow import cli
 from harness import BERGTOW, DONE, ROOT, call
 
 sys.path.insert(0, str(ROOT / "docs"))
+import stage  # noqa: E402
 import tables  # noqa: E402
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -319,3 +320,13 @@ def test_the_force_law_of_the_page_is_the_one_that_is_tested():
     page = (ROOT / "docs/how-to-add-a-force-law.md").read_text()
     first = next(lines for language, lines in blocks(page) if language == "c")
     assert first == (ROOT / "tests/examples/force_law.c").read_text().splitlines()
+
+
+def test_every_linked_page_is_in_the_contents(tmp_path):
+    """Red with a link to a page that no table of contents names: the manual is then refused (docs/build.py)."""
+    stage.stage(tmp_path)
+    listed = {(page.parent / f"{name}.md").resolve() for page in (ROOT / "docs").rglob("*.md")
+              for block in re.findall(r":::\{toctree\}(.*?):::", page.read_text(), re.S)
+              for name in re.findall(r"^[\w./-]+$", block, re.M)}
+    linked = {ROOT / page.relative_to(tmp_path) for page in tmp_path.rglob("*.md")}
+    assert not {page for page in linked - listed if not page.is_relative_to(ROOT / "docs")}
