@@ -71,10 +71,8 @@ def settings(scene, n):
     if scene.startswith("compression"):
         return {"domain.width": f"{area / WALL_DISTANCE:.3f}"}
     side = math.sqrt(area + BERG_AREA)
-    return {
-        "domain.length": f"{side:.3f}", "domain.width": f"{side:.3f}", "body.x": f"{side / 4:.3f}",
-        "body.y": f"{side / 2:.3f}"
-    }
+    return {"domain.length": f"{side:.3f}", "domain.width": f"{side:.3f}", "body.x": f"{side / 4:.3f}",
+            "body.y": f"{side / 2:.3f}"}
 
 
 def flags(values):
@@ -97,10 +95,8 @@ def field_of(scene, n, o):
 def command(scene, n, ranks, threads, steps, o):
     values = dict(settings(scene, n), **o.set_keys, **{"ice.field": field_of(scene, n, o).resolve()})
     folder = o.out / "runs" / f"{scene}-{n}-{ranks}x{threads}"
-    words = [
-        o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads",
-        threads, "--steps", steps
-    ]
+    words = [o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads",
+             threads, "--steps", steps]
     if ranks > 1:
         words = ["mpirun", "-n", ranks, "--map-by", f"slot:PE={threads}", "--bind-to", "core", *words]
     return [str(w) for w in words], folder
@@ -351,10 +347,8 @@ def measure(o, with_ranks):
                     if isinstance(r, str):
                         fail(r)
                     if (r["ranks"], r["threads"]) != (ranks, threads):
-                        fail(
-                            f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × "
-                            f"{r['threads']}"
-                        )
+                        fail(f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × "
+                             f"{r['threads']}")
                     group.append(r)
             records += group
             for row in tables(group, triads):

@@ -410,8 +410,7 @@ def dataset(t, place, start, title):
 def write_netcdf(t, place, path, force, start, title):
     data = dataset(t, place, start, title)
     with writing.written(path, force) as new:
-        data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT",
-                       encoding={"time": {"_FillValue": None}})
+        data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT", encoding={"time": {"_FillValue": None}})
 
 
 # ---- the command

@@ -61,13 +61,9 @@ def draw_map(e, first, second):
         image = ax.pcolormesh(values, cmap=colours, norm=norm, edgecolor=style.PAPER, linewidth=0.6)
         for (i, j), v in np.ndenumerate(values):
             shade = image.norm(v) if np.isfinite(v) else 0
-            ax.text(j + 0.5,
-                    i + 0.5,
+            ax.text(j + 0.5, i + 0.5,
                     ("at least\n" if ax is axes[0] and least[i, j] else "") + texts(v) if np.isfinite(v) else "–",
-                    ha="center",
-                    va="center",
-                    fontsize=9.5,
-                    color=style.ON_DARK if shade > 0.5 else style.ON_LIGHT)
+                    ha="center", va="center", fontsize=9.5, color=style.ON_DARK if shade > 0.5 else style.ON_LIGHT)
         for set_ticks, key, some in ((ax.set_xticks, first, xs), (ax.set_yticks, second, ys)):
             times = reading(key, e.units[key])[0]
             set_ticks(np.arange(len(some)) + 0.5, [f"{times * v:.3g}" for v in some])
@@ -168,9 +164,7 @@ def pictures(e, options, conditions):
 def options(p):
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
     p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to put the pictures (default: DIR)")
-    p.add_argument("--format",
-                   choices=[s[1:] for s in writing.PICTURES],
-                   default="png",
+    p.add_argument("--format", choices=[s[1:] for s in writing.PICTURES], default="png",
                    help="kind of the files (default png)")
     loads.add_options(p)
     arguments.add_force(p)

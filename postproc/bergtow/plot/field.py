@@ -122,10 +122,7 @@ def draw(run, kind="speed", times=(), window="auto"):
 
 def options(p):
     arguments.add_run(p, "field.png")
-    p.add_argument("--colour",
-                   "--color",
-                   choices=COLOURS,
-                   default="speed",
+    p.add_argument("--colour", "--color", choices=COLOURS, default="speed",
                    help="what colours the floes (default: speed)")
     p.add_argument("--times", metavar="T", type=float, nargs="+", default=(),
                    help="draw the frames nearest to these times, s, in place of first, middle and last")

@@ -152,10 +152,8 @@ def write_gif(film, frames, fps, path):
 
     Pixels that do not change get the 256th index, transparent: their long runs need almost no space.
     """
-    picked = [
-        film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,
-                                                                          len(frames) - 1, min(4, len(frames)))
-    ]
+    picked = [film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,
+                                                                                len(frames) - 1, min(4, len(frames)))]
     palette = Image.fromarray(np.concatenate(picked)).quantize(255, method=Image.Quantize.MEDIANCUT)
     colours = palette.getpalette()[:765] + [0, 0, 0]
 
@@ -170,29 +168,16 @@ def write_gif(film, frames, fps, path):
             yield picture
 
     film_of = pictures()
-    next(film_of).save(path,
-                       format="GIF",
-                       save_all=True,
-                       append_images=film_of,
-                       duration=max(20, round(1000 / fps)),
-                       loop=0,
-                       optimize=False,
-                       comment=writing.MARK.encode(),
-                       transparency=255,
-                       disposal=1)
+    next(film_of).save(path, format="GIF", save_all=True, append_images=film_of, duration=max(20, round(1000 / fps)),
+                       loop=0, optimize=False, comment=writing.MARK.encode(), transparency=255, disposal=1)
 
 
 def options(p):
     arguments.add_run(p, "film.mp4")
-    p.add_argument("--colour",
-                   "--color",
-                   choices=COLOURS,
-                   default="speed",
+    p.add_argument("--colour", "--color", choices=COLOURS, default="speed",
                    help="what colours the floes (default: speed)")
     p.add_argument("--fps", type=float, default=20, help="frames per second (default: 20)")
-    p.add_argument("--frames",
-                   metavar="N",
-                   type=int,
+    p.add_argument("--frames", metavar="N", type=int,
                    help="at most N frames, evenly spaced (default: all, 120 for a GIF)")
     p.add_argument("--width", metavar="PX", type=int, help="width in pixels (default: 1280, 900 for a GIF)")
     p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",

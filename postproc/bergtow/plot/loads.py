@@ -35,11 +35,7 @@ def draw_exceedance(e, options, tails=None):
             continue
         conversions.update(h[4] for h in hits)
         top, least = max(top, peaks[0]), min(least, peaks[some_above][-1])
-        axes.plot(peaks[some_above],
-                  rate[some_above],
-                  color=colour,
-                  drawstyle="steps-post",
-                  linewidth=1.4,
+        axes.plot(peaks[some_above], rate[some_above], color=colour, drawstyle="steps-post", linewidth=1.4,
                   label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
         tail = tails[c.index] if tails else extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
@@ -47,10 +43,7 @@ def draw_exceedance(e, options, tails=None):
             beyond = np.maximum(1 + tail["shape"] * (z - tail["threshold"]) / tail["scale"], 0)
             fitted = tail["rate_per_hour"] * (np.exp(-(z - tail["threshold"]) / tail["scale"])
                                               if abs(tail["shape"]) < 1e-8 else beyond**(-1 / tail["shape"]))
-            axes.plot(z,
-                      np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan),
-                      color=colour,
-                      linewidth=1,
+            axes.plot(z, np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan), color=colour, linewidth=1,
                       dashes=(4, 2))
     if not conversions:
         return None

@@ -206,11 +206,7 @@ class Scene:
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         self._corners = corners
         kept = dict(animated=animated)
-        self._water = Polygon(self._flat(corners),
-                              closed=True,
-                              facecolor=style.WATER,
-                              edgecolor="none",
-                              zorder=0,
+        self._water = Polygon(self._flat(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0,
                               **kept)
         width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10

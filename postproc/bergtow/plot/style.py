@@ -50,11 +50,9 @@ HALO = "#fefefe"
 ON_DARK, ON_LIGHT = "#fefefe", "#1d2732"
 JAM = "#c1121f"
 #: {colour: its replacement on a dark page}; all other colours stay the same there
-DARK = {
-    PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
-    ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
-    JAM: "#ff6b6b", "#c2417c": "#f078ac", "#1b4f9c": "#6f9fe8", "#7a5b00": "#cfa63a", RAFTED: "#d45fb4"
-}
+DARK = {PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
+        ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
+        JAM: "#ff6b6b", "#c2417c": "#f078ac", "#1b4f9c": "#6f9fe8", "#7a5b00": "#cfa63a", RAFTED: "#d45fb4"}
 
 #: floes by speed: ice at rest is white, moving ice turns vermilion
 SPEED_MAP = LinearSegmentedColormap.from_list("speed", ["#eaf3f8", "#f6dfae", "#f2a541", "#dd5f1b", "#a62a0c"])

@@ -86,31 +86,14 @@ def draw_fields(axes, e, some, key, factor, log_x):
         draw_members(axes, e, c.finished[order], at, y[order] / factor)
     centre = np.array([y.mean() for y in means])
     if np.isfinite(band).all() and len(x) > 1:
-        axes.fill_between(x,
-                          band[:, 0] / factor,
-                          band[:, 1] / factor,
-                          color=style.ICE,
-                          alpha=0.13,
-                          linewidth=0,
+        axes.fill_between(x, band[:, 0] / factor, band[:, 1] / factor, color=style.ICE, alpha=0.13, linewidth=0,
                           zorder=2)
     axes.plot(x, centre / factor, color=style.ICE, linewidth=1.4, zorder=4)
     half_bar = np.nan_to_num(np.abs(band - centre[:, None])).T / factor
-    axes.errorbar(x,
-                  centre / factor,
-                  yerr=half_bar,
-                  fmt="s",
-                  color=style.ICE,
-                  markersize=5,
-                  capsize=3,
-                  linewidth=1.3,
+    axes.errorbar(x, centre / factor, yerr=half_bar, fmt="s", color=style.ICE, markersize=5, capsize=3, linewidth=1.3,
                   zorder=5)
-    axes.plot(x, [np.median(y) / factor for y in means],
-              marker="_",
-              markersize=13,
-              markeredgewidth=2,
-              color=style.INK,
-              linestyle="none",
-              zorder=6)
+    axes.plot(x, [np.median(y) / factor for y in means], marker="_", markersize=13, markeredgewidth=2, color=style.INK,
+              linestyle="none", zorder=6)
     axes.plot(x[least], centre[least] / factor, "^", color=style.JAM, markersize=8, zorder=7)
 
 
@@ -164,18 +147,10 @@ def draw_speed(axes, e, some, key, factor):
     exponent, low, high, scale = law
     weights = np.array([len(y) for y in means], dtype=float)
     centre = np.exp(np.dot(weights, np.log(x)) / weights.sum())
-    axes.plot(v,
-                      scale * centre**exponent * (v / centre)**2 / factor,
-                      color=style.TOW,
-                      linewidth=1.2,
-                      dashes=(5, 2),
-                      zorder=2.5,
-                      label="∝ V², through the middle of the fields")
-    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03),
-                  xycoords="axes fraction",
-                  ha="right",
-                  fontsize=9,
-                  color=style.FAINT)
+    axes.plot(v, scale * centre**exponent * (v / centre)**2 / factor, color=style.TOW, linewidth=1.2, dashes=(5, 2),
+              zorder=2.5, label="∝ V², through the middle of the fields")
+    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03), xycoords="axes fraction",
+                  ha="right", fontsize=9, color=style.FAINT)
 
 
 def draw_estimates(axes, e, some, key, factor):
@@ -209,12 +184,8 @@ def draw_sweep(e, key):
     log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero cannot be shown on a logarithmic axis
     low, high = force_limits(e, shown, log_y)
     factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
-    figure, grid = style.subplots(rows,
-                                columns,
-                                figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2),
-                                squeeze=False,
-                                sharex=True,
-                                sharey=True)
+    figure, grid = style.subplots(rows, columns, figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2), squeeze=False,
+                                  sharex=True, sharey=True)
     extra, lost = {}, {}
     for axes, (words, some) in zip(grid.flat, shown):
         draw_fields(axes, e, some, key, factor, log_x)
@@ -259,17 +230,10 @@ def draw_sweep(e, key):
     wide, height = figure.get_size_inches()
     note = textwrap.wrap(note, int(13.5 * wide))  # letters of 9 points in an inch
     lines, below = -(-len(pairs) // 3), 0.15 * max(0, len(note) - 1)
-    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0],
-                           right=0.98,
-                           top=1 - 0.95 / height,
-                           bottom=(0.95 + below + 0.24 * lines) / height,
-                           wspace=0.08,
-                           hspace=0.28)
-    figure.legend([h for h, _ in pairs], [t for _, t in pairs],
-                  loc="lower left",
-                  bbox_to_anchor=(0.02, (0.22 + below) / height),
-                  ncol=3,
-                  fontsize=9)
+    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0], right=0.98, top=1 - 0.95 / height,
+                           bottom=(0.95 + below + 0.24 * lines) / height, wspace=0.08, hspace=0.28)
+    figure.legend([h for h, _ in pairs], [t for _, t in pairs], loc="lower left",
+                  bbox_to_anchor=(0.02, (0.22 + below) / height), ncol=3, fontsize=9)
     figure.text(0.025, 0.08 / height, "\n".join(note), fontsize=9, color=style.FAINT)
     headline(figure, e, f"resistance against {short_key(key)}")
     return figure
@@ -291,21 +255,10 @@ def draw_scatter(e, key):
     if bins:
         centre = np.array([means[b].mean() for b in bins])
         bars = np.abs(np.array([stat_mean.t_interval(means[b]) for b in bins]) - centre[:, None]).T
-        axes.errorbar([at[b].mean() for b in bins],
-                      centre / factor,
-                      yerr=bars / factor,
-                      fmt="s-",
-                      color=style.INK,
-                      markersize=5,
-                      capsize=3,
-                      linewidth=1.2,
-                      label="mean of a bin of conditions, 95 % (t)")
-        axes.plot([at[b].mean() for b in bins], [np.median(means[b]) / factor for b in bins],
-                  "_",
-                  color=style.TOW,
-                  markersize=14,
-                  markeredgewidth=2,
-                  label="median of a bin")
+        axes.errorbar([at[b].mean() for b in bins], centre / factor, yerr=bars / factor, fmt="s-", color=style.INK,
+                      markersize=5, capsize=3, linewidth=1.2, label="mean of a bin of conditions, 95 % (t)")
+        axes.plot([at[b].mean() for b in bins], [np.median(means[b]) / factor for b in bins], "_", color=style.TOW,
+                  markersize=14, markeredgewidth=2, label="median of a bin")
     if log_y:
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)

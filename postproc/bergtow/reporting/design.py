@@ -148,10 +148,8 @@ def varied(a, found):
 def write_study(a, case, repeats, wider):
     """Write the study of a case, DIR/design.yml. wider: domain.width by concentration, see widths. Raises RunError."""
     values = [] if reads_ice(case) else a.concentrations or []
-    study = {
-        "title": a.title or title_of(case, a.file.stem, values),
-        "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed
-    }
+    study = {"title": a.title or title_of(case, a.file.stem, values),
+             "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed}
     parameters = {"ice.concentration": values} if values else {}
     fitting = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
     if a.by_speed:

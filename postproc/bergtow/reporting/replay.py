@@ -118,8 +118,7 @@ class Replay:
             "n": len(floes), "n_floes": run.n_floes, "geographic": run.geographic, "box": list(run.box),
             "period": list(run.period), "moving": run.case.get("domain.ends") == "moving", "quanta": self.quanta,
             "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
-            "edges": [run.case.get("domain.ends", ""),
-                      run.case.get("domain.sides", "")],
+            "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
             "style": {k.lower(): getattr(style, k)
                       for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")
                       }, "rafts": run.value("ice.rafting.kappa", 0) > 0, **self._bodies(frames), "curve": curve(run)
@@ -234,11 +233,9 @@ class Replay:
         if run.towed is not None:
             self._unwrap(poses[:, run.towed], frames)
         self.blobs["body_pose"] = pack(poses, self.compress)
-        out = {
-            "bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()}
-                       for b in run.bodies], "towed": run.towed, "follow": False, "view": None, "heading": None,
-            "line": None, "vessel": run.case.get("tow.mode") == "thrust", "track": None, "window_low": None
-        }
+        out = {"bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()}
+                          for b in run.bodies], "towed": run.towed, "follow": False, "view": None, "heading": None,
+               "line": None, "vessel": run.case.get("tow.mode") == "thrust", "track": None, "window_low": None}
         if run.towed is None:
             return out
         heading = tow_heading(run)
@@ -251,10 +248,8 @@ class Replay:
             out["line"] = [line.round(5).tolist() for line in lines]
         if "body_x" in run and len(run["time"]):
             kept = thinned(len(run["time"]), TRACK)
-            out["track"] = {
-                "time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
-                "y": run["body_y"][kept].round(5).tolist()
-            }
+            out["track"] = {"time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
+                            "y": run["body_y"][kept].round(5).tolist()}
         if "window_x" in run and np.isfinite(run["window_x"]).any():
             sample = self._samples(frames)
             out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()

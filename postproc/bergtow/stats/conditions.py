@@ -21,10 +21,8 @@ MOST_SAMPLES = 300  # of a condition's series, to which distributions are fitted
 
 
 #: the options of statistics(): the defaults of bergtow statistics
-DEFAULTS = {
-    "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
-    "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
-}
+DEFAULTS = {"error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
+            "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY}
 
 
 def member(e, m):
@@ -88,10 +86,8 @@ def extremes(e, rows, options):
         hits = e.impacts(m)
         if hits:
             time, peak, start, hours, conversion = hits
-            fields.append({
-                "time": time, "peak": peak, "start": start, "hours": hours,
-                "gap": 2 * e.number("window_correlation_time_s", m)
-            })
+            fields.append({"time": time, "peak": peak, "start": start, "hours": hours,
+                           "gap": 2 * e.number("window_correlation_time_s", m)})
             conversions.add(conversion)
     if not fields:
         return {"refused": "no collisions: the members' folders are not there, or impact.conversion was none"}
@@ -122,10 +118,7 @@ def drift(e, rows, mean):
         f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} "
         f"(95 %: {short(min(abs(low), abs(high)) / factor)} to {short(max(abs(low), abs(high)) / factor)})"
     ) if moved else "no drift"
-    return {
-        "verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high),
-        "words": words
-    }
+    return {"verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high), "words": words}
 
 
 def condition(e, c, members, options):
@@ -187,10 +180,8 @@ def sensitivity(e, members):
         return {"refused": "nothing is varied" if not varied else f"{len(y)} {of}, needs 8"}
     logs = stat_sensitivity.sobol(
         varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
-    return {
-        "members": len(e.used), "samples": len(y), "of": of, "ranks": stat_sensitivity.rank_correlations(varied, y),
-        "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs
-    }
+    return {"members": len(e.used), "samples": len(y), "of": of, "ranks": stat_sensitivity.rank_correlations(varied, y),
+            "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
 
 
 def nothing_to_count(e, dropped):

@@ -79,8 +79,7 @@ def trial(run, number, least):
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer", CASE)
     if np.sum(within(run["time"], *run.window)) < 2:
-        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less",
-                       CASE)
+        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less", CASE)
     if run.at_least:
         raise RunError(run.path, "the load of the body has no bound in some steps of the window",
                        "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)

@@ -31,30 +31,26 @@ def unit_of(s):
 
 def means(s):
     factor, unit = unit_of(s)
-    head = [
-        "condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
-        "standard error in a run", "largest field's share", f"fields for {100 * s['wanted_error']:g} %", "doubts"
-    ]
+    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
+            "standard error in a run", "largest field's share", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
     rows = []
     for c in s["conditions"]:
         r = c["resistance"]
         if not r["n"]:
             rows.append([c["label"], fields_cell(c)] + ["–"] * (len(head) - 3) + [doubts(c)])
             continue
-        rows.append([
-            c["label"],
-            fields_cell(c),
-            number(r["mean"] / factor),
-            pair(r["t_95"], factor),
-            pair(r["bootstrap_95"], factor),
-            number(r["median"] / factor),
-            number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–",
-            number(r["sd_between"] / factor),
-            number(r["se_within"] / factor),
-            f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
-            f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
-            doubts(c)
-        ])
+        rows.append([c["label"],
+                     fields_cell(c),
+                     number(r["mean"] / factor),
+                     pair(r["t_95"], factor),
+                     pair(r["bootstrap_95"], factor),
+                     number(r["median"] / factor),
+                     number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–",
+                     number(r["sd_between"] / factor),
+                     number(r["se_within"] / factor),
+                     f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
+                     f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
+                     doubts(c)])
     note = (
         "95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth "
         "of the fields at each end (from 8 fields on). "
@@ -84,10 +80,8 @@ def estimates(s):
             text = number(e["force"] / factor) + ("" if e["valid"] or not np.isfinite(e["force"]) else "*")
             cells.append(text + (f" ({number(e['ratio'])})" if np.isfinite(e["ratio"]) else ""))
         rows.append(cells)
-    on_top = [
-        f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
-        if s["conditions"][0]["estimates"][name]["on_top"]
-    ]
+    on_top = [f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
+              if s["conditions"][0]["estimates"][name]["on_top"]]
     note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
             "* outside the range the estimate is meant for. –: no value there. The estimates were not made for each "
             "other's conditions and can differ tenfold; none has been checked against a measured tow here.")
@@ -117,25 +111,18 @@ def extremes(s):
     some = [c for c in s["conditions"] if "refused" not in c["extremes"]]
     if not some:
         return [["No peaks: " + s["conditions"][0]["extremes"]["refused"] + "."]]
-    hours = [
-        level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
-        for level in c["extremes"][kind].get("levels", [])
-    ]
+    hours = [level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
+             for level in c["extremes"][kind].get("levels", [])]
     hours = sorted(set(hours))
-    factor, unit = scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]],
-                               "N")
-    head = [
-        "condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
-        *(f"once in {T:g} h" for T in hours)
-    ]
+    factor, unit = scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]], "N")
+    head = ["condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
+            *(f"once in {T:g} h" for T in hours)]
     rows, short = [], []
     for c in some:
         x = c["extremes"]
-        first = [
-            f"{x['hours']:.3g}",
-            number(x["collisions_per_hour"]),
-            number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"
-        ]
+        first = [f"{x['hours']:.3g}",
+                 number(x["collisions_per_hour"]),
+                 number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"]
         for kind, label in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
             f = x[kind]
             if "refused" in f:
@@ -143,12 +130,10 @@ def extremes(s):
                 continue
             at = {level["hours"]: level for level in f["levels"]}
             short += loads_text.cut(c["label"], f, x["hours"])
-            rows.append([
-                c["label"], label, *first,
-                f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
-                number(f["p_value"], 2),
-                *(loads_text.level(at.get(T), factor) for T in hours)
-            ])
+            rows.append([c["label"], label, *first,
+                         f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
+                         number(f["p_value"], 2),
+                         *(loads_text.level(at.get(T), factor) for T in hours)])
     refused = {
         f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}"
         for c in some
@@ -188,10 +173,8 @@ def sensitivity(s):
             cells += [f"{number(i[what], 2)} ({pair(i[f'{what}_95'])})" for what in ("first",
                                                                                      "total")] if i else ["–", "–"]
         rows.append(cells)
-    head = [
-        "parameter", "Spearman", "PRCC",
-        *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))
-    ]
+    head = ["parameter", "Spearman", "PRCC",
+            *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))]
     notes = [(f"{counted(x['members'])}. " if x["of"] == "members" else
               f"Means of {counted(x['samples'], 'condition')}, of {counted(x['members'])}. ") + "Brackets: 95 %."]
     for of, k in kinds:
@@ -214,10 +197,8 @@ def members(s, markdown):
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
     lines = [(f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."]
     if s["waiting"]:
-        lines.append(
-            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
-            f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields."
-        )
+        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
+                     f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields.")
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
         lines.append(
@@ -261,11 +242,9 @@ def members(s, markdown):
             f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
             f"no folder here ({listed(s['members_without_folder'])}): the peaks of their collisions are not known."
         )
-    heavy = [
-        c["label"]
-        for c in s["conditions"]
-        if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5
-    ]
+    heavy = [c["label"]
+             for c in s["conditions"]
+             if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
     return lines
