@@ -126,13 +126,11 @@ def run_once(scene, n, ranks, threads, steps, o):
 
 def record(scene, n, s, contact_sweeps, peak_memory):
     """The numbers of one run that the tables are made of."""
-    r = {
-        "scene": scene, "asked": n, "floes": s["n_floes"], "ranks": s["ranks"], "threads": s["threads"],
-        "steps": s["n_steps"], "dt": s["dt_s"], "wall": s["wall_time_s"], "ns": s["ns_per_floe_step"],
-        "phases": s["phases_s"], "sweeps": s["mean_sweeps"], "contacts": s["contacts_mean"],
-        "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
-        "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None
-    }
+    r = {"scene": scene, "asked": n, "floes": s["n_floes"], "ranks": s["ranks"], "threads": s["threads"],
+         "steps": s["n_steps"], "dt": s["dt_s"], "wall": s["wall_time_s"], "ns": s["ns_per_floe_step"],
+         "phases": s["phases_s"], "sweeps": s["mean_sweeps"], "contacts": s["contacts_mean"],
+         "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
+         "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None}
     r["step"] = sum(t for name, t in r["phases"].items() if name != "output") / max(1, r["floes"] * r["steps"])
     r.update({name: s.get(key) for name, key in FROM_SUMMARY.items()})
     if r["memory"] is None and peak_memory:
@@ -297,11 +295,7 @@ def options():
     p.add_argument("--steps", type=int, help="steps of every run, instead of the scene's own number")
     p.add_argument("--repeats", type=int, help="runs of each configuration")
     p.add_argument("--cores", type=int, default=len(os.sched_getaffinity(0)), help="use at most so many (default: all)")
-    p.add_argument("--set",
-                   action="append",
-                   default=[],
-                   metavar="KEY=VALUE",
-                   dest="set_keys",
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="set_keys",
                    help="a case key for every run, not for its field; "
                    "solver.max_sweeps=50 with solver.tolerance=1e-9 gives every size the same sweeps")
     p.add_argument("--out", type=Path, default=ROOT / "build/bench", help="folder of tables, plot and cached fields")

@@ -136,12 +136,10 @@ def rows(points):
         mean = at_least.of(means.mean(), [p.mean for p in some])
         if isinstance(mean, at_least.AtLeast):
             se = low = high = np.nan
-        out.append({
-            "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": mean,
-            "drift": stat_drift.of([p.change for p in some], means.mean()),
-            "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
-            "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)
-        })
+        out.append({"concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": mean,
+                    "drift": stat_drift.of([p.change for p in some], means.mean()),
+                    "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
+                    "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)})
     return out
 
 
@@ -292,12 +290,9 @@ def write_around(figure, points, lost, hidden):
         va="top",
         fontsize=13.5,
         fontweight="bold")
-    figure.text(0.02,
-                0.94,
+    figure.text(0.02, 0.94,
                 f"{e['thickness_m']:.3g} m of ice, body {e['width_m']:.3g} m across, {e['speed_along_m_s']:.3g} m/s "
-                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}",
-                va="top",
-                color=style.FAINT)
+                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}", va="top", color=style.FAINT)
     notes = ["dotted: outside the range", "the estimate is meant for", "band: its range, where it has one"]
     notes += ["out of the picture:", *lost] if lost else []
     if e["length_scale"] != 1:

@@ -67,17 +67,15 @@ TOWED_BY, SLOWER = {"line": " on a line", "thrust": " by a vessel"}, 0.05
 DPI = 150
 MANY = 20000  #: samples, or floe vertices, above which a vector drawing embeds them as an image
 
-LOOK = {
-    "font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
-    "axes.labelsize": 10.5, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.titlepad": 6,
-    "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.axisbelow": True,
-    "axes.spines.top": False, "axes.spines.right": False,
-    "axes.grid": False, "grid.color": GRID, "grid.linewidth": 0.7,
-    "xtick.color": FAINT, "ytick.color": FAINT, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
-    "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "xtick.major.width": 0.8, "ytick.major.width": 0.8,
-    "legend.frameon": False, "legend.fontsize": 9.5, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
-    "figure.dpi": DPI, "savefig.dpi": DPI, "figure.facecolor": PAPER, "svg.fonttype": "none", "pdf.fonttype": 42,
-}
+LOOK = {"font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
+        "axes.labelsize": 10.5, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.titlepad": 6,
+        "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.axisbelow": True,
+        "axes.spines.top": False, "axes.spines.right": False,
+        "axes.grid": False, "grid.color": GRID, "grid.linewidth": 0.7,
+        "xtick.color": FAINT, "ytick.color": FAINT, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
+        "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "xtick.major.width": 0.8, "ytick.major.width": 0.8,
+        "legend.frameon": False, "legend.fontsize": 9.5, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
+        "figure.dpi": DPI, "savefig.dpi": DPI, "figure.facecolor": PAPER, "svg.fonttype": "none", "pdf.fonttype": 42}
 
 
 @contextmanager

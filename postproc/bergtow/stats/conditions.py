@@ -33,12 +33,10 @@ def member(e, m):
     se, share = within.se, e.number("window_no_load_share", m)
     if share > 0:
         mean, se, low, high = at_least.AtLeast(mean, share), np.nan, np.nan, np.nan
-    return {
-        "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
-        "se_within": se, "within_95": (mean + low - within.mean, mean + high - within.mean),
-        "independent": independent if np.isfinite(independent) else within.n_eff,
-        "tau_samples": within.tau, "doubts": sorted(e.doubts(m))
-    }
+    return {"name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
+            "se_within": se, "within_95": (mean + low - within.mean, mean + high - within.mean),
+            "independent": independent if np.isfinite(independent) else within.n_eff,
+            "tau_samples": within.tau, "doubts": sorted(e.doubts(m))}
 
 
 def samples(e, rows, members):
@@ -216,12 +214,10 @@ def statistics(e, options):
         raise nothing_to_count(e, dropped)
     members = {int(m): member(e, m) for m in progress.each("mean of member", e.used)}
     conditions = [condition(e, c, members, options) for c in progress.each("statistics of condition", e.conditions())]
-    return {
-        "title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
-        "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
-        "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
-        "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
-        "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
-        "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
-        "convergence": findings.read("converge", e.path)
-    }
+    return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
+            "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
+            "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
+            "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
+            "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
+            "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
+            "convergence": findings.read("converge", e.path)}

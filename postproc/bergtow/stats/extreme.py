@@ -175,15 +175,13 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
         return stat_fit.Frozen(scipy.stats.genpareto, k, scale=s)
     frozen = stat_fit.Frozen(scipy.stats.genpareto, shape, scale=scale)
     statistic = stat_fit.anderson_darling(excess, frozen.cdf)
-    return {
-        "threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
-        "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
-        "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
-        "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
-                                    resamples), "interval": interval_note(len(fields)),
-        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
-                   for T, (z, ends) in zip(hours_of_levels, levels)]
-    }
+    return {"threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
+            "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
+            "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
+            "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
+                                        resamples), "interval": interval_note(len(fields)),
+            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
+                       for T, (z, ends) in zip(hours_of_levels, levels)]}
 
 
 def interval_note(fields):

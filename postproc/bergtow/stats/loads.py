@@ -258,21 +258,17 @@ def panels(e, rows):
         return None
     def over(x):
         return np.array([stat_load.mean_over_fields(column, 0.0) for column in np.array(x).T])
-    return {
-        "units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
-        "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
-        "mean_of_largest_95": over(largest),
-        "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360
-    }
+    return {"units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
+            "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
+            "mean_of_largest_95": over(largest),
+            "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360}
 
 
 def add_options(p):
     """Add the options of the statistics of loads, and --exclude."""
     p.add_argument("--exclude", action="append", choices=EXCLUDABLE, default=[],
                    help="leave out members with this doubt, and name them; may be repeated")
-    p.add_argument("--time-scale",
-                   type=above_zero,
-                   metavar="S",
+    p.add_argument("--time-scale", type=above_zero, metavar="S",
                    help="loads are moving means over this time, s (default: 30 at full scale, by Froude's law at model "
                         "scale: stats/loads.py says why)")
     p.add_argument("--tow-hours", type=above_zero, metavar="H",

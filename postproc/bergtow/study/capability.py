@@ -389,15 +389,13 @@ def perform(a):
     # a key whose default follows from a varied key varies with it
     alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
     title = case.get("run.title", "none")
-    found = {
-        "case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
-        "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
-        "range": [start, end], "resolution": resolution, "for": across,
-        "for_unit": case.get(across, "").partition(" ")[2],
-        "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
-        "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
-        "conditions": [found_of(c, least) for c in some]
-    }
+    found = {"case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
+             "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
+             "range": [start, end], "resolution": resolution, "for": across,
+             "for_unit": case.get(across, "").partition(" ")[2],
+             "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
+             "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
+             "conditions": [found_of(c, least) for c in some]}
     if not any(any(c.trials.values()) for c in some):
         runs.tell_failed()
         raise RunError(folder, "the budget does not reach for a run", "raise --budget; the same call continues", SIGNAL)
