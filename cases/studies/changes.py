@@ -165,8 +165,7 @@ def main():
     p.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("changes.png"))
     arguments.add_force(p)
     a = p.parse_args()
-    if a.output.suffix.lower() not in writing.PICTURES:
-        p.error(f"{a.output}: unknown kind of file; end the name in {', '.join(writing.PICTURES)}")
+    arguments.ends_in(a.output, writing.PICTURES)
     writing.may_write(a.output, a.force)
     studies = [named(text) for text in (a.base, *a.others)]
     if len(studies) > len(LINES):

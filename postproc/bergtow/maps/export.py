@@ -15,7 +15,6 @@ Trajectories: discrete sampling geometry of CF-1.8, in the classic NetCDF format
 import argparse
 import csv
 import datetime
-import json
 import math
 import re
 import shutil
@@ -265,17 +264,16 @@ def _rows(layer):
 
 def geojson(layer, place):
     """The text, with the head that `bergtow outlines` and `bergtow field` write: frame and origin for ice.outlines."""
-    head = {"type": "FeatureCollection", "made_by": writing.MARK,
-            "bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
+    head = {"bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
     if not place.degrees:
         head["crs"] = {"type": "name", "properties": {"name": place.crs or map_read.local_crs()}}
     lines = []
     for properties, at in _rows(layer):
         where = (place.coordinates(at[0]).tolist() if layer.geometry == "Point" else
                  [place.ring(at).tolist()] if layer.geometry == "Polygon" else place.coordinates(at).tolist())
-        lines.append(json.dumps({"type": "Feature", "properties": properties, "geometry": {
-            "type": layer.geometry, "coordinates": where}}, allow_nan=False))
-    return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
+        lines.append({"type": "Feature", "properties": properties,
+                      "geometry": {"type": layer.geometry, "coordinates": where}})
+    return writing.collection(head, lines)
 
 
 def write_ogr(layers, place, path, driver):
@@ -458,7 +456,7 @@ def perform(a):
         if not (kind == ".shp" and file == path and path.with_suffix(".dbf").exists()):
             writing.may_write(file, a.force)
     if kind in (".gpkg", ".shp"):
-        map_read.need_libraries()
+        map_read.need()
     with Run(a.run) as run:
         place = Place.of(run)
         frames = frames_of(run, a.time or ("all" if trajectories else "last"))

@@ -3,7 +3,7 @@
 import textwrap
 
 from bergtow import arguments, writing
-from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.result.run import Run
 
@@ -227,12 +227,10 @@ def options(p):
     arguments.add_run(p, "force.png")
     p.add_argument("--diagnostics", action="store_true",
                    help="also draw contacts, sweeps, residual and overlap, in a second file (NAME-diagnostics)")
-    p.add_argument("--max", metavar="N", type=float, help="upper end of the force axes, N")
+    p.add_argument("--max", metavar="N", type=arguments.above_zero, help="upper end of the force axes, N")
 
 
 def perform(a):
-    if a.max is not None and not 0 < a.max < np.inf:
-        raise BergtowError("--max: choose a force above 0", USAGE)
     path = arguments.output(a, "force.png", writing.PICTURES)
     second = path.with_name(f"{path.stem}-diagnostics{path.suffix}")
     if a.diagnostics:

@@ -144,6 +144,22 @@ def view_body(run):
     return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
 
 
+def framed(run, window):
+    """(does the view follow the towed body, the view) for a --window. Raises RunError."""
+    follow = window == "body" or (window == "auto" and needs_window(run))
+    if follow and run.towed is None:
+        raise RunError(run.result, "has no towed body", "use --window whole")
+    return follow, view_body(run) if follow else view_whole(run)
+
+
+def add_options(p):
+    p.add_argument("--colour", "--color", choices=COLOURS, default="speed",
+                   help="what colours the floes (default: speed)")
+    p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
+                   help="the whole domain, or a window that moves with the body (default: auto, the body in long "
+                   "domains)")
+
+
 def tow_line(run, frame, position):
     """[n, 2] m: hull, towing end and, with two branches, hull again, for a towed body at a position; only the towing
     end if all branches have broken.
@@ -266,8 +282,7 @@ class Scene:
     def show(self, frame):
         """Update the artists to a frame."""
         run = self.run
-        if not run.n_frames:
-            raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+        run.need_frames()
         position, centre = np.zeros(2), None
         if run.towed is not None:
             position = run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2])[0]

@@ -106,8 +106,7 @@ class Replay:
     """
 
     def __init__(self, run, limit=LIMIT, compress=True):
-        if not run.n_frames:
-            raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+        run.need_frames()
         self.run, self.compress, self.notes = run, compress, []
         frames, floes = self._fit(limit)
         self.frames, self.floes = frames, floes

@@ -313,7 +313,8 @@ def options(p):
     p.add_argument("--resolution", metavar="V", help="width of the bracket at which the search ends (default: "
                    f"1/{PARTS} of the range)")
     p.add_argument("--for", dest="conditions", metavar="KEY=V,V", help="search under each of these values")
-    p.add_argument("--speed", metavar="V", help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
+    p.add_argument("--speed", type=measure("m/s"), metavar="V",
+                   help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
     p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
                    "(default 0.5)")
     p.add_argument("--fields", type=whole_from(6, 1000), default=FIELDS, metavar="N",
@@ -323,14 +324,6 @@ def options(p):
                    "search alone)")
     domain_width.add_option(p)
     analysis.add_options(p, BUDGET)
-
-
-def number(option, text, unit):
-    """A number with a unit from an option, read as the program reads it. Raises RunError."""
-    try:
-        return read(text, unit)
-    except BergtowError as error:
-        raise BergtowError(f"{option} {error}", USAGE) from None
 
 
 def check_options(a):
@@ -356,17 +349,16 @@ def perform(a):
     start, end = (value for _, value in ends)
     if start == end:
         raise RunError(a.search, "the range has no extent", "give --from and --to two values", USAGE)
-    unit, least = case.get(a.search, "").partition(" ")[2], STOPPED * case_value(case, "tow.speed")
+    unit, least = case.get(a.search, "").partition(" ")[2], a.speed or STOPPED * case_value(case, "tow.speed")
     resolution = abs(end - start) / PARTS
     if a.resolution:
-        resolution = number("--resolution", a.resolution, unit)
+        try:
+            resolution = read(a.resolution, unit)
+        except BergtowError as error:
+            raise BergtowError(f"--resolution {error}", USAGE) from None
         if not 0 < resolution <= abs(end - start):
             raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
                            f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
-    if a.speed:
-        least = number("--speed", a.speed, "m/s")
-        if not least > 0:
-            raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep", USAGE)
     last = began + 60 * a.budget
     runs = CaseRuns(a.case.resolve(), folder, "capability", binary, a.set, a.jobs, last, last)
     replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
