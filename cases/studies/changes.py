@@ -148,8 +148,7 @@ def draw(studies, of):
     above.set_ylabel(f"mean ice resistance, {unit}")
     above.legend(frameon=False, fontsize=9)
     below.axhline(0, color=style.INK, linewidth=0.8)
-    below.set_ylabel("change of the mean, %")
-    below.set_xlabel(axis)
+    below.set(ylabel="change of the mean, %", xlabel=axis)
     if texts:
         below.set_xticks(x, texts, rotation=30, ha="right", fontsize=8)
         figure.subplots_adjust(bottom=0.22)

@@ -250,16 +250,11 @@ def _pieces(xy, period):
 # ---- files
 
 
-def _value(v):
-    v = v.item() if isinstance(v, np.generic) else v
-    return None if isinstance(v, float) and not math.isfinite(v) else v
-
-
 def _rows(layer):
     """(properties, place) of each feature."""
     names, values = list(layer.columns), [v for _, v in layer.columns.values()]
     for k, place in enumerate(layer.places):
-        yield {name: _value(v[k]) for name, v in zip(names, values)}, place
+        yield {name: writing.plain(v[k]) for name, v in zip(names, values)}, place
 
 
 def geojson(layer, place):
@@ -358,7 +353,7 @@ def write_table(t, place, path, force):
         mark = writing.MARK  # written once: a table of all floes has millions of rows
         for i, name in enumerate(t.name):
             for k in np.flatnonzero(np.isfinite(at[i]).all(axis=1)):
-                row = [_value(v) for v in (t.time[k], *at[i, k], t.speed[i, k], t.thickness[i])]
+                row = writing.plain([t.time[k], *at[i, k], t.speed[i, k], t.thickness[i]])
                 table.writerow([name, *("" if v is None else repr(v) for v in row), mark])
                 mark = ""
 

@@ -179,10 +179,8 @@ def draw(run, c, whole=False):
         bar.set_label(f"impulse / time step ({unit})")
     axes.set_aspect("equal")
     low, high = turn(np.array([[x0, y0], [x1, y1]]))
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_xlabel("y, east (m)" if run.geographic else "x (m)")
-    axes.set_ylabel("x, north (m)" if run.geographic else "y (m)")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="y, east (m)" if run.geographic else "x (m)",
+             ylabel="x, north (m)" if run.geographic else "y (m)")
     words = (
         f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the force, "
         f"none below {10 ** -DECADES:.1g} of the largest"

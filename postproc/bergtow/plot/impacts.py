@@ -101,8 +101,7 @@ def draw_exceedance(axes, run):
     hits = run.impacts
     late = hits["time"] >= run.number("impacts.from_s")  # none without a window
     peaks, rate = exceedance(hits["peak"][late], run.number("impacts.hours"))
-    axes.set_xlabel(f"peak of a collision (N)\n{hits['conversion']}")
-    axes.set_ylabel("exceeded (per hour)")
+    axes.set(xlabel=f"peak of a collision (N)\n{hits['conversion']}", ylabel="exceeded (per hour)")
     axes.set_title("How often a peak is exceeded" + ", at least" * run.at_least, loc="left", fontsize=10.5)
     if not len(peaks) or peaks[0] <= 0:
         axes.annotate("no collisions in the window", (0.5, 0.5), xycoords="axes fraction", ha="center",

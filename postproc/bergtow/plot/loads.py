@@ -55,9 +55,8 @@ def draw_exceedance(e, options, tails=None):
     if not conversions:
         return None
     style.logarithmic(axes.xaxis, axes.yaxis)
-    axes.set_xlim(max(1e-4 * top, 0.7 * least), 3 * top)
-    axes.set_xlabel(f"peak of a collision (N), {by(conversions)}")
-    axes.set_ylabel("exceeded (per hour of tow)")
+    axes.set(xlim=(max(1e-4 * top, 0.7 * least), 3 * top), xlabel=f"peak of a collision (N), {by(conversions)}",
+             ylabel="exceeded (per hour of tow)")
     notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
     return finished(e, axes, notes, some, "how often a peak is exceeded")
 
@@ -165,8 +164,7 @@ def draw_above(e, conditions, name):
         axes.fill_between(level, 100 * np.fmax(low, 1e-9), 100 * np.fmax(high, 1e-9), where=np.isfinite(low),
                           color=colour, alpha=0.15, linewidth=0)
     style.logarithmic(axes.yaxis)
-    axes.set_ylim(50 * least, 100)
-    axes.set_xlabel(f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}")
-    axes.set_ylabel("share of the time above (%)")
+    axes.set(ylim=(50 * least, 100), xlabel=f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}",
+             ylabel="share of the time above (%)")
     notes = ["from the median of a condition to the", "largest value simulated; band: 95 % over fields"]
     return finished(e, axes, notes, some, f"share of the time above a level of {first['label']}")

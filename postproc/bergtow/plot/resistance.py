@@ -79,8 +79,7 @@ def read(path):
 def curve(point, name):
     """(concentration [n], force [n] N, NaN where undefined) of an estimate, for the conditions of a run."""
     curves = point.conditions["curves"]
-    return np.array(curves["concentration"], dtype=float), np.array([np.nan if f is None else f for f in curves[name]],
-                                                                    dtype=float)
+    return np.array(curves["concentration"], dtype=float), np.array(curves[name], dtype=float)
 
 
 def check_alike(points):
@@ -202,7 +201,7 @@ def draw_estimates(axes, points, factor):
     for k, (name, estimate) in enumerate(first.of_ice.items()):
         label, colour = estimate.label, style.ESTIMATES[k % len(style.ESTIMATES)]
         a, force = curve(first, name)
-        low, high = (np.nan if v is None else v for v in valid[name])
+        low, high = np.array(valid[name], dtype=float)
         inside = (a >= low) & (a <= high)
         with_force = np.where(force > 0, force, np.nan) / factor
         axes.plot(a, np.where(inside, with_force, np.nan), color=colour, linewidth=2, label=label)
@@ -321,10 +320,8 @@ def draw(points, log=True):
     hidden = draw_runs(axes, points, factor, low, log)
     if log:
         style.logarithmic(axes.yaxis)
-    axes.set_ylim(low / factor, high / factor)
-    axes.set_xlim(0, 1)
-    axes.set_xlabel("ice concentration")
-    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.set(ylim=(low / factor, high / factor), xlim=(0, 1), xlabel="ice concentration",
+             ylabel=f"mean ice resistance ({unit})")
     axes.grid(which="major")
     handles, labels, lost = style.legend_of(axes)
     order = sorted(range(len(labels)), key=lambda i: handles[i] in of_estimates)

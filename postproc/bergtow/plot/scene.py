@@ -201,8 +201,7 @@ class Scene:
         view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
         axes.set_ylim(*view[:, 1])
-        axes.set_aspect("equal")
-        axes.set_facecolor(style.WATER if run.period[0] or run.period[1] or follow else style.PAPER)
+        axes.set(aspect="equal", facecolor=style.WATER if run.period[0] or run.period[1] or follow else style.PAPER)
         for spine in axes.spines.values():
             spine.set_visible(False)
         relative = " from the body" if follow else ""
@@ -211,8 +210,7 @@ class Scene:
         wide, high = view[1] - view[0]
         axes.xaxis.set_major_locator(MaxNLocator(9 if wide > 2 * high else 5, steps=(1, 2, 5, 10)))
         axes.yaxis.set_major_locator(MaxNLocator(9 if high > 2 * wide else 5, steps=(1, 2, 5, 10)))
-        axes.set_xlabel(names[0])
-        axes.set_ylabel(names[1])
+        axes.set(xlabel=names[0], ylabel=names[1])
 
         # Walls are endless along a periodic direction; a view that follows the body may extend across the seam.
         px, py = run.period if follow else (0.0, 0.0)

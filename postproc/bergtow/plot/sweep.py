@@ -5,7 +5,7 @@ against concentration, the law V^2 against speed. For a Latin hypercube, every m
 import textwrap
 
 from bergtow.plot import style
-from bergtow.plot.axes import axis_label, headline, of, wants_log
+from bergtow.plot.axes import axis_label, headline, wants_log
 from bergtow.result.members import reading, short_key, worded
 from bergtow.stats import mean as stat_mean
 from bergtow.stats.conditions import sample
@@ -78,7 +78,7 @@ def draw_fields(axes, e, some, key, factor, log_x):
     """Draw the members, the mean with its 95 % interval and band, and the median."""
     x = np.array([c.values[key] for c in some])
     half = width_of(x, log_x)
-    means = [of(e, c.finished) for c in some]
+    means = [e.mean[c.finished] for c in some]
     least = np.array([bool(e.without_bound(c.members)) for c in some])
     band = np.where(least[:, None], np.nan, [stat_mean.t_interval(y) for y in means])
     for c, y in zip(some, means):
@@ -110,8 +110,8 @@ def fields_legend(e):
 
 def force_limits(e, some_groups, log):
     """Ends of the force axis, N: every field, the intervals, and the estimates meant for the conditions."""
-    seen = [v for _, some in some_groups for c in some for v in of(e, c.finished)]
-    tops = [stat_mean.t_interval(of(e, c.finished))[1] for _, some in some_groups for c in some]
+    seen = [v for _, some in some_groups for c in some for v in e.mean[c.finished]]
+    tops = [stat_mean.t_interval(e.mean[c.finished])[1] for _, some in some_groups for c in some]
     seen += [v for v in tops if np.isfinite(v)]
     low = min((v for v in seen if v > 0), default=1.0)
     high = max(seen, default=1.0)
@@ -139,7 +139,7 @@ def power_law(x, means):
 def draw_speed(axes, e, some, key, factor):
     """Draw the law V² through the geometric mean of the fields, and the fitted exponent."""
     x = np.array([c.values[key] for c in some])
-    means = [of(e, c.finished) for c in some]
+    means = [e.mean[c.finished] for c in some]
     law = power_law(x, means)
     if law is None:
         return
@@ -180,7 +180,7 @@ def draw_sweep(e, key):
     rows = -(-len(shown) // columns)
     values = np.array([c.values[key] for _, some in shown for c in some])
     log_x = key == "tow.speed" and values.min() > 0
-    forces = [v for _, some in shown for c in some for v in of(e, c.finished)]
+    forces = [v for _, some in shown for c in some for v in e.mean[c.finished]]
     log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero cannot be shown on a logarithmic axis
     low, high = force_limits(e, shown, log_y)
     factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
@@ -225,7 +225,7 @@ def draw_sweep(e, key):
          if key == "ice.concentration" else []) +
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
-            stat_mean.t_interval(of(e, c.finished))[0] <= 0 and not e.without_bound(c.members)
+            stat_mean.t_interval(e.mean[c.finished])[0] <= 0 and not e.without_bound(c.members)
             for _, some in shown for c in some) else []))
     wide, height = figure.get_size_inches()
     note = textwrap.wrap(note, int(13.5 * wide))  # letters of 9 points in an inch
@@ -243,7 +243,7 @@ def draw_scatter(e, key):
     """Figure of a Latin hypercube: every member against one parameter, and the mean with 95 % in bins of equally many
     conditions. The bins use means of conditions, whose fields are not independent (ensemble.sample)."""
     rows = e.used
-    x, y = e.parameters[key][rows], of(e, rows)
+    x, y = e.parameters[key][rows], e.mean[rows]
     log_y = wants_log(y)
     factor, unit = style.scale([np.median(y)], "N")
     figure, axes = style.subplots(figsize=(9.5, 5.8))
@@ -263,8 +263,7 @@ def draw_scatter(e, key):
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)
     style.times(axes.xaxis, reading(key, e.units[key])[0])
-    axes.set_xlabel(axis_label(e, key))
-    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.set(xlabel=axis_label(e, key), ylabel=f"mean ice resistance ({unit})")
     axes.grid(True)
     pairs = members_legend(e, "a member") + list(zip(*axes.get_legend_handles_labels()))
     axes.legend([handle for handle, _ in pairs], [label for _, label in pairs], loc="best")

@@ -84,7 +84,7 @@ def trial(run, number, least):
         raise RunError(run.path, "the load of the body has no bound in some steps of the window",
                        "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
     domain = run.summary.get("domain") or {}
-    widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
+    widths, needed = np.array([domain.get(k) for k in ("body_widths", "body_widths_needed")], dtype=float).tolist()
     # a body that is adrift before the end of the window has no speed and no tow force, but it has the tension that
     # parted its line
     towed = run.adrift >= run.window[1]
