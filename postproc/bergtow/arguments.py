@@ -22,11 +22,23 @@ def read(text, unit):
 def measure(unit, fits=lambda x: x > 0, words="not above zero"):
     """Argparse type for a number with a unit, as in read(); by default it must be above zero."""
     def number(text):
+        if not text.strip():
+            raise argparse.ArgumentTypeError("a number is missing")
         try:
             return read(text, unit)
         except BergtowError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
     return lambda text: _within(text, number, fits, words)
+
+
+def from_zero(unit):
+    """The same for a number with a unit that may be zero."""
+    return measure(unit, lambda x: x >= 0, "below zero")
+
+
+def several(kind):
+    """Argparse type for an option with several values of a type, sorted."""
+    return lambda text: sorted({kind(part) for part in text.split(",")})
 
 
 def minutes(text):

@@ -31,7 +31,7 @@ from pathlib import Path
 
 from bergtow import arguments, writing
 from bergtow._program import program_path
-from bergtow.arguments import above_zero, at_least_one, measure, minutes, read
+from bergtow.arguments import above_zero, at_least_one, from_zero, measure, minutes, read, several
 from bergtow.errors import CASE, SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
@@ -370,11 +370,6 @@ def factor(text):
     return value
 
 
-def several(kind):
-    """Argparse type for an option with several values, sorted."""
-    return lambda text: sorted({kind(part) for part in text.split(",")})
-
-
 def speeds(text):
     """"0.8 kn,1 kn", or "0.8 kn:1.4 kn:4" for four speeds from the first to the second: [m/s]"""
     if text.count(":") == 2:
@@ -398,7 +393,7 @@ def options(p):
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
     p.add_argument("--thicknesses", type=several(measure("m")), metavar="H,...", default=[], help="of a case: "
                    "thicknesses of the ice beside its own, \"0.8 m,1.6 m\"")
-    p.add_argument("--winds", type=several(measure("m/s", lambda x: x >= 0, "below zero")), metavar="V,...", default=[],
+    p.add_argument("--winds", type=several(from_zero("m/s")), metavar="V,...", default=[],
                    help="of a case: winds from ahead beside its own, \"10 m/s,20 m/s\"")
     p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
@@ -413,11 +408,10 @@ def options(p):
         p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
     p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of what is assumed, as the "
                    "parameters of a study (default: a few with their sources)")
-    against = measure("m/s", lambda x: x >= 0, "below zero")
-    p.add_argument("--head-current", type=against, metavar="V", help="against the tow, in the load case with head "
-                   f"current and wind (default: {load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design "
-                   "value)")
-    p.add_argument("--head-wind", type=against, metavar="V", help="the same of the wind (default: "
+    p.add_argument("--head-current", type=from_zero("m/s"), metavar="V",
+                   help="against the tow, in the load case with head current and wind (default: "
+                   f"{load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design value)")
+    p.add_argument("--head-wind", type=from_zero("m/s"), metavar="V", help="the same of the wind (default: "
                    f"{load_cases.HEAD_WIND:g} m/s)")
     p.add_argument("--bend", type=measure("rad", lambda x: BENDS[0] <= abs(x) <= BENDS[1], "not from 1 to "
                                           "150 degrees, to either side"),

@@ -169,10 +169,8 @@ class Replay:
     def _say_what_is_left_out(self, frames, floes):
         run, notes = self.run, self.notes
         if len(frames) < run.n_frames:
-            notes.append(
-                f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all are in "
-                f"result.h5."
-            )
+            notes.append(f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all "
+                         "are in result.h5.")
         if len(floes) < run.n_floes:
             which = "those that come nearest to the towed body" if run.towed is not None else "the largest ones"
             notes.append(
@@ -180,10 +178,8 @@ class Replay:
                 f"water is not free of ice. "
                 "All are in result.h5.")
         worst = max(self.quanta[axis][1] / 2 for axis in "xy")
-        notes.append(
-            f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact force to "
-            f"16 bits; result.h5 holds them in full."
-        )
+        notes.append(f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact "
+                     "force to 16 bits; result.h5 holds them in full.")
 
     def _add_outlines(self, floes):
         run = self.run

@@ -7,14 +7,15 @@ reads it, including fixed floes and floes given by hand. Python generates no ice
 import json
 import os
 import subprocess
-from ctypes import byref, c_double
+from ctypes import c_double
 from dataclasses import dataclass
 from pathlib import Path
 
 from bergtow import _library, writing
 from bergtow._calls import called
+from bergtow.arguments import read
 from bergtow.case import Case
-from bergtow.errors import CASE, USAGE, Refused, RunError
+from bergtow.errors import CASE, USAGE, BergtowError, Refused, RunError
 from bergtow.result.frames import lonlat_of, place as turned
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
@@ -63,12 +64,10 @@ def number(text, unit, option):
     if not text.strip():
         raise RunError(option.strip(), "a number is missing", "write one on each side of a comma; see bergtow route "
                        "--help", USAGE)
-    value = c_double()
     try:
-        _library.library().bt_number_read(text.strip().encode(), unit.encode(), byref(value))
-    except Exception as error:
+        return read(text, unit)
+    except BergtowError as error:
         raise RunError(option, str(error), "see bergtow route --help", USAGE) from None
-    return value.value
 
 
 def position(text, place, option):

@@ -112,10 +112,9 @@ def drift(e, rows, mean):
         return {"verdict": "not judged", "words": "too few fields"}
     change, (low, high), moved = found
     factor, unit = scale([abs(change)], "N")
-    words = (
-        f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} "
-        f"(95 %: {short(min(abs(low), abs(high)) / factor)} to {short(max(abs(low), abs(high)) / factor)})"
-    ) if moved else "no drift"
+    words = (f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} (95 %: "
+             f"{short(min(abs(low), abs(high)) / factor)} to "
+             f"{short(max(abs(low), abs(high)) / factor)})") if moved else "no drift"
     return {"verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high), "words": words}
 
 

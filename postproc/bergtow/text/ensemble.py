@@ -51,15 +51,12 @@ def means(s):
                      f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
                      f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
                      doubts(c)])
-    note = (
-        "95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth "
-        "of the fields at each end (from 8 fields on). "
-        "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by "
-        "its slowest cosine waves. "
-        "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps "
-        "without a solution, so that its mean and peaks are at least these, J body stood still, N window not steady, "
-        "S short window, F met little ice, X stopped early, O other warning."
-    )
+    note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an "
+            "eighth of the fields at each end (from 8 fields on). Sd of fields: standard deviation between the means "
+            "of runs; standard error in a run: of one run's mean, by its slowest cosine waves. Largest: share of the "
+            "field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps without a solution, "
+            "so that its mean and peaks are at least these, J body stood still, N window not steady, S short window, F "
+            "met little ice, X stopped early, O other warning.")
     drifting = [
         f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"
     ]
@@ -141,12 +138,10 @@ def extremes(s):
         if "refused" in c["extremes"][kind]
     }
     conversions = sorted({c["extremes"]["conversion"] for c in some})
-    text = (
-        f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. "
-        f"GPD: peaks over a threshold; GEV: block maxima. "
-        "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest "
-        f"peak seen. No bound: the upper end is more than {FAR:g} times the level."
-    )
+    text = (f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other "
+            "peaks. GPD: peaks over a threshold; GEV: block maxima. Brackets: 95 %. * beyond the hours simulated. ! "
+            "shape below -0.5: the levels are little more than the largest peak seen. No bound: the upper end is more "
+            f"than {FAR:g} times the level.")
     return [Table(head, rows), [text, *loads_text.cut_note(short), *(f"No fit for {r}." for r in sorted(refused))]]
 
 
@@ -201,36 +196,27 @@ def members(s, markdown):
                      f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields.")
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
-        lines.append(
-            f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: "
-            f"{name}: {why}. Call `bergtow ensemble` again to rerun damaged members."
-        )
+        lines.append(f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the "
+                     f"first: {name}: {why}. Call `bergtow ensemble` again to rerun damaged members.")
     if s["without_mean"]:
-        lines.append(
-            f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no "
-            f"window, nothing that is towed, or a line that parted before the window or early in it."
-        )
+        lines.append(f"{counted(len(s['without_mean']))} without a mean, and in no number "
+                     f"({listed(s['without_mean'])}): no window, nothing that is towed, or a line that parted before "
+                     "the window or early in it.")
     if s["behind"]:
-        lines.append(
-            f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, "
-            f"which takes them in."
-        )
+        lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow "
+                     "ensemble` again, which takes them in.")
     for kind, words in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
-            lines.append(
-                f"{counted(len(s[kind]))} {words}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the "
-                f"first: {name}: {why}"
-            )
+            lines.append(f"{counted(len(s[kind]))} {words}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; "
+                         f"the first: {name}: {why}")
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " +
                      ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     if s["copies"]:
-        lines.append(
-            f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and count with "
-            f"it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): no seed changes ice "
-            f"that is read, or water without floes."
-        )
+        lines.append(f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and "
+                     f"count with it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): "
+                     "no seed changes ice that is read, or water without floes.")
     if s["builds"]:
         lines.append(s["builds"])
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
@@ -238,10 +224,9 @@ def members(s, markdown):
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers" +
                      ("." if markdown else "; --exclude leaves them out."))
     if s["members_without_folder"]:
-        lines.append(
-            f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
-            f"no folder here ({listed(s['members_without_folder'])}): the peaks of their collisions are not known."
-        )
+        lines.append(f"{counted(len(s['members_without_folder']))} "
+                     f"{'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here "
+                     f"({listed(s['members_without_folder'])}): the peaks of their collisions are not known.")
     heavy = [c["label"]
              for c in s["conditions"]
              if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
