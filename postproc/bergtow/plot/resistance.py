@@ -13,6 +13,7 @@ from bergtow import arguments, writing
 from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.result import at_least, compared
+from bergtow.result.origins import source_of_ice
 from bergtow.result.run import Run
 from bergtow.stats import drift as stat_drift
 from bergtow.table import quantity, scale, short
@@ -65,10 +66,10 @@ def read(path):
         made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
         if not np.isfinite(mean):
             raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no window")
-        from_file = any(run.case.get(key, "none") != "none" for key in ("ice.field", "ice.outlines"))
         return Point(path=run.path, title=style.title(run),
-                     asked=made if from_file else run.value("ice.concentration", made), concentration=made, mean=mean,
-                     se=run.number("mean_ice_resistance_se_n"), low=low, high=high, steady=run.verdict[0] == "steady",
+                     asked=made if source_of_ice(run.case) else run.value("ice.concentration", made),
+                     concentration=made, mean=mean, se=run.number("mean_ice_resistance_se_n"), low=low, high=high,
+                     steady=run.verdict[0] == "steady",
                      change=run.number("window.series.ice_resistance.change_n"),
                      reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),

@@ -8,6 +8,7 @@ import textwrap
 from contextlib import contextmanager
 
 from bergtow import table as text_table
+from bergtow.result.origins import source_of_ice
 
 import matplotlib
 import numpy as np
@@ -106,7 +107,7 @@ def conditions(run):
     if run.n_floes:
         words.append(f"{run.n_start} floes")
         # floes may have individual thicknesses
-        if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):
+        if source_of_ice(run.case):
             words.append(f"{np.mean(run.thickness[:run.n_start]):.3g} m thick")
         elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")

@@ -29,18 +29,18 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import writing
 from bergtow._program import program_path
 from bergtow.arguments import above_zero, at_least_one, from_zero, measure, minutes, read, several
 from bergtow.errors import CASE, SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
 from bergtow.result.members import FINISHED, WAITING, Members
-from bergtow.result.origins import TITLE_BLOCK
+from bergtow.result.origins import TITLE_BLOCK, source_of_ice
 from bergtow.result.run import Run
 from bergtow.study import analysis, answer, assumed, domain_width, gear, load_cases
 from bergtow.study.case_file import contents, files, is_study, says, section
-from bergtow.study.domain_width import read_ice_of, reads_ice
+from bergtow.study.domain_width import reads_ice
 from bergtow.study.runs import CaseRuns, locked, run_members
 from bergtow.table import written
 from bergtow.text import answer as answer_text
@@ -263,7 +263,7 @@ def make_replay(work, a, left):
     if m is None:
         return
     with Run(e.folder(m)) as run:
-        if read_ice_of(run.case):
+        if source_of_ice(run.case):
             return
         takes = max(run.number("wall_time_s"), work.member)
         if takes > left:
@@ -299,7 +299,7 @@ def beside(work, a, row, t):
                            abs(t.wind) > load_cases.NO_WIND * abs(t.value))
     end = work.last - work.replay
     with locked(a.output / "load-cases") as lock:
-        n = (1, 1) if read_ice_of(t.case) else (PAIRED, OF_A_CASE)
+        n = (1, 1) if source_of_ice(t.case) else (PAIRED, OF_A_CASE)
         duration = answer.case_value(t.case, "run.duration")
         runs = load_cases.Runs(CaseRuns(a.file, a.output, "load-cases", work.program, given, work.jobs, end, end,
                                         lock=lock), *map(range, n), duration, work.member / duration, a.no_load_cases)
@@ -425,9 +425,6 @@ def options(p):
                    help="of a case: at most so many of each condition (default: %(default)s)")
     p.add_argument("--seed", type=at_least_one, default=1, metavar="N", help="of a case: of its fields (default: 1)")
     p.add_argument("--title", metavar="TEXT", help="of a case: title of the report")
-    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
-    p.add_argument("--jobs", type=at_least_one, default=len(os.sched_getaffinity(0)), metavar="N",
-                   help="runs at a time (default: the cores)")
     p.add_argument("--no-pdf", action="store_true", help="the page alone")
     p.add_argument("--no-replay", action="store_true", help="no replay of a tow")
     p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
@@ -436,7 +433,7 @@ def options(p):
     p.add_argument("--quiet", action="store_true", help="no line for each member")
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
-    arguments.add_force(p)
+    analysis.add_runs(p)
 
 
 def set_ends(work, a, conditions, member=None):

@@ -24,6 +24,7 @@ from bergtow._program import program_path
 from bergtow.arguments import measure, read, whole_from
 from bergtow.errors import CASE, SIGNAL, USAGE, BergtowError, RunError
 from bergtow.result import at_least, compared
+from bergtow.result.origins import source_of_ice
 from bergtow.result.run import Run, case_value, parse_case, within
 from bergtow.stats import mean as stat_mean
 from bergtow.study import analysis, bracket, domain_width
@@ -291,7 +292,7 @@ def check(case, key):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
                        "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
                        "tow.line.breaking_load", CASE)
-    if domain_width.read_ice_of(case):
+    if source_of_ice(case):
         raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
                        "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
                        "each value", CASE)
