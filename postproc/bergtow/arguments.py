@@ -22,12 +22,11 @@ def read(text, unit):
 def measure(unit, fits=lambda x: x > 0, words="not above zero"):
     """Argparse type for a number with a unit, as in read(); by default it must be above zero."""
     def number(text):
-        if not text.strip():
-            raise argparse.ArgumentTypeError("a number is missing")
         try:
             return read(text, unit)
         except BergtowError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
+            words = str(error) if text.strip() else f"a number is missing;{str(error).partition(';')[2]}"
+            raise argparse.ArgumentTypeError(words) from None
     return lambda text: _within(text, number, fits, words)
 
 
