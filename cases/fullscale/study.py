@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "postproc"), str(ROOT / "cases")]
 
 from bergtow import writing  # noqa: E402
+from bergtow.arguments import measure, whole_from  # noqa: E402
 from bergtow.cli import command  # noqa: E402
 from bergtow.plot import resistance as plot_resistance  # noqa: E402
 from bergtow.plot import style  # noqa: E402
@@ -35,70 +36,52 @@ def concentration(a):
     text = plot_resistance.table(points)
     (a.out / "resistance.md").write_text(text + "\n", encoding="utf-8")
     writing.save(plot_resistance.draw(points), a.out / "resistance.png", force=True)
-    print(
-        f"\nMean ice resistance; in brackets simulated / estimate; * an estimate outside the range it is meant "
-        f"for\n\n{text}\n\n{a.out / 'resistance.md'}"
-    )
+    print(f"\nMean ice resistance; in brackets simulated / estimate; * an estimate outside the range it is meant "
+          f"for\n\n{text}\n\n{a.out / 'resistance.md'}")
 
 
 def dt(a):
     """One field with several time steps: mean, percentiles and peak of the means over a step."""
-    lines = [
-        "| time step, s | ice resistance, N | standard error, N | sd, N | 99 % below, N | largest step mean, N | "
-        "sweeps a step "
-        "| steps not converged | overlap / floe size | wall time, s |", "|" + " ---: |" * 10
-    ]
+    lines = ["| time step, s | ice resistance, N | standard error, N | sd, N | 99 % below, N | largest step mean, N | "
+             "sweeps a step "
+             "| steps not converged | overlap / floe size | wall time, s |", "|" + " ---: |" * 10]
     for step in a.steps:
         with Run(run(a, f"dt{step:g}", run__dt=f"{step:g}", ice__concentration=f"{a.concentration:g}")) as r:
             number = r.number
-            cells = [
-                f"{step:g}", f"{number('mean_ice_resistance_n'):.4g}", f"{number('mean_ice_resistance_se_n'):.2g}",
-                f"{number('sd_ice_resistance_n'):.3g}", f"{number('p99_ice_resistance_n'):.3g}",
-                f"{number('peak_ice_resistance_n'):.3g}", f"{number('mean_sweeps'):.3g}",
-                f"{100 * number('unconverged_steps') / number('n_steps'):.2g} %",
-                f"{100 * number('max_overlap_relative'):.2g} %", f"{number('wall_time_s'):.0f}"
-            ]
+            cells = [f"{step:g}", f"{number('mean_ice_resistance_n'):.4g}", f"{number('mean_ice_resistance_se_n'):.2g}",
+                     f"{number('sd_ice_resistance_n'):.3g}", f"{number('p99_ice_resistance_n'):.3g}",
+                     f"{number('peak_ice_resistance_n'):.3g}", f"{number('mean_sweeps'):.3g}",
+                     f"{100 * number('unconverged_steps') / number('n_steps'):.2g} %",
+                     f"{100 * number('max_overlap_relative'):.2g} %", f"{number('wall_time_s'):.0f}"]
         lines.append("| " + " | ".join(cells) + " |")
     text = "\n".join(lines)
     (a.out / "dt.md").write_text(text + "\n", encoding="utf-8")
     print(f"\n{text}\n\n{a.out / 'dt.md'}")
 
 
-def positive(kind, most):
-    def read(text):
-        value = kind(text)
-        if not 0 < value <= most:
-            raise argparse.ArgumentTypeError(f"{text}: choose a number above 0, at most {most:g}")
-        return value
-    return read
+ice = measure("%", lambda x: 0 < x <= 0.95, "not above 0 and up to 95 %")
 
 
 def arguments(argv):
     p = argparse.ArgumentParser(description="Studies of the full-scale tow of cases/fullscale/berg.yml.")
     common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("--case",
-                        type=Path,
-                        default=Path(__file__).resolve().parent / "berg.yml",
+    common.add_argument("--case", type=Path, default=Path(__file__).resolve().parent / "berg.yml",
                         help="case file (default: berg.yml)")
-    common.add_argument("--out",
-                        type=Path,
-                        default=ROOT / "out/fullscale",
+    common.add_argument("--out", type=Path, default=ROOT / "out/fullscale",
                         help="folder of the results (default: out/fullscale)")
     common.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a key in every run")
-    common.add_argument("--threads", type=positive(int, 1024), help="threads of each run (default: all cores)")
+    common.add_argument("--threads", type=whole_from(1, 1024), help="threads of each run (default: all cores)")
     common.add_argument("--bergtow", default=os.environ.get("BERGTOW", str(ROOT / "build/release/bergtow")),
                         help="the program (default: build/release/bergtow)")
     sub = p.add_subparsers(dest="study", required=True)
     table = sub.add_parser("concentration", parents=[common], help="resistance against concentration")
-    table.add_argument("--concentrations", type=positive(float, 0.95), nargs="+", default=CONCENTRATIONS, metavar="A")
-    table.add_argument("--seeds",
-                       type=positive(int, 1000),
-                       default=1,
-                       metavar="N",
+    table.add_argument("--concentrations", type=ice, nargs="+", default=CONCENTRATIONS, metavar="A")
+    table.add_argument("--seeds", type=whole_from(1, 1000), default=1, metavar="N",
                        help="fields of each concentration (default: 1)")
     steps = sub.add_parser("dt", parents=[common], help="time steps on one field")
-    steps.add_argument("--steps", type=positive(float, 1000), nargs="+", default=STEPS, metavar="S")
-    steps.add_argument("--concentration", type=positive(float, 0.95), default=0.8, metavar="A")
+    steps.add_argument("--steps", type=measure("s", lambda x: 0 < x <= 1000, "not above 0 and up to 1000 s"), nargs="+",
+                       default=STEPS, metavar="S")
+    steps.add_argument("--concentration", type=ice, default=0.8, metavar="A")
     a = p.parse_args(argv)
     if not os.access(a.bergtow, os.X_OK):
         p.error(f"{a.bergtow}: no such program; run make, or name it with --bergtow")

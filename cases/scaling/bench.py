@@ -71,10 +71,8 @@ def settings(scene, n):
     if scene.startswith("compression"):
         return {"domain.width": f"{area / WALL_DISTANCE:.3f}"}
     side = math.sqrt(area + BERG_AREA)
-    return {
-        "domain.length": f"{side:.3f}", "domain.width": f"{side:.3f}", "body.x": f"{side / 4:.3f}",
-        "body.y": f"{side / 2:.3f}"
-    }
+    return {"domain.length": f"{side:.3f}", "domain.width": f"{side:.3f}", "body.x": f"{side / 4:.3f}",
+            "body.y": f"{side / 2:.3f}"}
 
 
 def flags(values):
@@ -97,10 +95,8 @@ def field_of(scene, n, o):
 def command(scene, n, ranks, threads, steps, o):
     values = dict(settings(scene, n), **o.set_keys, **{"ice.field": field_of(scene, n, o).resolve()})
     folder = o.out / "runs" / f"{scene}-{n}-{ranks}x{threads}"
-    words = [
-        o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads",
-        threads, "--steps", steps
-    ]
+    words = [o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads",
+             threads, "--steps", steps]
     if ranks > 1:
         words = ["mpirun", "-n", ranks, "--map-by", f"slot:PE={threads}", "--bind-to", "core", *words]
     return [str(w) for w in words], folder
@@ -130,13 +126,11 @@ def run_once(scene, n, ranks, threads, steps, o):
 
 def record(scene, n, s, contact_sweeps, peak_memory):
     """The numbers of one run that the tables are made of."""
-    r = {
-        "scene": scene, "asked": n, "floes": s["n_floes"], "ranks": s["ranks"], "threads": s["threads"],
-        "steps": s["n_steps"], "dt": s["dt_s"], "wall": s["wall_time_s"], "ns": s["ns_per_floe_step"],
-        "phases": s["phases_s"], "sweeps": s["mean_sweeps"], "contacts": s["contacts_mean"],
-        "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
-        "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None
-    }
+    r = {"scene": scene, "asked": n, "floes": s["n_floes"], "ranks": s["ranks"], "threads": s["threads"],
+         "steps": s["n_steps"], "dt": s["dt_s"], "wall": s["wall_time_s"], "ns": s["ns_per_floe_step"],
+         "phases": s["phases_s"], "sweeps": s["mean_sweeps"], "contacts": s["contacts_mean"],
+         "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
+         "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None}
     r["step"] = sum(t for name, t in r["phases"].items() if name != "output") / max(1, r["floes"] * r["steps"])
     r.update({name: s.get(key) for name, key in FROM_SUMMARY.items()})
     if r["memory"] is None and peak_memory:
@@ -301,11 +295,7 @@ def options():
     p.add_argument("--steps", type=int, help="steps of every run, instead of the scene's own number")
     p.add_argument("--repeats", type=int, help="runs of each configuration")
     p.add_argument("--cores", type=int, default=len(os.sched_getaffinity(0)), help="use at most so many (default: all)")
-    p.add_argument("--set",
-                   action="append",
-                   default=[],
-                   metavar="KEY=VALUE",
-                   dest="set_keys",
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="set_keys",
                    help="a case key for every run, not for its field; "
                    "solver.max_sweeps=50 with solver.tolerance=1e-9 gives every size the same sweeps")
     p.add_argument("--out", type=Path, default=ROOT / "build/bench", help="folder of tables, plot and cached fields")
@@ -351,10 +341,8 @@ def measure(o, with_ranks):
                     if isinstance(r, str):
                         fail(r)
                     if (r["ranks"], r["threads"]) != (ranks, threads):
-                        fail(
-                            f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × "
-                            f"{r['threads']}"
-                        )
+                        fail(f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × "
+                             f"{r['threads']}")
                     group.append(r)
             records += group
             for row in tables(group, triads):

@@ -92,9 +92,7 @@ def phase_bars(ax, rows):
         left = [a + b for a, b in zip(left, share)]
     ax.set_yticks(range(len(chosen)), [f"{r['scene']}, {name_of(*config(r))}" for r in chosen], fontsize=8)
     ax.invert_yaxis()
-    ax.set_xlim(0, 100)
-    ax.set_xlabel("% of the wall time")
-    ax.set_title(f"Phases, {largest:,.0f} floes")
+    ax.set(xlim=(0, 100), xlabel="% of the wall time", title=f"Phases, {largest:,.0f} floes")
     ax.legend(ncols=4, fontsize=8, loc="upper center", bbox_to_anchor=(0.4, -0.16), handlelength=1, columnspacing=1)
 
 

@@ -148,8 +148,7 @@ def draw(studies, of):
     above.set_ylabel(f"mean ice resistance, {unit}")
     above.legend(frameon=False, fontsize=9)
     below.axhline(0, color=style.INK, linewidth=0.8)
-    below.set_ylabel("change of the mean, %")
-    below.set_xlabel(axis)
+    below.set(ylabel="change of the mean, %", xlabel=axis)
     if texts:
         below.set_xticks(x, texts, rotation=30, ha="right", fontsize=8)
         figure.subplots_adjust(bottom=0.22)
@@ -165,8 +164,7 @@ def main():
     p.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("changes.png"))
     arguments.add_force(p)
     a = p.parse_args()
-    if a.output.suffix.lower() not in writing.PICTURES:
-        p.error(f"{a.output}: unknown kind of file; end the name in {', '.join(writing.PICTURES)}")
+    arguments.ends_in(a.output, writing.PICTURES)
     writing.may_write(a.output, a.force)
     studies = [named(text) for text in (a.base, *a.others)]
     if len(studies) > len(LINES):

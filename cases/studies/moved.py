@@ -58,8 +58,7 @@ def draw(folder, path):
         dots = ax.scatter(pose[k, :, 1] / 1e3, pose[k, :, 0] / 1e3, c=np.minimum(speeds(time, pose, k), 0.1), s=0.3,
                           linewidths=0, vmin=0, vmax=0.1, cmap="viridis", rasterized=True)
         ax.set_title(f"{time[k] / 60:.0f} min", fontsize=9)
-        ax.set_aspect("equal")
-        ax.set_xlabel("across, km")
+        ax.set(aspect="equal", xlabel="across, km")
     np.atleast_1d(axes)[0].set_ylabel("along the tow, km")
     figure.colorbar(dots, ax=axes, label="speed since the last frame, m/s (0.1 and more)", orientation="horizontal",
                     shrink=0.5)

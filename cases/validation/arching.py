@@ -37,13 +37,11 @@ def keys(ratio, friction=0.2, concentration=0.5, seed=1, widths=2.0, speed=SPEED
     """Keys of one run: a gap of BLOCK / ratio in a channel `widths` gaps wide; step: way per time step, in blocks."""
     gap = BLOCK / ratio
     reach = way * BLOCK * PACKED / (PACKED - concentration)
-    return {
-        "ice__friction": friction, "ice__concentration": concentration, "ice__seed": seed,
-        "domain__width": f"{widths * gap:.6g} m", "body__width": f"{(widths - 1) * gap:.6g} m",
-        "domain__length": f"{START + reach + 5 * BLOCK:.6g} m", "tow__speed": f"{speed:.6g} m/s",
-        "tow__ramp": f"{BLOCK / speed:.6g} s", "run__dt": f"{step * BLOCK / speed:.6g} s",
-        "run__duration": f"{way * BLOCK / speed:.6g} s", "output__frame_interval": f"{BLOCK / speed:.6g} s", **more
-    }
+    return {"ice__friction": friction, "ice__concentration": concentration, "ice__seed": seed,
+            "domain__width": f"{widths * gap:.6g} m", "body__width": f"{(widths - 1) * gap:.6g} m",
+            "domain__length": f"{START + reach + 5 * BLOCK:.6g} m", "tow__speed": f"{speed:.6g} m/s",
+            "tow__ramp": f"{BLOCK / speed:.6g} s", "run__dt": f"{step * BLOCK / speed:.6g} s",
+            "run__duration": f"{way * BLOCK / speed:.6g} s", "output__frame_interval": f"{BLOCK / speed:.6g} s", **more}
 
 
 def flow(folder):

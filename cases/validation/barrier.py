@@ -37,11 +37,9 @@ DRAWS = 1000                 # of the bootstrap
 def keys(width, friction, lengths, seed, kappa=0):
     """Keys of one run."""
     long = lengths * width
-    return {
-        "domain__width": f"{width:g} m", "body__width": f"{width - 0.1:g} m", "domain__length": f"{long + 5:g} m",
-        "ice__x_max": f"{long + 0.5:g} m", "body__x": f"{long + 0.8:g} m", "domain__wall_friction": friction,
-        "ice__rafting__kappa": kappa, "ice__seed": seed
-    }
+    return {"domain__width": f"{width:g} m", "body__width": f"{width - 0.1:g} m", "domain__length": f"{long + 5:g} m",
+            "ice__x_max": f"{long + 0.5:g} m", "body__x": f"{long + 0.8:g} m", "domain__wall_friction": friction,
+            "ice__rafting__kappa": kappa, "ice__seed": seed}
 
 
 def load(folder):

@@ -47,12 +47,10 @@ def resistance(folder):
         force, dt = r["ice_resistance"][use], r.number("dt_s")
         n = int(round(SECOND / dt))
         slow = force[:len(force) // n * n].reshape(-1, n).mean(1)
-        return {
-            "mean": r.number("mean_ice_resistance_n"), "sd": float(force.std()), "slow": float(slow.std()),
-            "unconverged_steps": r.summary["unconverged_steps"], "wall_time_s": r.summary["wall_time_s"],
-            "overlap": r.summary["max_overlap_relative"], "second": slow.tolist(),
-            "estimates": {k: e.force for k, e in r.estimates.items() if e.valid and not e.on_top}
-        }
+        return {"mean": r.number("mean_ice_resistance_n"), "sd": float(force.std()), "slow": float(slow.std()),
+                "unconverged_steps": r.summary["unconverged_steps"], "wall_time_s": r.summary["wall_time_s"],
+                "overlap": r.summary["max_overlap_relative"], "second": slow.tolist(),
+                "estimates": {k: e.force for k, e in r.estimates.items() if e.valid and not e.on_top}}
 
 
 def jobs(fields):
@@ -90,12 +88,10 @@ def point(runs):
     """Mean over the fields with its 95 % interval, range of the fields, and standard deviations within a run."""
     means = np.array([r["mean"] for r in runs])
     half = student.ppf(0.975, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.nan
-    return {
-        "mean": means.mean(), "low": means.mean() - half, "high": means.mean() + half, "least": means.min(),
-        "most": means.max(), "sd": np.sqrt(np.mean([r["sd"]**2 for r in runs])),
-        "slow": np.sqrt(np.mean([r["slow"]**2 for r in runs])), "n": len(runs),
-        "unconverged": sum(r["unconverged_steps"] for r in runs)
-    }
+    return {"mean": means.mean(), "low": means.mean() - half, "high": means.mean() + half, "least": means.min(),
+            "most": means.max(), "sd": np.sqrt(np.mean([r["sd"]**2 for r in runs])),
+            "slow": np.sqrt(np.mean([r["slow"]**2 for r in runs])), "n": len(runs),
+            "unconverged": sum(r["unconverged_steps"] for r in runs)}
 
 
 def table(points):

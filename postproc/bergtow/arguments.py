@@ -2,6 +2,7 @@
 """Options that several commands share, and the types of numbers that options take."""
 import argparse
 import ctypes
+import functools
 import math
 from pathlib import Path
 
@@ -24,8 +25,19 @@ def measure(unit, fits=lambda x: x > 0, words="not above zero"):
         try:
             return read(text, unit)
         except BergtowError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
+            words = str(error) if text.strip() else f"a number is missing;{str(error).partition(';')[2]}"
+            raise argparse.ArgumentTypeError(words) from None
     return lambda text: _within(text, number, fits, words)
+
+
+def from_zero(unit):
+    """The same for a number with a unit that may be zero."""
+    return measure(unit, lambda x: x >= 0, "below zero")
+
+
+def several(kind):
+    """Argparse type for an option with several values of a type, sorted."""
+    return lambda text: sorted({kind(part) for part in text.split(",")})
 
 
 def minutes(text):
@@ -47,6 +59,16 @@ def _within(text, number, fits, words):
     return value
 
 
+def between(least, most, kind=float):
+    """Argparse type for a number of a kind in a closed interval."""
+    words = f"no {'whole ' * (kind is int)}number from {least:g} to {most:g}"
+    return lambda text: _within(text, kind, lambda x: least <= x <= most, words)
+
+
+#: the same for a whole number
+whole_from = functools.partial(between, kind=int)
+
+
 def finite(text):
     return _within(text, float, math.isfinite, "not a finite number")
 
@@ -64,15 +86,6 @@ def at_least_one(text):
 
 
 share = measure("%", lambda x: 0 < x < 1, "not between 0 and 1")
-
-
-def whole_from(least, most):
-    """Argparse type for a whole number in a range."""
-    def number(text):
-        if not (text.isdecimal() and least <= int(text) <= most):
-            raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {most}")
-        return int(text)
-    return number
 
 
 def add_run(p, output):

@@ -89,6 +89,12 @@ def write_json(value, path, force):
     write_text(json.dumps({"made_by": MARK, **plain(value)}, indent=1, allow_nan=False) + "\n", path, force)
 
 
+def collection(head, features):
+    """The text of a GeoJSON FeatureCollection with further members at its head, a line for each feature."""
+    head = json.dumps({"type": "FeatureCollection", "made_by": MARK} | head)
+    return head[:-1] + ', "features": [\n' + ",\n".join(json.dumps(f, allow_nan=False) for f in features) + "\n]}\n"
+
+
 def write_csv(rows, path, force):
     """Write dicts with the same keys as a table, with the mark as the last column. Raises RunError."""
     text = io.StringIO()

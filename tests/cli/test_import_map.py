@@ -937,7 +937,7 @@ def test_bad_maps(tmp_path, name):
 
 
 @pytest.mark.parametrize("words, says", [
-    (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "no length"),
+    (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "above zero"),
     (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--unseen", "x"), "whole numbers"),
     (("--footprint", "1,2,3,4"), "at least three"), (("--record", "a.txt"), ".json"),
     (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "names of their own")])

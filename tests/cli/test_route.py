@@ -575,7 +575,7 @@ def local(geometry):
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--map-age", "11 s"], USAGE, "--map-age"),
     ({}, ["--to", "8.5,0", "--force-limit", "1e-3"], CASE, "takes more than --force-limit"),
     ({}, ["--to", "8.5,0", "--map", "map.shp"], USAGE, "bergtow outlines"),
-    ({}, ["--to", "8.5,0", "--speeds", "0"], USAGE, "is not above 0"),
+    ({}, ["--to", "8.5,0", "--speeds", "0"], USAGE, "is not above zero"),
     ({}, ["--to", "8.5,0", "--speeds", "0.1,,0.2"], USAGE, "--speeds: a number is missing"),
     ({}, ["--to", "8.5,"], USAGE, "--to: a number is missing"),
     ({"tow": {"mode": "none", "speed": 0}}, ["--to", "8.5,0"], CASE, "nothing is towed"),

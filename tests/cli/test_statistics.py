@@ -412,7 +412,7 @@ def test_the_law_of_the_speed_is_found(plain):
     e = Members(plain[0])
     for words, some in plot_sweep.groups(e, "tow.speed"):
         exponent, low, high, _ = plot_sweep.power_law([c.values["tow.speed"] for c in some],
-                                                      [plot_ensemble.of(e, c.finished) for c in some])
+                                                      [e.mean[c.finished] for c in some])
         assert exponent == pytest.approx(2, abs=0.1) and low < 2 < high and words.startswith("concentration")
     figure = plot_ensemble.draw_sweep(e, "tow.speed")
     law = next(line for line in figure.axes[0].lines if line.get_color() == plot_ensemble.style.TOW)
@@ -502,7 +502,7 @@ def test_the_bins_of_a_hypercube_are_of_conditions(tmp_path):
     bars = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].containers[0]
     at, centre = bars[0].get_data()
     half = [(s[1, 1] - s[0, 1]) / 2 for s in bars[2][0].get_segments()]
-    conditions = sorted((c.values["ice.thickness"], plot_ensemble.of(e, c.finished).mean()) for c in e.conditions())
+    conditions = sorted((c.values["ice.thickness"], e.mean[c.finished].mean()) for c in e.conditions())
     assert len(at) == 3
     for k, one in enumerate(np.array_split(np.array(conditions), 3)):
         low, high = stat_mean.t_interval(one[:, 1])

@@ -15,7 +15,6 @@ Trajectories: discrete sampling geometry of CF-1.8, in the classic NetCDF format
 import argparse
 import csv
 import datetime
-import json
 import math
 import re
 import shutil
@@ -251,31 +250,25 @@ def _pieces(xy, period):
 # ---- files
 
 
-def _value(v):
-    v = v.item() if isinstance(v, np.generic) else v
-    return None if isinstance(v, float) and not math.isfinite(v) else v
-
-
 def _rows(layer):
     """(properties, place) of each feature."""
     names, values = list(layer.columns), [v for _, v in layer.columns.values()]
     for k, place in enumerate(layer.places):
-        yield {name: _value(v[k]) for name, v in zip(names, values)}, place
+        yield {name: writing.plain(v[k]) for name, v in zip(names, values)}, place
 
 
 def geojson(layer, place):
     """The text, with the head that `bergtow outlines` and `bergtow field` write: frame and origin for ice.outlines."""
-    head = {"type": "FeatureCollection", "made_by": writing.MARK,
-            "bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
+    head = {"bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
     if not place.degrees:
         head["crs"] = {"type": "name", "properties": {"name": place.crs or map_read.local_crs()}}
     lines = []
     for properties, at in _rows(layer):
         where = (place.coordinates(at[0]).tolist() if layer.geometry == "Point" else
                  [place.ring(at).tolist()] if layer.geometry == "Polygon" else place.coordinates(at).tolist())
-        lines.append(json.dumps({"type": "Feature", "properties": properties, "geometry": {
-            "type": layer.geometry, "coordinates": where}}, allow_nan=False))
-    return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
+        lines.append({"type": "Feature", "properties": properties,
+                      "geometry": {"type": layer.geometry, "coordinates": where}})
+    return writing.collection(head, lines)
 
 
 def write_ogr(layers, place, path, driver):
@@ -360,7 +353,7 @@ def write_table(t, place, path, force):
         mark = writing.MARK  # written once: a table of all floes has millions of rows
         for i, name in enumerate(t.name):
             for k in np.flatnonzero(np.isfinite(at[i]).all(axis=1)):
-                row = [_value(v) for v in (t.time[k], *at[i, k], t.speed[i, k], t.thickness[i])]
+                row = writing.plain([t.time[k], *at[i, k], t.speed[i, k], t.thickness[i]])
                 table.writerow([name, *("" if v is None else repr(v) for v in row), mark])
                 mark = ""
 
@@ -410,8 +403,7 @@ def dataset(t, place, start, title):
 def write_netcdf(t, place, path, force, start, title):
     data = dataset(t, place, start, title)
     with writing.written(path, force) as new:
-        data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT",
-                       encoding={"time": {"_FillValue": None}})
+        data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT", encoding={"time": {"_FillValue": None}})
 
 
 # ---- the command
@@ -459,7 +451,7 @@ def perform(a):
         if not (kind == ".shp" and file == path and path.with_suffix(".dbf").exists()):
             writing.may_write(file, a.force)
     if kind in (".gpkg", ".shp"):
-        map_read.need_libraries()
+        map_read.need()
     with Run(a.run) as run:
         place = Place.of(run)
         frames = frames_of(run, a.time or ("all" if trajectories else "last"))

@@ -8,7 +8,6 @@ every change counted (maps/repair.py). They are written in degrees, or in metres
 or if a heading is given. A case reads the file through ice.outlines.
 """
 import argparse
-import json
 import math
 from pathlib import Path
 
@@ -28,32 +27,23 @@ LEAST_SIZE = 0.01       # m, mean; if smaller, the metres are probably degrees
 EDGE = 64               # pieces per edge of the image, which is curved in the plane
 
 
-def pair(text):
-    numbers = [float(part) for part in text.split(",")]
-    if len(numbers) != 2 or not all(map(math.isfinite, numbers)):
-        raise ValueError
-    return tuple(numbers)
+def finite(text):
+    """The numbers of a list; none if one of them is not finite."""
+    try:
+        some = [float(part) for part in text.split(",")]
+    except ValueError:
+        return []
+    return some if all(map(math.isfinite, some)) else []
 
 
 def place(text):
     """Read LON,LAT."""
-    try:
-        return pair(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: is no place; write two numbers, LON,LAT") from None
+    if len(some := finite(text)) != 2:
+        raise argparse.ArgumentTypeError(f"{text}: is no place; write two numbers, LON,LAT")
+    return tuple(some)
 
 
-def metres(text):
-    """A number above zero, followed by m, km or nothing."""
-    word = text.strip()
-    scale = 1e3 if word.endswith("km") else 1.0
-    try:
-        value = float(word.removesuffix("km").removesuffix("m")) * scale
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: is no length; write for example 500 m")
-    return value
+metres = arguments.measure("m")
 
 
 def extent(text):
@@ -61,16 +51,6 @@ def extent(text):
     if len(parts) != 2:
         raise argparse.ArgumentTypeError(f"{text}: is no extent; write for example 2km,800m")
     return tuple(map(metres, parts))
-
-
-def square_metres(text):
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: is no area in square metres")
-    return value
 
 
 def integers(text):
@@ -82,23 +62,10 @@ def integers(text):
 
 def corners(text):
     """Read X,Y,X,Y,..."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) < 6 or len(numbers) % 2 or not all(map(math.isfinite, numbers)):
+    some = finite(text)
+    if len(some) < 6 or len(some) % 2:
         raise argparse.ArgumentTypeError(f"{text}: are no corners; write at least three, column,row,column,row,...")
-    return tuple(zip(numbers[::2], numbers[1::2]))
-
-
-def angle(text):
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not -360 <= value <= 360:
-        raise argparse.ArgumentTypeError(f"{text}: is no direction in degrees")
-    return value
+    return tuple(zip(some[::2], some[1::2]))
 
 
 def options(p):
@@ -106,8 +73,9 @@ def options(p):
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="GeoJSON to write")
     p.add_argument("--centre", metavar="LON,LAT", type=place, help="where the towed body is, x = y = 0: "
                    "degrees on WGS 84; east and north of a local map (default: the middle of the map)")
-    p.add_argument("--heading", metavar="DEG", type=angle, help="direction of x, clockwise from north: metres for the "
-                   "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
+    p.add_argument("--heading", metavar="DEG", type=arguments.between(-360, 360), help="direction of x, clockwise from "
+                   "north: metres for the basin's frame are written (default: degrees for the geographic frame, or "
+                   "metres of a local map)")
     p.add_argument("--crs", help="coordinate reference system, if the file does not name it: EPSG:..., any other "
                    "name that PROJ knows, or local: metres east and north without a place on the earth")
     p.add_argument("--layer", metavar="NAME",
@@ -134,7 +102,8 @@ def options(p):
                    "within half a pixel, each floe keeping its area, or kept but for the tolerance")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
                    "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
-    p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
+    p.add_argument("--least", metavar="AREA", type=arguments.not_below_zero,
+                   help="smallest floe, m² (default: four pixels; 0)")
     p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
     p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
     arguments.add_force(p)
@@ -157,23 +126,15 @@ def in_plane(found, plane):
     """Shapes in metres in the plane, and the largest bend there of edges that are straight on the map, m."""
     bend = 0.0
     for shape in found.shapes:
-        there = moved(shape.geometry, plane.onto)
+        there = map_read.moved(shape.geometry, plane.onto)
         if there.distance(map_repair.Point(0, 0)) < _library.limit("map_farthest_m"):  # others: too far away
             bend = max(bend, bent(shape.geometry, plane))
         shape.geometry = there
         if shape.pixels is not None:
-            shape.pixels = moved(shape.pixels, plane.onto)
+            shape.pixels = map_read.moved(shape.pixels, plane.onto)
     if found.seen is not None:
-        found.seen = moved(found.seen, lambda xy: plane.onto(divided(xy, EDGE)))
+        found.seen = map_read.moved(found.seen, lambda xy: plane.onto(divided(xy, EDGE)))
     return bend
-
-
-def moved(geometry, onto):
-    """A polygon or multipolygon with all its rings transformed."""
-    Polygon, MultiPolygon = map_read.Polygon, map_read.MultiPolygon
-    parts = [Polygon(onto(np.asarray(p.exterior.coords)), [onto(np.asarray(r.coords)) for r in p.interiors])
-             for p in getattr(geometry, "geoms", [geometry])]
-    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 
 
 def divided(ring, n):
@@ -228,7 +189,7 @@ def geojson(floes, found, plane):
     """The GeoJSON text. A file in degrees carries its centre where the reader of the program looks for it."""
     local = isinstance(plane.crs, str) or plane.heading is not None
     mark = {"frame": "basin"} if plane.heading is not None else {} if local else {"origin": list(plane.centre)}
-    head = {"type": "FeatureCollection", "made_by": writing.MARK, "bergtow": mark}
+    head = {"bergtow": mark}
     if found.about:
         head["description"] = found.about
     if local:
@@ -244,9 +205,9 @@ def geojson(floes, found, plane):
             properties["thickness"] = floe.thickness
         if floe.cut:
             properties["cut_by_edge"] = True
-        lines.append(json.dumps({"type": "Feature", "id": k, "properties": properties, "geometry": {
-            "type": "Polygon", "coordinates": [ring.tolist()]}}, allow_nan=False))
-    return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
+        lines.append({"type": "Feature", "id": k, "properties": properties,
+                      "geometry": {"type": "Polygon", "coordinates": [ring.tolist()]}})
+    return writing.collection(head, lines)
 
 
 def perform(a):

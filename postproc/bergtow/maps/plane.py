@@ -25,7 +25,7 @@ import numpy as np
 
 from bergtow import _library
 from bergtow.errors import RunError
-from bergtow.maps.read import INSTALL, local_crs
+from bergtow.maps.read import local_crs, need
 
 WGS84 = "OGC:CRS84"   # degrees, longitude first
 ROUNDING = 1e-3       # degrees outside the valid range, beyond which coordinates cannot be degrees
@@ -54,8 +54,7 @@ def vertices(geometry):
 def system(path, found, said, implied=False):
     """The crs of a map: a pyproj.CRS, or local_crs(). found, said: from the file and from --crs, or None; implied: the
     crs of the file is only the default of its format, and --crs overrides it. Raises RunError."""
-    if MISSING:
-        raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
+    need(MISSING)
     ours = None if said is None else local_crs() if said in ("local", local_crs()) else known(path, said, "--crs")
     theirs = None if found is None else local_crs() if found == local_crs() else known(path, found, "its crs")
     if theirs is None and ours is None:

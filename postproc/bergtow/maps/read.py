@@ -92,15 +92,15 @@ class Map:
     chart: list = field(default_factory=list)    #: columns that indicate an ice chart, not a map of floes
 
 
-def need_libraries():
-    """Raises RunError if GDAL or shapely is not installed."""
-    if MISSING:
-        raise RunError("outlines", f"a library is missing ({MISSING})", f"install it: {INSTALL}")
+def need(missing=MISSING):
+    """Raises RunError for an ImportError; the default is that of GDAL or shapely."""
+    if missing:
+        raise RunError("outlines", f"a library is missing ({missing})", f"install it: {INSTALL}")
 
 
 def read(path, how):
     """Read the map. Raises RunError."""
-    need_libraries()
+    need()
     gdal.UseExceptions()
     ogr.UseExceptions()
     if not path.exists():
@@ -355,10 +355,15 @@ def place_of(path, source, name):
     return axes[0][0] - steps[0] / 2, steps[0], 0, axes[1][0] - steps[1] / 2, 0, steps[1]
 
 
+def in_memory():
+    """An empty data set of vectors."""
+    return (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
+
+
 def inside(footprint, shape):
     """Which pixels have their centre in the polygon, given in columns and rows."""
     image = gdal.GetDriverByName("MEM").Create("", shape[1], shape[0], 1, gdal.GDT_Byte)
-    memory = (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
+    memory = in_memory()
     layer = memory.CreateLayer("footprint")
     feature = ogr.Feature(layer.GetLayerDefn())
     feature.SetGeometry(ogr.CreateGeometryFromWkb(wkb.dumps(Polygon(footprint))))
@@ -488,7 +493,7 @@ def regions(values, mask):
     image = gdal.GetDriverByName("MEM").Create("", columns, rows, 2, gdal.GDT_Int32)
     image.GetRasterBand(1).WriteArray(values)
     image.GetRasterBand(2).WriteArray(mask.astype(np.int32))
-    memory = (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
+    memory = in_memory()
     layer = memory.CreateLayer("regions")
     layer.CreateField(ogr.FieldDefn("value", ogr.OFTInteger))
     gdal.Polygonize(image.GetRasterBand(1), image.GetRasterBand(2), layer, 0)
@@ -519,10 +524,11 @@ def bevelled(polygon):
 def placed(geometry, place):
     """Convert columns and rows to the coordinates of the map."""
     x0, a, b, y0, c, d = place
+    return moved(geometry, lambda p: np.c_[x0 + a * p[:, 0] + b * p[:, 1], y0 + c * p[:, 0] + d * p[:, 1]])
 
-    def ring(points):
-        p = np.asarray(points)
-        return np.c_[x0 + a * p[:, 0] + b * p[:, 1], y0 + c * p[:, 0] + d * p[:, 1]]
-    parts = [Polygon(ring(p.exterior.coords), [ring(r.coords) for r in p.interiors])
+
+def moved(geometry, onto):
+    """A polygon or multipolygon with the vertices [n, 2] of each ring transformed."""
+    parts = [Polygon(onto(np.asarray(p.exterior.coords)), [onto(np.asarray(r.coords)) for r in p.interiors])
              for p in getattr(geometry, "geoms", [geometry])]
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)

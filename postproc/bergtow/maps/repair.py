@@ -31,10 +31,10 @@ from bergtow.errors import RunError
 from bergtow.maps.plane import vertices
 
 try:
-    from shapely.geometry import Point, Polygon
+    from shapely.geometry import MultiPoint, Point, Polygon
     from shapely.ops import unary_union
     from shapely.validation import make_valid
-except ImportError:  # map_read.need_libraries reports it
+except ImportError:  # map_read.need reports it
     pass
 
 SAME = 0.9               # of both areas: traced twice; of the smaller area: lies inside the other
@@ -159,7 +159,7 @@ def whole(shape, book):
     for part in parts_of(shape.geometry):
         if not part.is_valid:
             mended = parts_of(make_valid(part))
-            book.note("crossing", shape.name, abs(ring_area(part)), sum(p.area for p in mended))
+            book.note("crossing", shape.name, Polygon(part.exterior).area, sum(p.area for p in mended))
             parts += mended
         else:
             parts.append(part)
@@ -175,11 +175,6 @@ def whole(shape, book):
     names = [shape.name] if len(parts) == 1 else [f"{shape.name}, part {k + 1}" for k in range(len(parts))]
     return [Floe(name, filled(p, name, book), shape.thickness, shape.cut, pixels, shape.straight)
             for name, p in zip(names, parts)]
-
-
-def ring_area(polygon):
-    x, y = np.asarray(polygon.exterior.coords).T[:2]
-    return 0.5 * float(np.sum((x[:-1] - x[0]) * (y[1:] - y[0]) - (x[1:] - x[0]) * (y[:-1] - y[0])))
 
 
 def filled(polygon, name, book):
@@ -382,12 +377,10 @@ def trimmed(polygon, tolerance):
 
 def hull_of_shapes(shapes):
     """Polygon around all shapes that lie in the plane: outlines tell nothing else about the area observed."""
-    from shapely.geometry import MultiPoint
     places = np.concatenate([vertices(s.geometry) for s in shapes])
     return MultiPoint(places[np.isfinite(places).all(axis=1)]).convex_hull
 
 
 def hull_of(floes):
     """Points on the convex hull of all floes, (n, 2)."""
-    from shapely.geometry import MultiPoint
     return vertices(MultiPoint(np.concatenate([vertices(f.polygon) for f in floes])).convex_hull.buffer(0))

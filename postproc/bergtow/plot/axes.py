@@ -31,10 +31,6 @@ def headline(figure, e, subject):
     style.head(figure, f"{style.plain(e.title)}: {subject}", ", ".join(words))
 
 
-def of(e, rows):
-    return e.mean[rows]
-
-
 def wants_log(values):
     """True if the values are positive and span more than a decade and a half."""
     values = np.asarray(values, dtype=float)

@@ -157,11 +157,8 @@ def draw(run, c, whole=False):
         body = run.bodies[k]
         colour = style.BODY if body.towed else style.WALL if body.wall else style.FIXED
         axes.add_collection(
-            PolyCollection([turn(shape)],
-                           facecolor=colour,
-                           edgecolor=style.BODY_EDGE if body.towed else colour,
-                           linewidth=0.8,
-                           zorder=2))
+            PolyCollection([turn(shape)], facecolor=colour, edgecolor=style.BODY_EDGE if body.towed else colour,
+                           linewidth=0.8, zorder=2))
     top = force.max(initial=0.0)
     if top > 0:
         lines, which = with_images(run, lines)
@@ -171,13 +168,8 @@ def draw(run, c, whole=False):
         least = top * 10 ** -DECADES
         seen = force >= least
         widths = WIDEST * np.maximum(force[seen] / top, 1e-12) ** 0.5
-        drawn = LineCollection(turn(lines[seen]),
-                               array=force[seen],
-                               cmap=style.FORCE_MAP,
-                               norm=LogNorm(least, top),
-                               linewidths=np.maximum(widths, 0.4),
-                               capstyle="round",
-                               zorder=3)
+        drawn = LineCollection(turn(lines[seen]), array=force[seen], cmap=style.FORCE_MAP, norm=LogNorm(least, top),
+                               linewidths=np.maximum(widths, 0.4), capstyle="round", zorder=3)
         axes.add_collection(drawn)
         factor, unit = style.scale([top], "N")
         bar = figure.colorbar(drawn,
@@ -187,19 +179,13 @@ def draw(run, c, whole=False):
         bar.set_label(f"impulse / time step ({unit})")
     axes.set_aspect("equal")
     low, high = turn(np.array([[x0, y0], [x1, y1]]))
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_xlabel("y, east (m)" if run.geographic else "x (m)")
-    axes.set_ylabel("x, north (m)" if run.geographic else "y (m)")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="y, east (m)" if run.geographic else "x (m)",
+             ylabel="x, north (m)" if run.geographic else "y (m)")
     words = (
         f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the force, "
         f"none below {10 ** -DECADES:.1g} of the largest"
         if top > 0 else "no contact bears a force")
-    figure.text(0.02,
-                1 - 0.14 / height,
-                f"{style.title(run)}: force chains at {c.time:g} s",
-                va="top",
-                fontsize=13.5,
+    figure.text(0.02, 1 - 0.14 / height, f"{style.title(run)}: force chains at {c.time:g} s", va="top", fontsize=13.5,
                 fontweight="bold")
     figure.text(0.02, 1 - 0.42 / height, f"{style.conditions(run)}\n{words}", va="top", fontsize=10, color=style.FAINT)
     return figure
@@ -216,8 +202,7 @@ def options(p):
         "largest force on each floe"
     )
     p.add_argument("-o", "--output", metavar="FILE", type=Path, help="file to write (default: RUN/chains.png)")
-    p.add_argument("--whole",
-                   action="store_true",
+    p.add_argument("--whole", action="store_true",
                    help="draw the whole domain (default: what holds the towed body and the forces)")
     arguments.add_force(p)
 

@@ -19,7 +19,7 @@ from bergtow import arguments, writing
 from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.plot import variants as plot_variants
-from bergtow.plot.axes import axis_label, headline, numeric, of, wants_log
+from bergtow.plot.axes import axis_label, headline, numeric, wants_log
 from bergtow.plot.loads import MOST_LINES, draw_above, draw_exceedance, draw_returns
 from bergtow.plot.sweep import draw_scatter, draw_sweep
 from bergtow.result.members import Members, reading, short_key
@@ -40,7 +40,7 @@ def draw_map(e, first, second):
     most = 1
     for i, v in enumerate(ys):
         for j, u in enumerate(xs):
-            cell = [dict(zip(e.seed[c.finished].tolist(), of(e, c.finished))) for c in conditions
+            cell = [dict(zip(e.seed[c.finished].tolist(), e.mean[c.finished])) for c in conditions
                     if c.values[first] == u and c.values[second] == v]
             least[i, j] = any(e.without_bound(c.members) for c in conditions
                               if c.values[first] == u and c.values[second] == v)
@@ -61,13 +61,9 @@ def draw_map(e, first, second):
         image = ax.pcolormesh(values, cmap=colours, norm=norm, edgecolor=style.PAPER, linewidth=0.6)
         for (i, j), v in np.ndenumerate(values):
             shade = image.norm(v) if np.isfinite(v) else 0
-            ax.text(j + 0.5,
-                    i + 0.5,
+            ax.text(j + 0.5, i + 0.5,
                     ("at least\n" if ax is axes[0] and least[i, j] else "") + texts(v) if np.isfinite(v) else "–",
-                    ha="center",
-                    va="center",
-                    fontsize=9.5,
-                    color=style.ON_DARK if shade > 0.5 else style.ON_LIGHT)
+                    ha="center", va="center", fontsize=9.5, color=style.ON_DARK if shade > 0.5 else style.ON_LIGHT)
         for set_ticks, key, some in ((ax.set_xticks, first, xs), (ax.set_yticks, second, ys)):
             times = reading(key, e.units[key])[0]
             set_ticks(np.arange(len(some)) + 0.5, [f"{times * v:.3g}" for v in some])
@@ -90,8 +86,7 @@ def draw_indices(axes, names, indices):
                                            ("total", -0.17, style.TOW, "total")) if name in indices else ():
             axes.barh(k + shift, indices[name][what], height=0.3, color=colour, label=label if k == 0 else None)
             axes.plot(indices[name][f"{what}_95"], [k + shift] * 2, color=style.INK, linewidth=1.2)
-    axes.set_xlabel("share of the explained variance")
-    axes.set_xlim(0, 1.02)
+    axes.set(xlabel="share of the explained variance", xlim=(0, 1.02))
     axes.legend(loc="lower right")
 
 
@@ -168,9 +163,7 @@ def pictures(e, options, conditions):
 def options(p):
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
     p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to put the pictures (default: DIR)")
-    p.add_argument("--format",
-                   choices=[s[1:] for s in writing.PICTURES],
-                   default="png",
+    p.add_argument("--format", choices=[s[1:] for s in writing.PICTURES], default="png",
                    help="kind of the files (default png)")
     loads.add_options(p)
     arguments.add_force(p)

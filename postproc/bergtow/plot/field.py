@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The ice field of a run before, during and after the tow, with the channel that the body leaves."""
 from bergtow import arguments, writing
-from bergtow.errors import USAGE, BergtowError, RunError
 from bergtow.plot import style
-from bergtow.plot.scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
+from bergtow.plot.scene import Colouring, Scene, add_options, framed
 from bergtow.result.run import Run
 
 import numpy as np
@@ -14,8 +13,7 @@ LETTER, TICK = 0.083, 0.48  # space for a letter of a panel's title and for a nu
 
 def frames_to_show(run, times):
     """[(label, frame)]: the frames nearest to the times given; by default first, half of the tow, last."""
-    if not run.n_frames:
-        raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+    run.need_frames()
     if times:
         return [("", run.frame_at(t)) for t in times]
     last = run.n_frames - 1
@@ -80,10 +78,7 @@ def layout(n, view, turned, lines):
 def draw(run, kind="speed", times=(), window="auto"):
     """The figure. kind: one of COLOURS; times: s; window: whole, body, or auto."""
     shown = frames_to_show(run, times)
-    follow = window == "body" or (window == "auto" and needs_window(run))
-    if follow and run.towed is None:
-        raise RunError(run.result, "has no towed body", "use --window whole")
-    view = view_body(run) if follow else view_whole(run)
+    follow, view = framed(run, window)
     titles = [panel_words(run, label, frame, follow) for label, frame in shown]
     size, rects, cax, orientation = layout(len(shown), view, run.geographic, max(map(len, titles)))
     figure = style.Figure(figsize=size)
@@ -122,20 +117,12 @@ def draw(run, kind="speed", times=(), window="auto"):
 
 def options(p):
     arguments.add_run(p, "field.png")
-    p.add_argument("--colour",
-                   "--color",
-                   choices=COLOURS,
-                   default="speed",
-                   help="what colours the floes (default: speed)")
-    p.add_argument("--times", metavar="T", type=float, nargs="+", default=(),
+    add_options(p)
+    p.add_argument("--times", metavar="T", type=arguments.finite, nargs="+", default=(),
                    help="draw the frames nearest to these times, s, in place of first, middle and last")
-    p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
-                   help="the whole domain, or a window about the body (default: auto, the body in long domains)")
 
 
 def perform(a):
-    if not np.isfinite(a.times).all():
-        raise BergtowError("--times: not a finite number", USAGE)
     path = arguments.output(a, "field.png", writing.PICTURES)
     with Run(a.run) as run:
         writing.save(draw(run, a.colour, a.times, a.window), path, a.force)

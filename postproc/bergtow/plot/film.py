@@ -9,10 +9,10 @@ import subprocess
 import tempfile
 
 from bergtow import arguments, writing
-from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.plot.force import draw_ice, running_mean, smoothing
-from bergtow.plot.scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
+from bergtow.plot.scene import Colouring, Scene, add_options, framed
 from bergtow.result.run import Run
 
 import numpy as np
@@ -26,10 +26,7 @@ class Film:
 
     def __init__(self, run, frames, kind="speed", width=1280, window="auto"):
         self.run = run
-        follow = window == "body" or (window == "auto" and needs_window(run))
-        if follow and run.towed is None:
-            raise RunError(run.result, "has no towed body", "use --window whole")
-        view = view_body(run) if follow else view_whole(run)
+        follow, view = framed(run, window)
         wide, high = (view[3] - view[2], view[1] - view[0]) if run.geographic else (view[1] - view[0],
                                                                                     view[3] - view[2])
         left, right, head, between, curve, foot = 0.85, 1.15, 0.85, 0.95, 1.75, 0.58
@@ -152,10 +149,8 @@ def write_gif(film, frames, fps, path):
 
     Pixels that do not change get the 256th index, transparent: their long runs need almost no space.
     """
-    picked = [
-        film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,
-                                                                          len(frames) - 1, min(4, len(frames)))
-    ]
+    picked = [film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,
+                                                                                len(frames) - 1, min(4, len(frames)))]
     palette = Image.fromarray(np.concatenate(picked)).quantize(255, method=Image.Quantize.MEDIANCUT)
     colours = palette.getpalette()[:765] + [0, 0, 0]
 
@@ -170,51 +165,28 @@ def write_gif(film, frames, fps, path):
             yield picture
 
     film_of = pictures()
-    next(film_of).save(path,
-                       format="GIF",
-                       save_all=True,
-                       append_images=film_of,
-                       duration=max(20, round(1000 / fps)),
-                       loop=0,
-                       optimize=False,
-                       comment=writing.MARK.encode(),
-                       transparency=255,
-                       disposal=1)
+    next(film_of).save(path, format="GIF", save_all=True, append_images=film_of, duration=max(20, round(1000 / fps)),
+                       loop=0, optimize=False, comment=writing.MARK.encode(), transparency=255, disposal=1)
 
 
 def options(p):
     arguments.add_run(p, "film.mp4")
-    p.add_argument("--colour",
-                   "--color",
-                   choices=COLOURS,
-                   default="speed",
-                   help="what colours the floes (default: speed)")
-    p.add_argument("--fps", type=float, default=20, help="frames per second (default: 20)")
-    p.add_argument("--frames",
-                   metavar="N",
-                   type=int,
+    add_options(p)
+    p.add_argument("--fps", type=arguments.between(0.1, 120), default=20, help="frames per second (default: 20)")
+    p.add_argument("--frames", metavar="N", type=arguments.at_least_one,
                    help="at most N frames, evenly spaced (default: all, 120 for a GIF)")
-    p.add_argument("--width", metavar="PX", type=int, help="width in pixels (default: 1280, 900 for a GIF)")
-    p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
-                   help="the whole domain, or a window that moves with the body (default: auto)")
+    p.add_argument("--width", metavar="PX", type=arguments.whole_from(300, 8000),
+                   help="width in pixels (default: 1280, 900 for a GIF)")
 
 
 def perform(a):
     path = arguments.output(a, "film.mp4", (".mp4", ".gif"))
     gif = path.suffix.lower() == ".gif"
-    if not 0.1 <= a.fps <= 120:
-        raise BergtowError("--fps: choose 0.1 to 120", USAGE)
-    if a.frames is not None and a.frames < 1:
-        raise BergtowError("--frames: choose at least 1", USAGE)
-    width = a.width or (900 if gif else 1280)
-    if not 300 <= width <= 8000:
-        raise BergtowError("--width: choose 300 to 8000", USAGE)
     with Run(a.run) as run:
-        if not run.n_frames:
-            raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+        run.need_frames()
         count = min(a.frames or (120 if gif else run.n_frames), run.n_frames)
         frames = sorted({int(i) for i in np.linspace(0, run.n_frames - 1, count).round()})
-        film = Film(run, frames, a.colour, width, a.window)
+        film = Film(run, frames, a.colour, a.width or (900 if gif else 1280), a.window)
         with writing.written(path, a.force) as new:
             (write_gif if gif else write_mp4)(film, frames, a.fps, new)
     print(path)

@@ -3,7 +3,7 @@
 import textwrap
 
 from bergtow import arguments, writing
-from bergtow.errors import USAGE, BergtowError, RunError
+from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.result.run import Run
 
@@ -72,25 +72,12 @@ def draw_ice(axes, run, factor, unit, top=None):
         start, end = run.window
         steady = run.verdict[0] == "steady"
         if np.isfinite(bottom):
-            axes.fill_between([start, end],
-                              bottom / factor,
-                              ceiling / factor,
-                              color=style.TOW,
-                              alpha=0.28,
-                              linewidth=0,
+            axes.fill_between([start, end], bottom / factor, ceiling / factor, color=style.TOW, alpha=0.28, linewidth=0,
                               zorder=1.5)
-        axes.plot([start, end], [mean / factor] * 2,
-                  color=style.TOW,
-                  linewidth=1.8,
-                  linestyle="-" if steady else ":",
-                  zorder=4,
-                  label=run.mean_name + (", 95 % interval" if np.isfinite(bottom) else ""))
+        axes.plot([start, end], [mean / factor] * 2, color=style.TOW, linewidth=1.8, linestyle="-" if steady else ":",
+                  zorder=4, label=run.mean_name + (", 95 % interval" if np.isfinite(bottom) else ""))
     if np.isfinite(reference):
-        axes.axhline(reference / factor,
-                     color=style.REFERENCE,
-                     linewidth=1.3,
-                     dashes=(5, 3),
-                     zorder=4,
+        axes.axhline(reference / factor, color=style.REFERENCE, linewidth=1.3, dashes=(5, 3), zorder=4,
                      label="reference")
     marks = [m for m in (reference, bottom, ceiling) if np.isfinite(m)]
     _clip_peaks(axes, ice, smooth, marks, factor, top)
@@ -105,13 +92,8 @@ def mark_window(axes, run):
     """Shade the averaging window; hatched if the tow is not steady in it."""
     if run.window:
         steady = run.verdict[0] in ("steady", "not judged")
-        axes.axvspan(*run.window,
-                     facecolor=style.WINDOW,
-                     edgecolor=style.PAPER if steady else style.FAINT,
-                     hatch=None if steady else "///",
-                     alpha=1 if steady else 0.35,
-                     linewidth=0,
-                     zorder=0)
+        axes.axvspan(*run.window, facecolor=style.WINDOW, edgecolor=style.PAPER if steady else style.FAINT,
+                     hatch=None if steady else "///", alpha=1 if steady else 0.35, linewidth=0, zorder=0)
 
 
 def draw_balance(axes, run, factor, unit):
@@ -147,10 +129,8 @@ def findings(run):
         factor, unit = style.scale([mean], "N")
         if np.isfinite(low) and high > low:  # all with the two digits that the interval justifies
             decimals = len(style.short((high - low) / 2 / factor, 2).partition(".")[2])
-            words.append(
-                f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: "
-                f"{low / factor:.{decimals}f} to {high / factor:.{decimals}f})"
-            )
+            words.append(f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: "
+                         f"{low / factor:.{decimals}f} to {high / factor:.{decimals}f})")
         else:
             words.append(f"{run.mean_name}: ice resistance {style.short(mean / factor)} {unit}")
     tow, low, high = run.interval("tow_force")
@@ -181,14 +161,8 @@ def draw(run, top=None):
     if not len(run["time"]):
         raise RunError(run.result, "holds no samples", "the run ended before its first sample: run the case for longer")
     figure = style.Figure(figsize=(11, 7.2))
-    grid = figure.add_gridspec(2,
-                               1,
-                               height_ratios=(1.55, 1),
-                               hspace=0.30,
-                               left=0.085,
-                               right=0.975,
-                               top=0.79 if doubts(run) else 0.825,
-                               bottom=0.115)
+    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975,
+                               top=0.79 if doubts(run) else 0.825, bottom=0.115)
     upper = figure.add_subplot(grid[0])
     lower = figure.add_subplot(grid[1], sharex=upper)
     smooth = running_mean(run["ice_resistance"], smoothing(run)[0])
@@ -253,12 +227,10 @@ def options(p):
     arguments.add_run(p, "force.png")
     p.add_argument("--diagnostics", action="store_true",
                    help="also draw contacts, sweeps, residual and overlap, in a second file (NAME-diagnostics)")
-    p.add_argument("--max", metavar="N", type=float, help="upper end of the force axes, N")
+    p.add_argument("--max", metavar="N", type=arguments.above_zero, help="upper end of the force axes, N")
 
 
 def perform(a):
-    if a.max is not None and not 0 < a.max < np.inf:
-        raise BergtowError("--max: choose a force above 0", USAGE)
     path = arguments.output(a, "force.png", writing.PICTURES)
     second = path.with_name(f"{path.stem}-diagnostics{path.suffix}")
     if a.diagnostics:

@@ -60,9 +60,7 @@ def draw_hull(axes, run, values, colour, label):
     scale = 0.75 * size / top if top > 0 else 0.0
     outlines = along_hull(run)
     axes.add_collection(
-        PolyCollection([_turn(s, run) for s in bars(outlines, values, scale)],
-                       facecolor=colour,
-                       edgecolor=style.PAPER,
+        PolyCollection([_turn(s, run) for s in bars(outlines, values, scale)], facecolor=colour, edgecolor=style.PAPER,
                        linewidth=0.6))
     axes.add_patch(Polygon(_turn(hull, run), closed=True, facecolor=style.WINDOW, edgecolor=style.INK, linewidth=1.0))
     step = _round(top / factor)
@@ -71,16 +69,10 @@ def draw_hull(axes, run, values, colour, label):
         axes.plot(*_turn(np.vstack([ring, ring[:1]]), run).T, color=style.GRID, linewidth=0.7, zorder=0)
         axes.update_datalim(_turn(ring, run))
     ahead = np.array([[0.0, 0.0], [0.55 * size, 0.0]])
-    axes.annotate("",
-                  _turn(ahead, run)[1],
-                  _turn(ahead, run)[0],
+    axes.annotate("", _turn(ahead, run)[1], _turn(ahead, run)[0],
                   arrowprops=dict(arrowstyle="->", color=style.FAINT, linewidth=1))
-    axes.annotate("body's own x",
-                  _turn(0.5 * ahead[1] - [0, 0.1 * size], run),
-                  fontsize=8.5,
-                  color=style.FAINT,
-                  ha="center",
-                  va="center")
+    axes.annotate("body's own x", _turn(0.5 * ahead[1] - [0, 0.1 * size], run), fontsize=8.5, color=style.FAINT,
+                  ha="center", va="center")
     for shape in bars(outlines, values, scale):
         axes.update_datalim(_turn(shape, run))
     axes.set_aspect("equal")
@@ -109,13 +101,10 @@ def draw_exceedance(axes, run):
     hits = run.impacts
     late = hits["time"] >= run.number("impacts.from_s")  # none without a window
     peaks, rate = exceedance(hits["peak"][late], run.number("impacts.hours"))
-    axes.set_xlabel(f"peak of a collision (N)\n{hits['conversion']}")
-    axes.set_ylabel("exceeded (per hour)")
+    axes.set(xlabel=f"peak of a collision (N)\n{hits['conversion']}", ylabel="exceeded (per hour)")
     axes.set_title("How often a peak is exceeded" + ", at least" * run.at_least, loc="left", fontsize=10.5)
     if not len(peaks) or peaks[0] <= 0:
-        axes.annotate("no collisions in the window", (0.5, 0.5),
-                      xycoords="axes fraction",
-                      ha="center",
+        axes.annotate("no collisions in the window", (0.5, 0.5), xycoords="axes fraction", ha="center",
                       color=style.FAINT)
         return
     style.logarithmic(axes.xaxis, axes.yaxis)
@@ -125,18 +114,11 @@ def draw_exceedance(axes, run):
     if np.isfinite(push) and push > 0:
         axes.axvline(push, color=LARGEST, linestyle="--", linewidth=1.2)
         axes.annotate(f"largest quasi-static load of a floe {style.quantity(push, 'N')}", (push, 0.97),
-                      xycoords=("data", "axes fraction"),
-                      rotation=90,
-                      ha="right",
-                      va="top",
-                      fontsize=9,
-                      color=LARGEST)
+                      xycoords=("data", "axes fraction"), rotation=90, ha="right", va="top", fontsize=9, color=LARGEST)
     axes.set_xlim(max(peaks[-1], 1e-4 * peaks[0]), 1.5 * max(peaks[0], push if np.isfinite(push) else 0))
     axes.grid(True)
     axes.annotate(f"{len(peaks)} collisions in {style.short(60 * run.number('impacts.hours'))} min", (0.02, 0.03),
-                  xycoords="axes fraction",
-                  fontsize=9,
-                  color=style.FAINT)
+                  xycoords="axes fraction", fontsize=9, color=style.FAINT)
 
 
 def _start(panels, name):
@@ -156,8 +138,7 @@ def draw(run):
                            "wait for it, or run the case again")
     figure = style.Figure(figsize=(11, 8.6))
     grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.855, bottom=0.09, hspace=0.26, wspace=0.16)
-    window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(
-        panels["from"]) else "no window"
+    window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(panels["from"]) else "no window"
     least = "at least the " if run.at_least else ""  # panels count nothing in steps without a converged solution
     draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"{least}mean load by panel, {window}")
     draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST,

@@ -6,27 +6,35 @@ from bergtow.stats import extreme as stat_extreme
 from bergtow.stats.conditions import extremes
 
 import numpy as np
+import scipy
 
 MOST_LINES = 8
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#8c6bb1", "#b8860b", "#56b4e9", "#4d4d4d", "#cc79a7")
 
 
-def key_beside(figure, axes, notes, step, some):
-    """Put legend and notes to the right of the axes. step: one in this many of the conditions in `some` is shown."""
+def every(some):
+    """One in how many of these conditions is shown."""
+    return max(1, -(-len(some) // MOST_LINES))
+
+
+def finished(e, axes, notes, some, subject):
+    """The figure, with legend and notes to the right of the axes. some: the conditions, see every()."""
+    axes.grid(True)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
-    notes = notes + [f"one in {step} of {len(some)} conditions is shown"] * (step > 1)
-    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    notes = notes + [f"one in {every(some)} of {len(some)} conditions is shown"] * (every(some) > 1)
+    axes.figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    headline(axes.figure, e, subject)
+    return axes.figure
 
 
 def draw_exceedance(e, options, tails=None):
     """Figure of the exceedance of peaks, one line per condition, overlaid with the GPD tail; None if there are no
     peaks. tails: the known fitted tails, by the index of their condition."""
     some = [c for c in e.conditions() if len(c.finished)]
-    step = max(1, -(-len(some) // MOST_LINES))
     figure, axes = style.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.08, right=0.66, top=0.86, bottom=0.14)
     conversions, top, least = set(), 0.0, np.inf
-    for colour, c in zip(CYCLE, some[::step]):
+    for colour, c in zip(CYCLE, some[::every(some)]):
         hits = [h for h in map(e.impacts, c.finished) if h]
         fields = [{"time": h[0], "peak": h[1], "start": h[2], "hours": h[3]} for h in hits]
         peaks, rate = stat_extreme.exceedance(fields)
@@ -35,34 +43,22 @@ def draw_exceedance(e, options, tails=None):
             continue
         conversions.update(h[4] for h in hits)
         top, least = max(top, peaks[0]), min(least, peaks[some_above][-1])
-        axes.plot(peaks[some_above],
-                  rate[some_above],
-                  color=colour,
-                  drawstyle="steps-post",
-                  linewidth=1.4,
+        axes.plot(peaks[some_above], rate[some_above], color=colour, drawstyle="steps-post", linewidth=1.4,
                   label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
         tail = tails[c.index] if tails else extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
             z = np.geomspace(tail["threshold"] * 1.0001, 3 * peaks[0], 200)
-            beyond = np.maximum(1 + tail["shape"] * (z - tail["threshold"]) / tail["scale"], 0)
-            fitted = tail["rate_per_hour"] * (np.exp(-(z - tail["threshold"]) / tail["scale"])
-                                              if abs(tail["shape"]) < 1e-8 else beyond**(-1 / tail["shape"]))
-            axes.plot(z,
-                      np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan),
-                      color=colour,
-                      linewidth=1,
+            fitted = tail["rate_per_hour"] * scipy.stats.genpareto.sf(z, tail["shape"], tail["threshold"],
+                                                                      tail["scale"])
+            axes.plot(z, np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan), color=colour, linewidth=1,
                       dashes=(4, 2))
     if not conversions:
         return None
     style.logarithmic(axes.xaxis, axes.yaxis)
-    axes.set_xlim(max(1e-4 * top, 0.7 * least), 3 * top)
-    axes.set_xlabel(f"peak of a collision (N), {by(conversions)}")
-    axes.set_ylabel("exceeded (per hour of tow)")
-    axes.grid(True)
+    axes.set(xlim=(max(1e-4 * top, 0.7 * least), 3 * top), xlabel=f"peak of a collision (N), {by(conversions)}",
+             ylabel="exceeded (per hour of tow)")
     notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
-    key_beside(figure, axes, notes, step, some)
-    headline(figure, e, "how often a peak is exceeded")
-    return figure
+    return finished(e, axes, notes, some, "how often a peak is exceeded")
 
 
 def tail(f, hours):
@@ -108,8 +104,7 @@ def draw_returns(e, conditions, name):
     some = [c for c in conditions if name in c["loads"] and "refused" not in c["loads"][name]["over_threshold"]]
     if not some:
         return None
-    step = max(1, -(-len(some) // MOST_LINES))
-    shown, first = some[::step], some[0]["loads"][name]
+    shown, first = some[::every(some)], some[0]["loads"][name]
     designs = [d for d in (c["loads"][name]["design"] for c in shown) if "refused" not in d]
     # no design value if a tow is shorter than the separation of clusters
     values = [d["value"] for d in designs] or [max(c["loads"][name]["over_threshold"]["maxima"]) for c in shown]
@@ -131,7 +126,6 @@ def draw_returns(e, conditions, name):
         axes.set_ylim(floor - 0.1 * (top - floor), top)
     axes.set_xlabel("return time (hours of tow)")
     axes.set_ylabel(f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}")
-    axes.grid(True)
     tows = sorted({c["loads"][name]["design"]["tow_hours"] for c in shown})
     hours = f"{tows[0]:.3g} h" if tows[-1] < 1.001 * tows[0] else f"{tows[0]:.3g} to {tows[-1]:.3g} h (Froude)"
     notes = ["dots: clusters of the fields together", "lines: tail fitted to them (GPD), dashed",
@@ -145,9 +139,7 @@ def draw_returns(e, conditions, name):
     if lacking:
         more = [f"and {len(lacking) - 2} more"] * (len(lacking) > 2)
         notes += ["without such a tail, not drawn:", *lacking[:2], *more]
-    key_beside(figure, axes, notes, step, some)
-    headline(figure, e, f"return levels of {first['label']}")
-    return figure
+    return finished(e, axes, notes, some, f"return levels of {first['label']}")
 
 
 def draw_above(e, conditions, name):
@@ -156,8 +148,7 @@ def draw_above(e, conditions, name):
     some = [c for c in conditions if name in c["loads"]]
     if not some:
         return None
-    step = max(1, -(-len(some) // MOST_LINES))
-    shown, first = some[::step], some[0]["loads"][name]
+    shown, first = some[::every(some)], some[0]["loads"][name]
     levels = [[row["level"] for row in c["loads"][name]["exceedance"]] for c in shown]
     factor, unit = style.scale([np.median([row[-1] for row in levels])], first["units"])
     figure, axes = style.subplots(figsize=(9.2, 4.6))
@@ -173,11 +164,7 @@ def draw_above(e, conditions, name):
         axes.fill_between(level, 100 * np.fmax(low, 1e-9), 100 * np.fmax(high, 1e-9), where=np.isfinite(low),
                           color=colour, alpha=0.15, linewidth=0)
     style.logarithmic(axes.yaxis)
-    axes.set_ylim(50 * least, 100)
-    axes.set_xlabel(f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}")
-    axes.set_ylabel("share of the time above (%)")
-    axes.grid(True)
+    axes.set(ylim=(50 * least, 100), xlabel=f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}",
+             ylabel="share of the time above (%)")
     notes = ["from the median of a condition to the", "largest value simulated; band: 95 % over fields"]
-    key_beside(figure, axes, notes, step, some)
-    headline(figure, e, f"share of the time above a level of {first['label']}")
-    return figure
+    return finished(e, axes, notes, some, f"share of the time above a level of {first['label']}")

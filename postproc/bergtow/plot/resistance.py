@@ -13,6 +13,7 @@ from bergtow import arguments, writing
 from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.result import at_least, compared
+from bergtow.result.origins import source_of_ice
 from bergtow.result.run import Run
 from bergtow.stats import drift as stat_drift
 from bergtow.table import quantity, scale, short
@@ -65,31 +66,21 @@ def read(path):
         made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
         if not np.isfinite(mean):
             raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no window")
-        from_file = any(run.case.get(key, "none") != "none" for key in ("ice.field", "ice.outlines"))
-        return Point(path=run.path,
-                     title=style.title(run),
-                     asked=made if from_file else run.value("ice.concentration", made),
-                     concentration=made,
-                     mean=mean,
-                     se=run.number("mean_ice_resistance_se_n"),
-                     low=low,
-                     high=high,
+        return Point(path=run.path, title=style.title(run),
+                     asked=made if source_of_ice(run.case) else run.value("ice.concentration", made),
+                     concentration=made, mean=mean, se=run.number("mean_ice_resistance_se_n"), low=low, high=high,
                      steady=run.verdict[0] == "steady",
                      change=run.number("window.series.ice_resistance.change_n"),
                      reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
-                     warnings=len(run.warnings),
-                     estimates=run.estimates,
-                     case=dict(run.case),
-                     state=str(run.summary.get("state_hash") or ""),
-                     conditions=estimates)
+                     warnings=len(run.warnings), estimates=run.estimates, case=dict(run.case),
+                     state=str(run.summary.get("state_hash") or ""), conditions=estimates)
 
 
 def curve(point, name):
     """(concentration [n], force [n] N, NaN where undefined) of an estimate, for the conditions of a run."""
     curves = point.conditions["curves"]
-    return np.array(curves["concentration"], dtype=float), np.array([np.nan if f is None else f for f in curves[name]],
-                                                                    dtype=float)
+    return np.array(curves["concentration"], dtype=float), np.array(curves[name], dtype=float)
 
 
 def check_alike(points):
@@ -140,19 +131,15 @@ def rows(points):
             low, high = stat_drift.interval(means)
         names = [name for name in some[0].estimates if all(name in p.estimates for p in some)]
         forces = {name: float(np.mean([p.estimates[name].force for p in some])) for name in names}
-        valid, compares = ({name: all(getattr(p.estimates[name], what)
-                                      for p in some)
-                            for name in names}
+        valid, compares = ({name: all(getattr(p.estimates[name], what) for p in some) for name in names}
                            for what in ("valid", "compares"))
         mean = at_least.of(means.mean(), [p.mean for p in some])
         if isinstance(mean, at_least.AtLeast):
             se = low = high = np.nan
-        out.append({
-            "concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": mean,
-            "drift": stat_drift.of([p.change for p in some], means.mean()),
-            "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
-            "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)
-        })
+        out.append({"concentration": asked, "runs": len(some), "steady": sum(p.steady for p in some), "mean": mean,
+                    "drift": stat_drift.of([p.change for p in some], means.mean()),
+                    "se": se, "low": low, "high": high, "forces": forces, "valid": valid, "compares": compares,
+                    "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)})
     return out
 
 
@@ -160,16 +147,12 @@ def table(points):
     """The rows as a Markdown table, forces in N. Brackets give simulated / estimate for an estimate that is meant for
     these conditions and depends on the concentration; * marks an estimate that is not meant for the conditions."""
     names = points[0].of_ice
-    head = [
-        "ice, %", "runs", "simulated, N", "standard error, N", *(e.label for e in names.values()),
-        "steps not converged", "warnings"
-    ]
+    head = ["ice, %", "runs", "simulated, N", "standard error, N", *(e.label for e in names.values()),
+            "steps not converged", "warnings"]
     lines = ["| " + " | ".join(head) + " |", "|" + " ---: |" * len(head)]
     for row in rows(points):
-        cells = [
-            f"{100 * row['concentration']:.3g}",
-            str(row["runs"]), f"{row['mean']:.4g}", f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"
-        ]
+        cells = [f"{100 * row['concentration']:.3g}",
+                 str(row["runs"]), f"{row['mean']:.4g}", f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"]
         for name in names:
             force = row["forces"].get(name, np.nan)
             text = "–" if np.isnan(force) else f"{force:.3g}" + ("" if row["valid"][name] else "*")
@@ -219,7 +202,7 @@ def draw_estimates(axes, points, factor):
     for k, (name, estimate) in enumerate(first.of_ice.items()):
         label, colour = estimate.label, style.ESTIMATES[k % len(style.ESTIMATES)]
         a, force = curve(first, name)
-        low, high = (np.nan if v is None else v for v in valid[name])
+        low, high = np.array(valid[name], dtype=float)
         inside = (a >= low) & (a <= high)
         with_force = np.where(force > 0, force, np.nan) / factor
         axes.plot(a, np.where(inside, with_force, np.nan), color=colour, linewidth=2, label=label)
@@ -228,19 +211,11 @@ def draw_estimates(axes, points, factor):
         spans = [s for s in spans if None not in (s["force_n"], s["low_n"], s["high_n"])]
         if spans and spans[0]["high_n"] > spans[0]["low_n"]:
             down, up = (spans[0][k] / spans[0]["force_n"] for k in ("low_n", "high_n"))
-            axes.fill_between(a,
-                              np.where(inside, with_force * down, np.nan),
-                              np.where(inside, with_force * up, np.nan),
-                              color=colour,
-                              alpha=0.18,
-                              linewidth=0,
-                              zorder=1.2)
+            axes.fill_between(a, np.where(inside, with_force * down, np.nan), np.where(inside, with_force * up, np.nan),
+                              color=colour, alpha=0.18, linewidth=0, zorder=1.2)
     for estimate in first.estimates.values():
         if estimate.on_top and estimate.force > 0:
-            axes.axhline(estimate.force / factor,
-                         color=style.FAINT,
-                         linewidth=1,
-                         dashes=(6, 3),
+            axes.axhline(estimate.force / factor, color=style.FAINT, linewidth=1, dashes=(6, 3),
                          label=f"{estimate.label} (comes on top)")
 
 
@@ -278,17 +253,9 @@ def draw_runs(axes, points, factor, low, log):
                                (~steady & alone, style.PAPER, "window not steady or too short")):
         which = which & shown
         if which.any():
-            axes.errorbar(a[which],
-                          mean[which] / factor,
-                          yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor,
-                          fmt="o",
-                          color=style.ICE,
-                          markerfacecolor=face,
-                          markersize=6,
-                          capsize=3,
-                          linewidth=1.4,
-                          zorder=5,
-                          label=label)
+            axes.errorbar(a[which], mean[which] / factor,
+                          yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor, fmt="o", color=style.ICE,
+                          markerfacecolor=face, markersize=6, capsize=3, linewidth=1.4, zorder=5, label=label)
     for which, face, label in ((steady & ~alone, style.ICE, "simulated, a tow"),
                                (~steady & ~alone, style.PAPER, "a tow, not steady or too short")):
         which = which & shown
@@ -303,24 +270,13 @@ def draw_runs(axes, points, factor, low, log):
     if averaged:
         centre, low_end, high_end = (np.array([r[key] for r in averaged]) for key in ("mean", "low", "high"))
         reach = np.minimum(centre - low_end, centre - low / 2) if log else centre - low_end
-        axes.errorbar([r["concentration"] for r in averaged],
-                      centre / factor,
-                      yerr=np.array([np.maximum(reach, 0), high_end - centre]) / factor,
-                      fmt="s",
-                      color=style.INK,
-                      markersize=5,
-                      capsize=5,
-                      linewidth=1.8,
-                      zorder=6,
-                      label="mean of the tows, 95 % (t)")
+        axes.errorbar([r["concentration"] for r in averaged], centre / factor,
+                      yerr=np.array([np.maximum(reach, 0), high_end - centre]) / factor, fmt="s", color=style.INK,
+                      markersize=5, capsize=5, linewidth=1.8, zorder=6, label="mean of the tows, 95 % (t)")
     measured = [p for p in points if np.isfinite(p.reference)]
     if measured:
-        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured],
-                  "D",
-                  color=style.REFERENCE,
-                  markersize=6,
-                  zorder=6,
-                  label="measured")
+        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured], "D",
+                  color=style.REFERENCE, markersize=6, zorder=6, label="measured")
     return np.count_nonzero(~shown)
 
 
@@ -334,12 +290,9 @@ def write_around(figure, points, lost, hidden):
         va="top",
         fontsize=13.5,
         fontweight="bold")
-    figure.text(0.02,
-                0.94,
+    figure.text(0.02, 0.94,
                 f"{e['thickness_m']:.3g} m of ice, body {e['width_m']:.3g} m across, {e['speed_along_m_s']:.3g} m/s "
-                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}",
-                va="top",
-                color=style.FAINT)
+                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}", va="top", color=style.FAINT)
     notes = ["dotted: outside the range", "the estimate is meant for", "band: its range, where it has one"]
     notes += ["out of the picture:", *lost] if lost else []
     if e["length_scale"] != 1:
@@ -368,32 +321,21 @@ def draw(points, log=True):
     hidden = draw_runs(axes, points, factor, low, log)
     if log:
         style.logarithmic(axes.yaxis)
-    axes.set_ylim(low / factor, high / factor)
-    axes.set_xlim(0, 1)
-    axes.set_xlabel("ice concentration")
-    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.set(ylim=(low / factor, high / factor), xlim=(0, 1), xlabel="ice concentration",
+             ylabel=f"mean ice resistance ({unit})")
     axes.grid(which="major")
     handles, labels, lost = style.legend_of(axes)
     order = sorted(range(len(labels)), key=lambda i: handles[i] in of_estimates)
-    axes.legend([handles[i] for i in order], [labels[i] for i in order],
-                loc="upper left",
-                bbox_to_anchor=(1.02, 1.0),
-                borderaxespad=0,
-                handlelength=2.4,
-                labelspacing=0.8)
+    axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left", bbox_to_anchor=(1.02, 1.0),
+                borderaxespad=0, handlelength=2.4, labelspacing=0.8)
     write_around(figure, points, lost, hidden)
     return figure
 
 
 def options(p):
-    p.add_argument("run",
-                   metavar="RUN",
-                   nargs="+",
+    p.add_argument("run", metavar="RUN", nargs="+",
                    help="output folders of runs that differ in concentration and seed only")
-    p.add_argument("-o",
-                   "--output",
-                   metavar="FILE",
-                   type=Path,
+    p.add_argument("-o", "--output", metavar="FILE", type=Path,
                    help="file to write (default: resistance.png beside the first RUN)")
     p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
     p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")

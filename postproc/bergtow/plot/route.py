@@ -41,10 +41,8 @@ def figure(title, words, place, extent, cover, cover_extent, outlines, no_go, ro
     axes.plot(*start, "o", color=style.BODY, markeredgecolor=style.BODY_EDGE, markersize=8)
     aim = flat(np.atleast_2d(goal))
     axes.plot(*aim.T, "X-" if len(aim) > 1 else "X", color=style.JAM, markeredgecolor=style.HALO, markersize=10)
-    axes.set_xlim(left, right)
-    axes.set_ylim(low, high)
-    axes.set_xlabel("y, east (m)" if place.north_first else "x (m)")
-    axes.set_ylabel("x, north (m)" if place.north_first else "y (m)")
+    axes.set(xlim=(left, right), ylim=(low, high), xlabel="y, east (m)" if place.north_first else "x (m)",
+             ylabel="x, north (m)" if place.north_first else "y (m)")
     bar = fig.add_axes(((width - 0.95) / width, axes.get_position().y0, 0.16 / width, axes.get_position().height))
     fig.colorbar(image, cax=bar, label="ice concentration (%)")
     style.times(bar.yaxis, 100)

@@ -144,6 +144,22 @@ def view_body(run):
     return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
 
 
+def framed(run, window):
+    """(does the view follow the towed body, the view) for a --window. Raises RunError."""
+    follow = window == "body" or (window == "auto" and needs_window(run))
+    if follow and run.towed is None:
+        raise RunError(run.result, "has no towed body", "use --window whole")
+    return follow, view_body(run) if follow else view_whole(run)
+
+
+def add_options(p):
+    p.add_argument("--colour", "--color", choices=COLOURS, default="speed",
+                   help="what colours the floes (default: speed)")
+    p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
+                   help="the whole domain, or a window that moves with the body (default: auto, the body in long "
+                   "domains)")
+
+
 def tow_line(run, frame, position):
     """[n, 2] m: hull, towing end and, with two branches, hull again, for a towed body at a position; only the towing
     end if all branches have broken.
@@ -185,8 +201,7 @@ class Scene:
         view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
         axes.set_ylim(*view[:, 1])
-        axes.set_aspect("equal")
-        axes.set_facecolor(style.WATER if run.period[0] or run.period[1] or follow else style.PAPER)
+        axes.set(aspect="equal", facecolor=style.WATER if run.period[0] or run.period[1] or follow else style.PAPER)
         for spine in axes.spines.values():
             spine.set_visible(False)
         relative = " from the body" if follow else ""
@@ -195,8 +210,7 @@ class Scene:
         wide, high = view[1] - view[0]
         axes.xaxis.set_major_locator(MaxNLocator(9 if wide > 2 * high else 5, steps=(1, 2, 5, 10)))
         axes.yaxis.set_major_locator(MaxNLocator(9 if high > 2 * wide else 5, steps=(1, 2, 5, 10)))
-        axes.set_xlabel(names[0])
-        axes.set_ylabel(names[1])
+        axes.set(xlabel=names[0], ylabel=names[1])
 
         # Walls are endless along a periodic direction; a view that follows the body may extend across the seam.
         px, py = run.period if follow else (0.0, 0.0)
@@ -206,11 +220,7 @@ class Scene:
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         self._corners = corners
         kept = dict(animated=animated)
-        self._water = Polygon(self._flat(corners),
-                              closed=True,
-                              facecolor=style.WATER,
-                              edgecolor="none",
-                              zorder=0,
+        self._water = Polygon(self._flat(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0,
                               **kept)
         width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
@@ -270,8 +280,7 @@ class Scene:
     def show(self, frame):
         """Update the artists to a frame."""
         run = self.run
-        if not run.n_frames:
-            raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+        run.need_frames()
         position, centre = np.zeros(2), None
         if run.towed is not None:
             position = run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2])[0]

@@ -8,6 +8,7 @@ import textwrap
 from contextlib import contextmanager
 
 from bergtow import table as text_table
+from bergtow.result.origins import source_of_ice
 
 import matplotlib
 import numpy as np
@@ -50,11 +51,9 @@ HALO = "#fefefe"
 ON_DARK, ON_LIGHT = "#fefefe", "#1d2732"
 JAM = "#c1121f"
 #: {colour: its replacement on a dark page}; all other colours stay the same there
-DARK = {
-    PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
-    ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
-    JAM: "#ff6b6b", "#c2417c": "#f078ac", "#1b4f9c": "#6f9fe8", "#7a5b00": "#cfa63a", RAFTED: "#d45fb4"
-}
+DARK = {PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
+        ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
+        JAM: "#ff6b6b", "#c2417c": "#f078ac", "#1b4f9c": "#6f9fe8", "#7a5b00": "#cfa63a", RAFTED: "#d45fb4"}
 
 #: floes by speed: ice at rest is white, moving ice turns vermilion
 SPEED_MAP = LinearSegmentedColormap.from_list("speed", ["#eaf3f8", "#f6dfae", "#f2a541", "#dd5f1b", "#a62a0c"])
@@ -69,17 +68,15 @@ TOWED_BY, SLOWER = {"line": " on a line", "thrust": " by a vessel"}, 0.05
 DPI = 150
 MANY = 20000  #: samples, or floe vertices, above which a vector drawing embeds them as an image
 
-LOOK = {
-    "font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
-    "axes.labelsize": 10.5, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.titlepad": 6,
-    "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.axisbelow": True,
-    "axes.spines.top": False, "axes.spines.right": False,
-    "axes.grid": False, "grid.color": GRID, "grid.linewidth": 0.7,
-    "xtick.color": FAINT, "ytick.color": FAINT, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
-    "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "xtick.major.width": 0.8, "ytick.major.width": 0.8,
-    "legend.frameon": False, "legend.fontsize": 9.5, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
-    "figure.dpi": DPI, "savefig.dpi": DPI, "figure.facecolor": PAPER, "svg.fonttype": "none", "pdf.fonttype": 42,
-}
+LOOK = {"font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
+        "axes.labelsize": 10.5, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.titlepad": 6,
+        "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.axisbelow": True,
+        "axes.spines.top": False, "axes.spines.right": False,
+        "axes.grid": False, "grid.color": GRID, "grid.linewidth": 0.7,
+        "xtick.color": FAINT, "ytick.color": FAINT, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
+        "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "xtick.major.width": 0.8, "ytick.major.width": 0.8,
+        "legend.frameon": False, "legend.fontsize": 9.5, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
+        "figure.dpi": DPI, "savefig.dpi": DPI, "figure.facecolor": PAPER, "svg.fonttype": "none", "pdf.fonttype": 42}
 
 
 @contextmanager
@@ -110,7 +107,7 @@ def conditions(run):
     if run.n_floes:
         words.append(f"{run.n_start} floes")
         # floes may have individual thicknesses
-        if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):
+        if source_of_ice(run.case):
             words.append(f"{np.mean(run.thickness[:run.n_start]):.3g} m thick")
         elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")

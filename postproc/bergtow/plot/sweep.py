@@ -5,7 +5,7 @@ against concentration, the law V^2 against speed. For a Latin hypercube, every m
 import textwrap
 
 from bergtow.plot import style
-from bergtow.plot.axes import axis_label, headline, of, wants_log
+from bergtow.plot.axes import axis_label, headline, wants_log
 from bergtow.result.members import reading, short_key, worded
 from bergtow.stats import mean as stat_mean
 from bergtow.stats.conditions import sample
@@ -78,7 +78,7 @@ def draw_fields(axes, e, some, key, factor, log_x):
     """Draw the members, the mean with its 95 % interval and band, and the median."""
     x = np.array([c.values[key] for c in some])
     half = width_of(x, log_x)
-    means = [of(e, c.finished) for c in some]
+    means = [e.mean[c.finished] for c in some]
     least = np.array([bool(e.without_bound(c.members)) for c in some])
     band = np.where(least[:, None], np.nan, [stat_mean.t_interval(y) for y in means])
     for c, y in zip(some, means):
@@ -86,31 +86,14 @@ def draw_fields(axes, e, some, key, factor, log_x):
         draw_members(axes, e, c.finished[order], at, y[order] / factor)
     centre = np.array([y.mean() for y in means])
     if np.isfinite(band).all() and len(x) > 1:
-        axes.fill_between(x,
-                          band[:, 0] / factor,
-                          band[:, 1] / factor,
-                          color=style.ICE,
-                          alpha=0.13,
-                          linewidth=0,
+        axes.fill_between(x, band[:, 0] / factor, band[:, 1] / factor, color=style.ICE, alpha=0.13, linewidth=0,
                           zorder=2)
     axes.plot(x, centre / factor, color=style.ICE, linewidth=1.4, zorder=4)
     half_bar = np.nan_to_num(np.abs(band - centre[:, None])).T / factor
-    axes.errorbar(x,
-                  centre / factor,
-                  yerr=half_bar,
-                  fmt="s",
-                  color=style.ICE,
-                  markersize=5,
-                  capsize=3,
-                  linewidth=1.3,
+    axes.errorbar(x, centre / factor, yerr=half_bar, fmt="s", color=style.ICE, markersize=5, capsize=3, linewidth=1.3,
                   zorder=5)
-    axes.plot(x, [np.median(y) / factor for y in means],
-              marker="_",
-              markersize=13,
-              markeredgewidth=2,
-              color=style.INK,
-              linestyle="none",
-              zorder=6)
+    axes.plot(x, [np.median(y) / factor for y in means], marker="_", markersize=13, markeredgewidth=2, color=style.INK,
+              linestyle="none", zorder=6)
     axes.plot(x[least], centre[least] / factor, "^", color=style.JAM, markersize=8, zorder=7)
 
 
@@ -127,8 +110,8 @@ def fields_legend(e):
 
 def force_limits(e, some_groups, log):
     """Ends of the force axis, N: every field, the intervals, and the estimates meant for the conditions."""
-    seen = [v for _, some in some_groups for c in some for v in of(e, c.finished)]
-    tops = [stat_mean.t_interval(of(e, c.finished))[1] for _, some in some_groups for c in some]
+    seen = [v for _, some in some_groups for c in some for v in e.mean[c.finished]]
+    tops = [stat_mean.t_interval(e.mean[c.finished])[1] for _, some in some_groups for c in some]
     seen += [v for v in tops if np.isfinite(v)]
     low = min((v for v in seen if v > 0), default=1.0)
     high = max(seen, default=1.0)
@@ -156,7 +139,7 @@ def power_law(x, means):
 def draw_speed(axes, e, some, key, factor):
     """Draw the law V² through the geometric mean of the fields, and the fitted exponent."""
     x = np.array([c.values[key] for c in some])
-    means = [of(e, c.finished) for c in some]
+    means = [e.mean[c.finished] for c in some]
     law = power_law(x, means)
     if law is None:
         return
@@ -164,18 +147,10 @@ def draw_speed(axes, e, some, key, factor):
     exponent, low, high, scale = law
     weights = np.array([len(y) for y in means], dtype=float)
     centre = np.exp(np.dot(weights, np.log(x)) / weights.sum())
-    axes.plot(v,
-                      scale * centre**exponent * (v / centre)**2 / factor,
-                      color=style.TOW,
-                      linewidth=1.2,
-                      dashes=(5, 2),
-                      zorder=2.5,
-                      label="∝ V², through the middle of the fields")
-    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03),
-                  xycoords="axes fraction",
-                  ha="right",
-                  fontsize=9,
-                  color=style.FAINT)
+    axes.plot(v, scale * centre**exponent * (v / centre)**2 / factor, color=style.TOW, linewidth=1.2, dashes=(5, 2),
+              zorder=2.5, label="∝ V², through the middle of the fields")
+    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03), xycoords="axes fraction",
+                  ha="right", fontsize=9, color=style.FAINT)
 
 
 def draw_estimates(axes, e, some, key, factor):
@@ -205,16 +180,12 @@ def draw_sweep(e, key):
     rows = -(-len(shown) // columns)
     values = np.array([c.values[key] for _, some in shown for c in some])
     log_x = key == "tow.speed" and values.min() > 0
-    forces = [v for _, some in shown for c in some for v in of(e, c.finished)]
+    forces = [v for _, some in shown for c in some for v in e.mean[c.finished]]
     log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero cannot be shown on a logarithmic axis
     low, high = force_limits(e, shown, log_y)
     factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
-    figure, grid = style.subplots(rows,
-                                columns,
-                                figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2),
-                                squeeze=False,
-                                sharex=True,
-                                sharey=True)
+    figure, grid = style.subplots(rows, columns, figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2), squeeze=False,
+                                  sharex=True, sharey=True)
     extra, lost = {}, {}
     for axes, (words, some) in zip(grid.flat, shown):
         draw_fields(axes, e, some, key, factor, log_x)
@@ -254,22 +225,15 @@ def draw_sweep(e, key):
          if key == "ice.concentration" else []) +
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
-            stat_mean.t_interval(of(e, c.finished))[0] <= 0 and not e.without_bound(c.members)
+            stat_mean.t_interval(e.mean[c.finished])[0] <= 0 and not e.without_bound(c.members)
             for _, some in shown for c in some) else []))
     wide, height = figure.get_size_inches()
     note = textwrap.wrap(note, int(13.5 * wide))  # letters of 9 points in an inch
     lines, below = -(-len(pairs) // 3), 0.15 * max(0, len(note) - 1)
-    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0],
-                           right=0.98,
-                           top=1 - 0.95 / height,
-                           bottom=(0.95 + below + 0.24 * lines) / height,
-                           wspace=0.08,
-                           hspace=0.28)
-    figure.legend([h for h, _ in pairs], [t for _, t in pairs],
-                  loc="lower left",
-                  bbox_to_anchor=(0.02, (0.22 + below) / height),
-                  ncol=3,
-                  fontsize=9)
+    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0], right=0.98, top=1 - 0.95 / height,
+                           bottom=(0.95 + below + 0.24 * lines) / height, wspace=0.08, hspace=0.28)
+    figure.legend([h for h, _ in pairs], [t for _, t in pairs], loc="lower left",
+                  bbox_to_anchor=(0.02, (0.22 + below) / height), ncol=3, fontsize=9)
     figure.text(0.025, 0.08 / height, "\n".join(note), fontsize=9, color=style.FAINT)
     headline(figure, e, f"resistance against {short_key(key)}")
     return figure
@@ -279,7 +243,7 @@ def draw_scatter(e, key):
     """Figure of a Latin hypercube: every member against one parameter, and the mean with 95 % in bins of equally many
     conditions. The bins use means of conditions, whose fields are not independent (ensemble.sample)."""
     rows = e.used
-    x, y = e.parameters[key][rows], of(e, rows)
+    x, y = e.parameters[key][rows], e.mean[rows]
     log_y = wants_log(y)
     factor, unit = style.scale([np.median(y)], "N")
     figure, axes = style.subplots(figsize=(9.5, 5.8))
@@ -291,27 +255,15 @@ def draw_scatter(e, key):
     if bins:
         centre = np.array([means[b].mean() for b in bins])
         bars = np.abs(np.array([stat_mean.t_interval(means[b]) for b in bins]) - centre[:, None]).T
-        axes.errorbar([at[b].mean() for b in bins],
-                      centre / factor,
-                      yerr=bars / factor,
-                      fmt="s-",
-                      color=style.INK,
-                      markersize=5,
-                      capsize=3,
-                      linewidth=1.2,
-                      label="mean of a bin of conditions, 95 % (t)")
-        axes.plot([at[b].mean() for b in bins], [np.median(means[b]) / factor for b in bins],
-                  "_",
-                  color=style.TOW,
-                  markersize=14,
-                  markeredgewidth=2,
-                  label="median of a bin")
+        axes.errorbar([at[b].mean() for b in bins], centre / factor, yerr=bars / factor, fmt="s-", color=style.INK,
+                      markersize=5, capsize=3, linewidth=1.2, label="mean of a bin of conditions, 95 % (t)")
+        axes.plot([at[b].mean() for b in bins], [np.median(means[b]) / factor for b in bins], "_", color=style.TOW,
+                  markersize=14, markeredgewidth=2, label="median of a bin")
     if log_y:
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)
     style.times(axes.xaxis, reading(key, e.units[key])[0])
-    axes.set_xlabel(axis_label(e, key))
-    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.set(xlabel=axis_label(e, key), ylabel=f"mean ice resistance ({unit})")
     axes.grid(True)
     pairs = members_legend(e, "a member") + list(zip(*axes.get_legend_handles_labels()))
     axes.legend([handle for handle, _ in pairs], [label for _, label in pairs], loc="best")

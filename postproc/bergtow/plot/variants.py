@@ -48,8 +48,7 @@ def panels(e):
         found.setdefault(others, {})[c.values[KEY]] = rows
     out = []
     for others, some in found.items():
-        of = {name: dict(zip(e.repeat[rows].tolist(), e.mean[rows]))
-              for name, rows in some.items() if len(rows)}
+        of = {name: dict(zip(e.repeat[rows].tolist(), e.mean[rows])) for name, rows in some.items() if len(rows)}
         first = order[0]
         if first not in of or len(of) < 2:
             continue

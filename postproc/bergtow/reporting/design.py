@@ -29,18 +29,18 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from bergtow import arguments, writing
+from bergtow import writing
 from bergtow._program import program_path
-from bergtow.arguments import above_zero, at_least_one, measure, minutes, read
+from bergtow.arguments import above_zero, at_least_one, from_zero, measure, minutes, read, several
 from bergtow.errors import CASE, SIGNAL, RunError
 from bergtow.reporting import pdf
 from bergtow.reporting import page as report
 from bergtow.result.members import FINISHED, WAITING, Members
-from bergtow.result.origins import TITLE_BLOCK
+from bergtow.result.origins import TITLE_BLOCK, source_of_ice
 from bergtow.result.run import Run
 from bergtow.study import analysis, answer, assumed, domain_width, gear, load_cases
 from bergtow.study.case_file import contents, files, is_study, says, section
-from bergtow.study.domain_width import read_ice_of, reads_ice
+from bergtow.study.domain_width import reads_ice
 from bergtow.study.runs import CaseRuns, locked, run_members
 from bergtow.table import written
 from bergtow.text import answer as answer_text
@@ -148,10 +148,8 @@ def varied(a, found):
 def write_study(a, case, repeats, wider):
     """Write the study of a case, DIR/design.yml. wider: domain.width by concentration, see widths. Raises RunError."""
     values = [] if reads_ice(case) else a.concentrations or []
-    study = {
-        "title": a.title or title_of(case, a.file.stem, values),
-        "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed
-    }
+    study = {"title": a.title or title_of(case, a.file.stem, values),
+             "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed}
     parameters = {"ice.concentration": values} if values else {}
     fitting = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
     if a.by_speed:
@@ -265,7 +263,7 @@ def make_replay(work, a, left):
     if m is None:
         return
     with Run(e.folder(m)) as run:
-        if read_ice_of(run.case):
+        if source_of_ice(run.case):
             return
         takes = max(run.number("wall_time_s"), work.member)
         if takes > left:
@@ -301,7 +299,7 @@ def beside(work, a, row, t):
                            abs(t.wind) > load_cases.NO_WIND * abs(t.value))
     end = work.last - work.replay
     with locked(a.output / "load-cases") as lock:
-        n = (1, 1) if read_ice_of(t.case) else (PAIRED, OF_A_CASE)
+        n = (1, 1) if source_of_ice(t.case) else (PAIRED, OF_A_CASE)
         duration = answer.case_value(t.case, "run.duration")
         runs = load_cases.Runs(CaseRuns(a.file, a.output, "load-cases", work.program, given, work.jobs, end, end,
                                         lock=lock), *map(range, n), duration, work.member / duration, a.no_load_cases)
@@ -372,11 +370,6 @@ def factor(text):
     return value
 
 
-def several(kind):
-    """Argparse type for an option with several values, sorted."""
-    return lambda text: sorted({kind(part) for part in text.split(",")})
-
-
 def speeds(text):
     """"0.8 kn,1 kn", or "0.8 kn:1.4 kn:4" for four speeds from the first to the second: [m/s]"""
     if text.count(":") == 2:
@@ -400,7 +393,7 @@ def options(p):
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
     p.add_argument("--thicknesses", type=several(measure("m")), metavar="H,...", default=[], help="of a case: "
                    "thicknesses of the ice beside its own, \"0.8 m,1.6 m\"")
-    p.add_argument("--winds", type=several(measure("m/s", lambda x: x >= 0, "below zero")), metavar="V,...", default=[],
+    p.add_argument("--winds", type=several(from_zero("m/s")), metavar="V,...", default=[],
                    help="of a case: winds from ahead beside its own, \"10 m/s,20 m/s\"")
     p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
@@ -415,11 +408,10 @@ def options(p):
         p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
     p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of what is assumed, as the "
                    "parameters of a study (default: a few with their sources)")
-    against = measure("m/s", lambda x: x >= 0, "below zero")
-    p.add_argument("--head-current", type=against, metavar="V", help="against the tow, in the load case with head "
-                   f"current and wind (default: {load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design "
-                   "value)")
-    p.add_argument("--head-wind", type=against, metavar="V", help="the same of the wind (default: "
+    p.add_argument("--head-current", type=from_zero("m/s"), metavar="V",
+                   help="against the tow, in the load case with head current and wind (default: "
+                   f"{load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design value)")
+    p.add_argument("--head-wind", type=from_zero("m/s"), metavar="V", help="the same of the wind (default: "
                    f"{load_cases.HEAD_WIND:g} m/s)")
     p.add_argument("--bend", type=measure("rad", lambda x: BENDS[0] <= abs(x) <= BENDS[1], "not from 1 to "
                                           "150 degrees, to either side"),
@@ -433,9 +425,6 @@ def options(p):
                    help="of a case: at most so many of each condition (default: %(default)s)")
     p.add_argument("--seed", type=at_least_one, default=1, metavar="N", help="of a case: of its fields (default: 1)")
     p.add_argument("--title", metavar="TEXT", help="of a case: title of the report")
-    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
-    p.add_argument("--jobs", type=at_least_one, default=len(os.sched_getaffinity(0)), metavar="N",
-                   help="runs at a time (default: the cores)")
     p.add_argument("--no-pdf", action="store_true", help="the page alone")
     p.add_argument("--no-replay", action="store_true", help="no replay of a tow")
     p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
@@ -444,7 +433,7 @@ def options(p):
     p.add_argument("--quiet", action="store_true", help="no line for each member")
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
-    arguments.add_force(p)
+    analysis.add_runs(p)
 
 
 def set_ends(work, a, conditions, member=None):

@@ -85,12 +85,8 @@ def css(title, marked):
 def render(template, context, paper=False):
     """The page as text; paper: for a PDF."""
     code = script() if "replay" in context and not paper else ""
-    return templates().get_template(template).render(**context,
-                                                     code=code,
-                                                     paper=paper,
-                                                     mark=writing.MARK,
-                                                     policy=policy(code),
-                                                     css=css(context["title"], context["marked"]),
+    return templates().get_template(template).render(**context, code=code, paper=paper, mark=writing.MARK,
+                                                     policy=policy(code), css=css(context["title"], context["marked"]),
                                                      made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"))
 
 
@@ -105,8 +101,7 @@ def options(p):
         "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page says so "
         "(default: %(default)g)"
     )
-    p.add_argument("--no-compression",
-                   action="store_true",
+    p.add_argument("--no-compression", action="store_true",
                    help="store the replay's data as they are, for browsers that cannot unpack them")
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block, in place of report.{name} of the "

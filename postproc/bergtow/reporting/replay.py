@@ -106,8 +106,7 @@ class Replay:
     """
 
     def __init__(self, run, limit=LIMIT, compress=True):
-        if not run.n_frames:
-            raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+        run.need_frames()
         self.run, self.compress, self.notes = run, compress, []
         frames, floes = self._fit(limit)
         self.frames, self.floes = frames, floes
@@ -118,8 +117,7 @@ class Replay:
             "n": len(floes), "n_floes": run.n_floes, "geographic": run.geographic, "box": list(run.box),
             "period": list(run.period), "moving": run.case.get("domain.ends") == "moving", "quanta": self.quanta,
             "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
-            "edges": [run.case.get("domain.ends", ""),
-                      run.case.get("domain.sides", "")],
+            "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
             "style": {k.lower(): getattr(style, k)
                       for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")
                       }, "rafts": run.value("ice.rafting.kappa", 0) > 0, **self._bodies(frames), "curve": curve(run)
@@ -171,10 +169,8 @@ class Replay:
     def _say_what_is_left_out(self, frames, floes):
         run, notes = self.run, self.notes
         if len(frames) < run.n_frames:
-            notes.append(
-                f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all are in "
-                f"result.h5."
-            )
+            notes.append(f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all "
+                         "are in result.h5.")
         if len(floes) < run.n_floes:
             which = "those that come nearest to the towed body" if run.towed is not None else "the largest ones"
             notes.append(
@@ -182,10 +178,8 @@ class Replay:
                 f"water is not free of ice. "
                 "All are in result.h5.")
         worst = max(self.quanta[axis][1] / 2 for axis in "xy")
-        notes.append(
-            f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact force to "
-            f"16 bits; result.h5 holds them in full."
-        )
+        notes.append(f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact "
+                     "force to 16 bits; result.h5 holds them in full.")
 
     def _add_outlines(self, floes):
         run = self.run
@@ -234,11 +228,9 @@ class Replay:
         if run.towed is not None:
             self._unwrap(poses[:, run.towed], frames)
         self.blobs["body_pose"] = pack(poses, self.compress)
-        out = {
-            "bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()}
-                       for b in run.bodies], "towed": run.towed, "follow": False, "view": None, "heading": None,
-            "line": None, "vessel": run.case.get("tow.mode") == "thrust", "track": None, "window_low": None
-        }
+        out = {"bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()}
+                          for b in run.bodies], "towed": run.towed, "follow": False, "view": None, "heading": None,
+               "line": None, "vessel": run.case.get("tow.mode") == "thrust", "track": None, "window_low": None}
         if run.towed is None:
             return out
         heading = tow_heading(run)
@@ -251,10 +243,8 @@ class Replay:
             out["line"] = [line.round(5).tolist() for line in lines]
         if "body_x" in run and len(run["time"]):
             kept = thinned(len(run["time"]), TRACK)
-            out["track"] = {
-                "time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
-                "y": run["body_y"][kept].round(5).tolist()
-            }
+            out["track"] = {"time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
+                            "y": run["body_y"][kept].round(5).tolist()}
         if "window_x" in run and np.isfinite(run["window_x"]).any():
             sample = self._samples(frames)
             out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()

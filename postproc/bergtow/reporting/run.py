@@ -19,20 +19,14 @@ import numpy as np
 
 #: keys that the page shows directly; all others are in the collapsed table
 KEY_VALUES = {
-    "Ice": [
-        "ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law",
-        "ice.density", "ice.friction", "ice.restitution", "ice.crushing.pressure", "ice.rafting.kappa",
-        "ice.splitting.toughness", "ice.field", "ice.outlines", "ice.seed", "lead.mode"
-    ],
-    "Towed body": [
-        "body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass",
-        "body.friction", "body.drag.water_form"
-    ],
-    "Tow": [
-        "tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter",
-        "tow.line_length", "tow.line_stiffness", "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass",
-        "tow.vessel.bollard_pull", "tow.vessel.free_speed"
-    ],
+    "Ice": ["ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law",
+            "ice.density", "ice.friction", "ice.restitution", "ice.crushing.pressure", "ice.rafting.kappa",
+            "ice.splitting.toughness", "ice.field", "ice.outlines", "ice.seed", "lead.mode"],
+    "Towed body": ["body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass",
+                   "body.friction", "body.drag.water_form"],
+    "Tow": ["tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter",
+            "tow.line_length", "tow.line_stiffness", "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass",
+            "tow.vessel.bollard_pull", "tow.vessel.free_speed"],
     "Domain and environment": [
         "domain.length", "domain.width", "domain.ends", "domain.sides", "water.current_x", "water.current_y",
         "water.current_table", "water.tilt", "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"
@@ -216,11 +210,9 @@ def impacts(run):
             start_peak(run, "impacts.start_largest_peak_n")))
     elif np.isfinite(run.number("impacts.start_largest_peak_n")):
         rows.append(("largest peak", "none in the window" + start_peak(run, "impacts.start_largest_peak_n")))
-    return {
-        "conversion": i["conversion"], "rows": rows,
-        "exceedance": [(f"{e['rank']:.0f}", style.short(e["per_hour"]), force(e["peak_n"]))
-                       for e in i.get("exceedance") or []]
-    }
+    return {"conversion": i["conversion"], "rows": rows,
+            "exceedance": [(f"{e['rank']:.0f}", style.short(e["per_hour"]), force(e["peak_n"]))
+                           for e in i.get("exceedance") or []]}
 
 
 def quality(run):
@@ -256,13 +248,11 @@ def quality(run):
         rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J",
                      f"in {n('crushing_steps'):.0f} steps, deepest {style.short(n('max_crushed_depth_m'))} m"))
     if n("max_rafted_area_m2", 0):
-        rows.append((
-            "rafted", f"{style.short(n('rafted_area_m2'))} m²",
-            f"{100 * n('rafted_share_of_ice'):.2g} % of the ice, {n('rafting_pairs'):.0f} pairs; edges took "
-            f"{style.short(n('raft_edge_work_j'))} J, "
-            f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction "
-            f"{style.short(n('raft_friction_work_j'))} J"
-        ))
+        rows.append(("rafted", f"{style.short(n('rafted_area_m2'))} m²",
+                     f"{100 * n('rafted_share_of_ice'):.2g} % of the ice, {n('rafting_pairs'):.0f} pairs; edges took "
+                     f"{style.short(n('raft_edge_work_j'))} J, "
+                     f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction "
+                     f"{style.short(n('raft_friction_work_j'))} J"))
     if run.summary.get("splitting"):
         at, bent, burst, steps, small, old = (n(f"splitting.{name}") for name in (
             "near", "far", "burst", "steps", "refused_size", "refused_generation"))

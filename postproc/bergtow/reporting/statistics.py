@@ -41,12 +41,9 @@ def load_columns(c, names):
 def csv_row(c, load_names):
     """Columns of a condition, without nesting; forces in N."""
     r = c["resistance"]
-    row = {
-        "condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"],
-        **{k: c["members"][k]
-           for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n
-                                                           for k, n in c["members"]["doubts"].items()}
-    }
+    row = {"condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"],
+           **{k: c["members"][k] for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n
+                                                              for k, n in c["members"]["doubts"].items()}}
     w = c["without_bound"]
     row |= {"at_least": int(bool(w["words"])), "no_load_share": w["share"], "ended_without_solution": len(w["ended"])}
     for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max",
@@ -71,40 +68,23 @@ def write(s, folder, force):
 
 def options(p):
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
-    p.add_argument("-o",
-                   "--output",
-                   metavar="FOLDER",
-                   type=Path,
+    p.add_argument("-o", "--output", metavar="FOLDER", type=Path,
                    help="where to write statistics.csv and .json (default: DIR)")
     p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
-    p.add_argument("--error",
-                   type=above_zero,
-                   metavar="E",
+    p.add_argument("--error", type=above_zero, metavar="E",
                    help="relative error of the mean that the number of fields needed is for (default %(default)s)")
-    p.add_argument("--hours",
-                   type=above_zero,
-                   nargs="+",
-                   metavar="T",
+    p.add_argument("--hours", type=above_zero, nargs="+", metavar="T",
                    help="return times of loads and peaks, hours of tow (default 1 10 100)")
     loads.add_options(p)
-    p.add_argument("--threshold",
-                   type=finite,
-                   metavar="N",
+    p.add_argument("--threshold", type=finite, metavar="N",
                    help="threshold of peaks over a threshold, N (default: a tenth of all peaks are above)")
-    p.add_argument("--gap",
-                   type=not_below_zero,
-                   metavar="S",
+    p.add_argument("--gap", type=not_below_zero, metavar="S",
                    help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
-    p.add_argument("--blocks",
-                   type=at_least_one,
-                   metavar="K",
+    p.add_argument("--blocks", type=at_least_one, metavar="K",
                    help="blocks a field for block maxima (default: so many that there are 20)")
-    p.add_argument("--resamples",
-                   type=at_least_one,
-                   metavar="B",
+    p.add_argument("--resamples", type=at_least_one, metavar="B",
                    help="resamples for p-values and return levels (default %(default)s)")
-    p.add_argument("--partial",
-                   action="store_true",
+    p.add_argument("--partial", action="store_true",
                    help="exit with 0 even where members of the study are in no number")
     arguments.add_force(p)
     p.set_defaults(**conditions.DEFAULTS | {"exclude": []})

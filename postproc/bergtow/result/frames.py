@@ -148,10 +148,14 @@ class Frames:
     def n_frames(self):
         return len(self.frame_times)
 
-    def frame_at(self, time):
-        """Index of the frame nearest to a time, s."""
+    def need_frames(self):
+        """Raises RunError if there are none."""
         if not self.n_frames:
             raise RunError(self.result, "holds no frames", "set output.frame_interval and run the case again")
+
+    def frame_at(self, time):
+        """Index of the frame nearest to a time, s."""
+        self.need_frames()
         return int(np.argmin(np.abs(self.frame_times - time)))
 
     def _frame(self, name, frame, width):

@@ -179,14 +179,10 @@ class Members:
                 self.units[key] = plain(data.attrs.get("units", "1"))
             self.state = list(f["members/state_hash"].asstr()[()])
             self.summary = {key: data[()] for key, data in f["summary"].items()}
-            self.meaning = {
-                key: {k: plain(v) for k, v in data.attrs.items()} for key, data in f["summary"].items()
-            }
+            self.meaning = {key: {k: plain(v) for k, v in data.attrs.items()} for key, data in f["summary"].items()}
             self._series = {key: data[()] for key, data in f["series"].items()}
-            self._described = {
-                key: [plain(data.attrs.get(what, "")) for what in ("label", "units", "description")]
-                for key, data in f["series"].items()
-            }
+            self._described = {key: [plain(data.attrs.get(what, "")) for what in ("label", "units", "description")]
+                               for key, data in f["series"].items()}
             self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
         self.study = plain(self.study)
         self.n = len(self.name)
@@ -202,11 +198,9 @@ class Members:
 
     def _unsound(self):
         """{name: why} of members whose results are incomplete or damaged; from here on they count as waiting."""
-        out = {
-            self.name[m]: self.reason[m].strip()
-            for m in np.flatnonzero(self.status == WAITING)
-            if self.hole[m] in ("unsound", "unreadable")
-        }
+        out = {self.name[m]: self.reason[m].strip()
+               for m in np.flatnonzero(self.status == WAITING)
+               if self.hole[m] in ("unsound", "unreadable")}
         for m in np.flatnonzero(self.status == FINISHED):
             why = integrity.fault_of_member(self.folder(m), self.name[m],
                                             self.study.encode()) if self.folder(m).is_dir() else None
@@ -341,19 +335,15 @@ class Members:
     @cached_property
     def behind(self):
         """Members that have finished since ensemble.h5 was written."""
-        return [
-            self.name[m]
-            for m in np.flatnonzero(self.status == WAITING)
-            if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()
-        ]
+        return [self.name[m]
+                for m in np.flatnonzero(self.status == WAITING)
+                if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()]
 
     def reasons(self, status):
         """{name: why} of the failed members, or of waiting members whose process died."""
-        return {
-            self.name[m]: self.reason[m].strip() or "no reason recorded"
-            for m in np.flatnonzero(self.status == status)
-            if (self.reason[m] or status == FAILED) and self.name[m] not in self.unsound
-        }
+        return {self.name[m]: self.reason[m].strip() or "no reason recorded"
+                for m in np.flatnonzero(self.status == status)
+                if (self.reason[m] or status == FAILED) and self.name[m] not in self.unsound}
 
     @cached_property
     def without_folder(self):
@@ -429,10 +419,8 @@ class Members:
         for index in np.unique(self.condition):
             rows = np.flatnonzero(self.condition == index)
             first = rows[0]
-            values = {
-                key: (str(column[first]) if column.dtype == object else float(column[first]))
-                for key, column in self.parameters.items()
-            }
+            values = {key: (str(column[first]) if column.dtype == object else float(column[first]))
+                      for key, column in self.parameters.items()}
             out.append(
                 Condition(int(index), values, varied or list(values), self.units, rows,
                           np.array([m for m in rows if m in used], dtype=int),

@@ -19,11 +19,9 @@ TITLE_BLOCK = ("client", "project", "author", "document", "revision", "distribut
 NAMES = {"document": "document number"}  #: names in the title block that differ from the key
 
 #: {kind: its label}
-KINDS = {
-    "assumed": "assumed", "memory": "from memory", "reported": "reported", "source": "source", "given": "given",
-    "set": "set",
-    "study": "study", "default": "default", "field": "as read", "unused": "not used"
-}
+KINDS = {"assumed": "assumed", "memory": "from memory", "reported": "reported", "source": "source", "given": "given",
+         "set": "set",
+         "study": "study", "default": "default", "field": "as read", "unused": "not used"}
 
 BESIDE = "set."  #: in the text of a case as given, prefix of keys set in addition to its files (src/case/case_read.c)
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  #: 20 times as fast, if the package was built with it
@@ -163,8 +161,7 @@ def of_field(run):
     if ice is None or not run.n_floes:
         return []
     said = f"counted in the ice that {ice} read"
-    rows = (("floes", str(run.n_start),
-             "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
+    rows = (("floes", str(run.n_start), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
                                   "area fraction of ice in the ice region at the start, before a lead"),
             ("floe size", spread(np.sqrt(4 * run.area[:run.n_start] / np.pi),
                                  "m"), "diameter of the circle of a floe's area: mean and range"),

@@ -2,6 +2,8 @@
 """Distances between simple polygons [n, 2]."""
 import numpy as np
 
+from bergtow.result.frames import place
+
 
 def to_edges(points, polygon):
     """[n] least distance of points [n, 2] to the edges of a closed polygon."""
@@ -49,9 +51,8 @@ def least(body, hull, areas, enough=0.0):
         if bound.min() > enough:
             found = min(found, float(bound.min()))
             continue
-        for x, y, yaw in body[bound <= enough]:
-            c, s = np.cos(yaw), np.sin(yaw)
-            found = min(found, of(hull @ np.array([[c, s], [-s, c]]) + (x, y), area))
+        for pose in body[bound <= enough]:
+            found = min(found, of(place(hull, pose), area))
             if found == 0:
                 return 0.0
     return found

@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass
 
 from bergtow.errors import CASE, RunError
+from bergtow.result.frames import place
 from bergtow.routing import apart
 from bergtow.routing.situation import reading
 
@@ -112,8 +113,7 @@ def clear_of_hull(outlines, situation, start=None, yaw=None):
     """[n] of bool: floes that do not lie on the towed body at its start."""
     start = np.array(situation.start if start is None else start)
     yaw = situation.values["body.yaw"] if yaw is None else yaw
-    c, s = np.cos(yaw), np.sin(yaw)
-    hull = situation.outline @ np.array([[c, s], [-s, c]]) + start
+    hull = place(situation.outline, (*start, yaw))
     reach = situation.hull.radius
     centres = [o.mean(axis=0) for o in outlines]
     return np.array([np.hypot(*(centre - start)) > reach + apart.radius(o, centre) or apart.of(o, hull) > 0

@@ -342,5 +342,4 @@ def fit_weights(features: Sequence[Union[Mapping[str, float], Sequence[float]]],
     spread = ((y - y.mean()) ** 2).sum()
     r2 = 1 - ((y - told) ** 2).sum() / spread if spread > 0 else math.nan
     flat = np.ptp(told) <= 1e-12 * np.abs(told).max(initial=0) or spread == 0
-    return Fit(Weights(*map(float, found)), float(r2),
-               math.nan if flat else float(scipy.stats.spearmanr(told, y)[0]))
+    return Fit(Weights(*map(float, found)), float(r2), math.nan if flat else float(scipy.stats.spearmanr(told, y)[0]))

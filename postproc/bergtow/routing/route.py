@@ -16,7 +16,7 @@ from pathlib import Path
 
 from bergtow import writing
 from bergtow._program import program_path
-from bergtow.arguments import not_below_zero, whole_from
+from bergtow.arguments import from_zero, measure, not_below_zero, several, whole_from
 from bergtow.errors import CASE, IO, SIGNAL, USAGE, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, situation, tows, verdict
@@ -71,31 +71,37 @@ def options(p):
                    "that of the case")
     p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons to keep "
                    "out of: land, shoals, zones; may be repeated. Fixed floes of the case are such areas, too")
-    p.add_argument("--clearance", metavar="M", default="0 m", help="distance to keep from them (default 0 m)")
+    p.add_argument("--clearance", type=from_zero("m"), metavar="M", default=0.0,
+                   help="distance to keep from them (default 0 m)")
     p.add_argument("--objective", choices=tuple(words.UNITS), default="work", help="what is to be small (default work)")
-    p.add_argument("--speeds", metavar="V,V", help="speeds to choose among (default: tow.speed)")
-    p.add_argument("--force-limit", metavar="F", help="tow force or tension that is not to be exceeded")
+    p.add_argument("--speeds", type=several(measure("m/s")), metavar="V,V",
+                   help="speeds to choose among (default: tow.speed)")
+    p.add_argument("--force-limit", type=measure("N"), default=np.inf, metavar="F",
+                   help="tow force or tension that is not to be exceeded")
     p.add_argument("--routes", type=whole_from(1, 16), default=ROUTES, metavar="K", help="routes besides the straight "
                    f"line, at least a width apart (default {ROUTES})")
     p.add_argument("--members", type=whole_from(1, 1000), default=MEMBERS, metavar="N", help="members of the map that "
                    f"every route is towed through (default {MEMBERS}; a map without errors has one)")
-    p.add_argument("--map-error", metavar="M", help=f"of a floe's position, standard deviation (default {POSITION:g} "
-                   "widths of the body, assumed)")
+    p.add_argument("--map-error", type=from_zero("m"), metavar="M",
+                   help=f"of a floe's position, standard deviation (default {POSITION:g} widths of the body, assumed)")
     p.add_argument("--thickness-error", type=not_below_zero, default=THICKNESS, metavar="S",
                    help="of the thickness, standard deviation over the thickness (default %(default)g, assumed)")
-    p.add_argument("--drift-error", metavar="V", help="of each component of the drift, standard deviation (default "
-                   f"{DRIFT:g} of the speed, assumed)")
+    p.add_argument("--drift-error", type=from_zero("m/s"), metavar="V",
+                   help=f"of each component of the drift, standard deviation (default {DRIFT:g} of the speed, assumed)")
     p.add_argument("--calibrate", type=whole_from(0, 1000), default=0, metavar="N", help="fit the cost to N straight "
                    "swaths towed through the map first, at least 6 (default 0: none)")
-    p.add_argument("--replan", metavar="S", help="look at the ice anew after every S of the tow and plan the rest")
-    p.add_argument("--map-age", metavar="S", default="0 s", help="age of the map at each look of --replan (default "
-                   "0 s)")
-    p.add_argument("--width", metavar="M", help="of the body across its way (default: the mean over its headings)")
-    p.add_argument("--radius", metavar="M", help="least radius of the body's way (default: the length of the line, "
-                   f"or {LENGTHS:g} times the body's mass over its water drag at 1 m/s; without a line {RADIUS:g} "
-                   "widths)")
+    p.add_argument("--replan", type=measure("s"), metavar="S",
+                   help="look at the ice anew after every S of the tow and plan the rest")
+    p.add_argument("--map-age", type=from_zero("s"), metavar="S", default=0.0,
+                   help="age of the map at each look of --replan (default 0 s)")
+    p.add_argument("--width", type=measure("m"), metavar="M",
+                   help="of the body across its way (default: the mean over its headings)")
+    p.add_argument("--radius", type=from_zero("m"), metavar="M",
+                   help=f"least radius of the body's way (default: the length of the line, or {LENGTHS:g} times the "
+                   f"body's mass over its water drag at 1 m/s; without a line {RADIUS:g} widths)")
     p.add_argument("--headings", type=int, choices=(16, 32), default=32, help="of the lattice (default 32)")
-    p.add_argument("--cell", metavar="M", help="of the raster of costs (default: an eighth of the width, or more)")
+    p.add_argument("--cell", type=measure("m"), metavar="M",
+                   help="of the raster of costs (default: an eighth of the width, or more)")
     p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in "
                    "the unit of the objective (default 0)")
     p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
@@ -103,20 +109,6 @@ def options(p):
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
                    "the same call goes on")
     analysis.add_options(p, BUDGET)
-
-
-def _above(text, unit, option):
-    value = situation.number(text, unit, f"{option} {text}")
-    if not (np.isfinite(value) and value > 0):
-        raise RunError(f"{option} {text}", "is not above 0", "give a number above 0", USAGE)
-    return value
-
-
-def _not_below(text, unit, option):
-    value = situation.number(text, unit, f"{option} {text}")
-    if not (np.isfinite(value) and value >= 0):
-        raise RunError(f"{option} {text}", "is below 0", "give 0 or more", USAGE)
-    return value
 
 
 def refuse_looks(w, s):
@@ -133,28 +125,22 @@ def refuse_looks(w, s):
 
 def wanted(a, s):
     """Values of the options, in SI units: {"speeds", "errors", "radius", ...}. s: Situation."""
-    speeds = [s.values["tow.speed"]]
-    if a.speeds:
-        speeds = sorted({_above(t, "m/s", "--speeds") for t in a.speeds.split(",")})
+    speeds = a.speeds or [s.values["tow.speed"]]
     if not speeds[0] > 0:
         raise RunError("tow.speed", "is 0: nothing reaches a goal", "give --speeds", CASE)
     if a.members == 1 and a.map_error is None and a.drift_error is None and a.thickness_error == THICKNESS:
         errors = members.Errors(0.0, 0.0, 0.0)
     else:
         errors = members.Errors(
-            _not_below(a.map_error, "m", "--map-error") if a.map_error else POSITION * s.hull.width, a.thickness_error,
-            _not_below(a.drift_error, "m/s", "--drift-error") if a.drift_error else DRIFT * speeds[-1])
+            POSITION * s.hull.width if a.map_error is None else a.map_error, a.thickness_error,
+            DRIFT * speeds[-1] if a.drift_error is None else a.drift_error)
     if a.drift_error is None and s.values["water.current_table"] and errors.drift:
         errors = members.Errors(errors.position, errors.thickness, 0.0)
     return {"speeds": tuple(speeds), "errors": errors,
             "assumed": a.map_error is None or a.drift_error is None or a.thickness_error == THICKNESS,
-            "limit": _above(a.force_limit, "N", "--force-limit") if a.force_limit else np.inf,
-            "radius": _not_below(a.radius, "m", "--radius") if a.radius else
+            "limit": a.force_limit, "radius": a.radius if a.radius is not None else
             max(s.line, LENGTHS * s.mass / s.hull.drag) if s.line else RADIUS * s.hull.width,
-            "clearance": _not_below(a.clearance, "m", "--clearance"),
-            "cell": _above(a.cell, "m", "--cell") if a.cell else None,
-            "replan": _above(a.replan, "s", "--replan") if a.replan else None,
-            "age": _not_below(a.map_age, "s", "--map-age")}
+            "clearance": a.clearance, "cell": a.cell, "replan": a.replan, "age": a.map_age}
 
 
 def planned(a, w, s, goal, weights, factor, **more):
@@ -367,8 +353,7 @@ def perform(a):
         body = {"body.x": f"{x:.12g} m", "body.y": f"{y:.12g} m"}
     goal = situation.goal(a.to, place)
     case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
-    width = _above(a.width, "m", "--width") if a.width else None
-    s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, width)
+    s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, a.width)
     w = wanted(a, s)
     if tows.to_goal(np.array([s.start]), goal)[0] <= tows.ARRIVED * s.hull.width:
         raise RunError(f"--to {a.to}", f"is reached where the tow starts: within a width of the body, "

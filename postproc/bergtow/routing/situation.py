@@ -7,15 +7,16 @@ reads it, including fixed floes and floes given by hand. Python generates no ice
 import json
 import os
 import subprocess
-from ctypes import byref, c_double
+from ctypes import c_double
 from dataclasses import dataclass
 from pathlib import Path
 
 from bergtow import _library, writing
 from bergtow._calls import called
+from bergtow.arguments import read
 from bergtow.case import Case
-from bergtow.errors import CASE, USAGE, Refused, RunError
-from bergtow.result.frames import lonlat_of
+from bergtow.errors import CASE, USAGE, BergtowError, Refused, RunError
+from bergtow.result.frames import lonlat_of, place as turned
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
@@ -63,12 +64,10 @@ def number(text, unit, option):
     if not text.strip():
         raise RunError(option.strip(), "a number is missing", "write one on each side of a comma; see bergtow route "
                        "--help", USAGE)
-    value = c_double()
     try:
-        _library.library().bt_number_read(text.strip().encode(), unit.encode(), byref(value))
-    except Exception as error:
+        return read(text, unit)
+    except BergtowError as error:
         raise RunError(option, str(error), "see bergtow route --help", USAGE) from None
-    return value.value
 
 
 def position(text, place, option):
@@ -309,14 +308,13 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     across = width or np.sum(np.hypot(*(np.roll(hull, -1, 0) - hull).T)) / np.pi
     density, kappa = values["ice.density"], values["ice.rafting.kappa"]
     rafting = 0.5 * kappa * density * (1 - density / values["water.density"]) * GRAVITY if kappa > 0 else np.inf
-    c, s = np.cos(start[2]), np.sin(start[2])
     x0, y0 = values["domain.x0"], values["domain.y0"]
     return Situation(
         case=case, field=field_file, values=values, place=place,
         ice=planner.Ice(outlines=[outlines[i] for i in floes], thickness=thickness, density=density,
                         added_mass=values["ice.added_mass"], rafting=rafting),
         hull=planner.Hull(width=across, radius=radius, drag=skin + form * across), mass=mass,
-        outline=hull @ np.array([[c, -s], [s, c]]),
+        outline=turned(hull, (0, 0, -start[2])),
         start=tuple(map(float, start[:2])),
         extent=(x0, y0, x0 + values["domain.length"], y0 + values["domain.width"]), no_go=areas + fixed,
         drift=tuple(map(float, drift)), water=water,

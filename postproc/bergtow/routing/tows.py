@@ -234,14 +234,12 @@ def outcome(run, c, goal, situation, force_limit=np.inf):
     body = np.column_stack([xy, run["body_yaw"]])[:n]
     off = apart.to_edges(xy[:n], np.vstack([c.track, c.track[::-1]]))
     touch = apart.least(body, s.outline, s.no_go, TOUCH * s.hull.width)
-    return {
-        "arrived": end is not None, "time": float(time[n - 1]) if end is not None else np.nan,
-        "work": work, "length": float(np.sum(np.hypot(*step.T))), "peak": peak,
-        "largest": float(np.max(force[there])) if there.any() else np.nan,
-        "mean_force": float(np.sum((force * dt)[there]) / np.sum(dt[there])) if there.any() else np.nan,
-        "limit_exceeded": bool(peak > force_limit), "slack": bool(s.mode != "speed" and np.any(some <= 0)),
-        "parted": any(e["kind"] == "line_broken" for e in run.events),
-        "no_go_contact": bool(touch <= TOUCH * s.hull.width), "off_track": float(off.max()),
-        "missed_by": float(to_goal(xy, goal).min()), "no_load": bool(np.isnan(run["ice_resistance"][:n]).any()),
-        "hash": str(run.summary.get("state_hash")), "wall_s": run.number("wall_time_s"),
-    }
+    return {"arrived": end is not None, "time": float(time[n - 1]) if end is not None else np.nan,
+            "work": work, "length": float(np.sum(np.hypot(*step.T))), "peak": peak,
+            "largest": float(np.max(force[there])) if there.any() else np.nan,
+            "mean_force": float(np.sum((force * dt)[there]) / np.sum(dt[there])) if there.any() else np.nan,
+            "limit_exceeded": bool(peak > force_limit), "slack": bool(s.mode != "speed" and np.any(some <= 0)),
+            "parted": any(e["kind"] == "line_broken" for e in run.events),
+            "no_go_contact": bool(touch <= TOUCH * s.hull.width), "off_track": float(off.max()),
+            "missed_by": float(to_goal(xy, goal).min()), "no_load": bool(np.isnan(run["ice_resistance"][:n]).any()),
+            "hash": str(run.summary.get("state_hash")), "wall_s": run.number("wall_time_s")}

@@ -21,10 +21,8 @@ MOST_SAMPLES = 300  # of a condition's series, to which distributions are fitted
 
 
 #: the options of statistics(): the defaults of bergtow statistics
-DEFAULTS = {
-    "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
-    "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
-}
+DEFAULTS = {"error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
+            "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY}
 
 
 def member(e, m):
@@ -35,12 +33,10 @@ def member(e, m):
     se, share = within.se, e.number("window_no_load_share", m)
     if share > 0:
         mean, se, low, high = at_least.AtLeast(mean, share), np.nan, np.nan, np.nan
-    return {
-        "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
-        "se_within": se, "within_95": (mean + low - within.mean, mean + high - within.mean),
-        "independent": independent if np.isfinite(independent) else within.n_eff,
-        "tau_samples": within.tau, "doubts": sorted(e.doubts(m))
-    }
+    return {"name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
+            "se_within": se, "within_95": (mean + low - within.mean, mean + high - within.mean),
+            "independent": independent if np.isfinite(independent) else within.n_eff,
+            "tau_samples": within.tau, "doubts": sorted(e.doubts(m))}
 
 
 def samples(e, rows, members):
@@ -88,10 +84,8 @@ def extremes(e, rows, options):
         hits = e.impacts(m)
         if hits:
             time, peak, start, hours, conversion = hits
-            fields.append({
-                "time": time, "peak": peak, "start": start, "hours": hours,
-                "gap": 2 * e.number("window_correlation_time_s", m)
-            })
+            fields.append({"time": time, "peak": peak, "start": start, "hours": hours,
+                           "gap": 2 * e.number("window_correlation_time_s", m)})
             conversions.add(conversion)
     if not fields:
         return {"refused": "no collisions: the members' folders are not there, or impact.conversion was none"}
@@ -118,14 +112,10 @@ def drift(e, rows, mean):
         return {"verdict": "not judged", "words": "too few fields"}
     change, (low, high), moved = found
     factor, unit = scale([abs(change)], "N")
-    words = (
-        f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} "
-        f"(95 %: {short(min(abs(low), abs(high)) / factor)} to {short(max(abs(low), abs(high)) / factor)})"
-    ) if moved else "no drift"
-    return {
-        "verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high),
-        "words": words
-    }
+    words = (f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} (95 %: "
+             f"{short(min(abs(low), abs(high)) / factor)} to "
+             f"{short(max(abs(low), abs(high)) / factor)})") if moved else "no drift"
+    return {"verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high), "words": words}
 
 
 def condition(e, c, members, options):
@@ -187,10 +177,8 @@ def sensitivity(e, members):
         return {"refused": "nothing is varied" if not varied else f"{len(y)} {of}, needs 8"}
     logs = stat_sensitivity.sobol(
         varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
-    return {
-        "members": len(e.used), "samples": len(y), "of": of, "ranks": stat_sensitivity.rank_correlations(varied, y),
-        "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs
-    }
+    return {"members": len(e.used), "samples": len(y), "of": of, "ranks": stat_sensitivity.rank_correlations(varied, y),
+            "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
 
 
 def nothing_to_count(e, dropped):
@@ -225,12 +213,10 @@ def statistics(e, options):
         raise nothing_to_count(e, dropped)
     members = {int(m): member(e, m) for m in progress.each("mean of member", e.used)}
     conditions = [condition(e, c, members, options) for c in progress.each("statistics of condition", e.conditions())]
-    return {
-        "title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
-        "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
-        "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
-        "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
-        "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
-        "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
-        "convergence": findings.read("converge", e.path)
-    }
+    return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
+            "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
+            "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
+            "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
+            "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
+            "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
+            "convergence": findings.read("converge", e.path)}

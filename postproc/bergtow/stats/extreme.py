@@ -164,29 +164,24 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
     each = _excesses(fields, threshold, gap)
     excess, raw = np.concatenate(each), sum(int(np.sum(exceeds(f["peak"], threshold))) for f in fields)
     if len(excess) < LEAST_EXCESSES:
-        return {
-            "refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more "
-                       f"fields, or `bergtow statistics` with a lower --threshold"
-        }
+        return {"refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more "
+                           f"fields, or `bergtow statistics` with a lower --threshold"}
     if why := saturated(threshold + excess, "clusters"):
         return {"refused": why}
     scale, shape = gpd(excess)
-    levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape,
-                                        hours_of_levels)
+    levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape, hours_of_levels)
     def refit(y):
         s, k = gpd(y)
         return stat_fit.Frozen(scipy.stats.genpareto, k, scale=s)
     frozen = stat_fit.Frozen(scipy.stats.genpareto, shape, scale=scale)
     statistic = stat_fit.anderson_darling(excess, frozen.cdf)
-    return {
-        "threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
-        "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
-        "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
-        "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
-                                    resamples), "interval": interval_note(len(fields)),
-        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
-                   for T, (z, ends) in zip(hours_of_levels, levels)]
-    }
+    return {"threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
+            "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
+            "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
+            "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
+                                        resamples), "interval": interval_note(len(fields)),
+            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
+                       for T, (z, ends) in zip(hours_of_levels, levels)]}
 
 
 def interval_note(fields):
@@ -219,10 +214,8 @@ def gpd_intervals(each, hours, threshold, scale, shape, hours_of_levels):
     rate = len(excess) / hours.sum()
     best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted scale), shape, ln rate
     def by_field(theta):
-        return np.array([
-            gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h
-            for x, h in zip(y, hours)
-        ])
+        return np.array([gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h
+                         for x, h in zip(y, hours)])
     def level(theta, T):
         return np.exp(theta[0]) * growth(theta[1], np.exp(theta[2]) * T)
     def alone(theta):

@@ -123,10 +123,7 @@ def gev(x):
     start = np.array([location, np.log(scale), shape])
     if not np.isfinite(gev_minus_log_likelihood(start, y)):  # a value lies outside the support of the first guess
         start = np.array([-0.45, np.log(0.78), 1e-3])        # Gumbel with mean 0 and standard deviation 1
-    found = scipy.optimize.minimize(gev_minus_log_likelihood,
-                                    start,
-                                    args=(y, ),
-                                    method="Nelder-Mead",
+    found = scipy.optimize.minimize(gev_minus_log_likelihood, start, args=(y, ), method="Nelder-Mead",
                                     options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 2000})
     location, log_scale, shape = found.x
     return centre + width * location, width * np.exp(log_scale), shape
@@ -139,10 +136,8 @@ def _gev(x):
 
 
 #: name: (fit, parameters, positive values only?)
-DISTRIBUTIONS = {
-    "normal": (_normal, 2, False), "lognormal": (_lognormal, 2, True), "Weibull": (_weibull, 2, True),
-    "gamma": (_gamma, 2, True), "GEV": (_gev, 3, False)
-}
+DISTRIBUTIONS = {"normal": (_normal, 2, False), "lognormal": (_lognormal, 2, True), "Weibull": (_weibull, 2, True),
+                 "gamma": (_gamma, 2, True), "GEV": (_gev, 3, False)}
 
 
 def anderson_darling(x, cdf):
@@ -184,8 +179,7 @@ def fit(name, x, resamples=RESAMPLES):
         p = p_value(statistic, frozen, n, lambda y: make(y)[1], resamples) if resamples else np.nan
     aic = 2 * k - 2 * likelihood
     aicc = aic + 2 * k * (k + 1) / (n - k - 1)
-    return Fit(name, {key: float(v)
-                      for key, v in parameters.items()}, likelihood, aic, aicc, float(statistic),
+    return Fit(name, {key: float(v) for key, v in parameters.items()}, likelihood, aic, aicc, float(statistic),
                float(scipy.stats.kstest(x, frozen.cdf).statistic), p, frozen)
 
 

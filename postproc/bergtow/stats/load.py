@@ -62,10 +62,8 @@ def field_of(time, x, start, end, scale):
     if len(x) < LEAST_SCALES * n:
         return None
     y = moving_mean(x, n) if n > 1 else x
-    return {
-        "time": time[n - 1:], "peak": y if y.ndim == 1 else y.max(axis=1), "start": float(time[n - 1]) - dt,
-        "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt
-    }
+    return {"time": time[n - 1:], "peak": y if y.ndim == 1 else y.max(axis=1), "start": float(time[n - 1]) - dt,
+            "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt}
 
 
 def start_up(time, x, start, end, scale):
@@ -182,8 +180,6 @@ def _block_maxima(fields, gap, hours_of_levels, resamples):
     longest = int(3600 * np.median([f["hours"] for f in fields]) / (LEAST_GAPS * gap))
     blocks = min(int(np.ceil(BLOCKS / len(fields))), longest)
     if blocks * len(fields) < stat_extreme.LEAST_BLOCKS:
-        return {
-            "refused": f"blocks of {LEAST_GAPS * gap:.3g} s, {LEAST_GAPS} times what separates clusters, are fewer "
-                       f"than {stat_extreme.LEAST_BLOCKS}; run longer, or more fields"
-        }
+        return {"refused": f"blocks of {LEAST_GAPS * gap:.3g} s, {LEAST_GAPS} times what separates clusters, are fewer "
+                           f"than {stat_extreme.LEAST_BLOCKS}; run longer, or more fields"}
     return stat_extreme.by_blocks(fields, hours_of_levels, blocks, resamples, "a sample")

@@ -192,15 +192,11 @@ def _design(found, hours, total):
             if np.isinf(bound(level["level"], level["level_95"][1])):
                 return {"refused": "the sample does not know the tail: the interval of its level has no upper bound; "
                                    "run more fields", "return_hours": hours, "unbounded": True}
-            return {
-                "value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,
-                "times_the_hours_simulated": hours / total, "beyond_data": bool(hours > total),
-                "shape": found[kind]["shape"], "irregular": found[kind]["irregular"]
-            }
-    return {
-        "refused": "; ".join(dict.fromkeys(found[kind].get("refused", "no level") for kind in TAILS)),
-        "return_hours": hours
-    }
+            return {"value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,
+                    "times_the_hours_simulated": hours / total, "beyond_data": bool(hours > total),
+                    "shape": found[kind]["shape"], "irregular": found[kind]["irregular"]}
+    return {"refused": "; ".join(dict.fromkeys(found[kind].get("refused", "no level") for kind in TAILS)),
+            "return_hours": hours}
 
 
 def statistics(e, rows, options, gathered=None):
@@ -262,32 +258,20 @@ def panels(e, rows):
         return None
     def over(x):
         return np.array([stat_load.mean_over_fields(column, 0.0) for column in np.array(x).T])
-    return {
-        "units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
-        "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
-        "mean_of_largest_95": over(largest),
-        "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360
-    }
+    return {"units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
+            "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
+            "mean_of_largest_95": over(largest),
+            "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360}
 
 
 def add_options(p):
     """Add the options of the statistics of loads, and --exclude."""
-    p.add_argument("--exclude",
-                   action="append",
-                   choices=EXCLUDABLE,
-                   default=[],
+    p.add_argument("--exclude", action="append", choices=EXCLUDABLE, default=[],
                    help="leave out members with this doubt, and name them; may be repeated")
-    p.add_argument("--time-scale",
-                   type=above_zero,
-                   metavar="S",
+    p.add_argument("--time-scale", type=above_zero, metavar="S",
                    help="loads are moving means over this time, s (default: 30 at full scale, by Froude's law at model "
                         "scale: stats/loads.py says why)")
-    p.add_argument("--tow-hours",
-                   type=above_zero,
-                   metavar="H",
+    p.add_argument("--tow-hours", type=above_zero, metavar="H",
                    help="length of the tow that the design values are for, h (default: 24 at full scale)")
-    p.add_argument("--probability",
-                   type=share,
-                   default=PROBABILITY,
-                   metavar="P",
+    p.add_argument("--probability", type=share, default=PROBABILITY, metavar="P",
                    help="with which the design value is exceeded in such a tow (default %(default)s)")

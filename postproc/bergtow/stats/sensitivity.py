@@ -67,11 +67,8 @@ def rank_correlations(parameters, y):
             others = np.column_stack(others)
             a, b = _residual(ranks[name], others), _residual(target, others)
             partial = float(np.corrcoef(a, b)[0, 1]) if np.std(a) > 1e-9 * n and np.std(b) > 1e-9 * n else np.nan
-        out[name] = {
-            "spearman": rho, "spearman_95": _interval(rho, n, 0), "prcc": partial,
-            "prcc_95": _interval(partial, n,
-                                 len(names) - 1)
-        }
+        out[name] = {"spearman": rho, "spearman_95": _interval(rho, n, 0), "prcc": partial,
+                     "prcc_95": _interval(partial, n, len(names) - 1)}
     return out
 
 
@@ -92,10 +89,8 @@ def _terms(depth, degree):
     def cost(a):
         return sum((1 if choice else e) for e, (_, choice) in zip(a, depth) if e)
 
-    return [
-        a for a in itertools.product(*(range(min(d, d if choice else degree) + 1) for d, choice in depth))
-        if 0 < cost(a) <= degree
-    ]
+    return [a for a in itertools.product(*(range(min(d, d if choice else degree) + 1) for d, choice in depth))
+            if 0 < cost(a) <= degree]
 
 
 def _design(columns, degree):
@@ -156,10 +151,8 @@ def sobol(parameters, y, resamples=RESAMPLES):
         if found and (best is None or found[3] > best[0][3] + 1e-12):
             best = found, a, terms, degree
     if best is None:
-        return {
-            "refused": f"{n} values do not suffice for {len(names)} parameters: a linear expansion needs "
-                       f"{PER_TERM * (len(names) + 1)} that differ in all of them"
-        }
+        return {"refused": f"{n} values do not suffice for {len(names)} parameters: a linear expansion needs "
+                           f"{PER_TERM * (len(names) + 1)} that differ in all of them"}
     (c, variance, r2, q2), a, terms, degree = best
     if q2 < LEAST_Q2:
         return {
@@ -181,10 +174,8 @@ def sobol(parameters, y, resamples=RESAMPLES):
     k = len(names)
     return {
         "samples": n, "degree": degree, "terms": len(terms), "r2": r2, "q2": q2, "indices": {
-            name: {
-                "first": first[i], "first_95": (low[i], high[i]), "total": total[i],
-                "total_95": (low[k + i], high[k + i])
-            }
+            name: {"first": first[i], "first_95": (low[i], high[i]), "total": total[i],
+                   "total_95": (low[k + i], high[k + i])}
             for i, name in enumerate(names)
         }
     }

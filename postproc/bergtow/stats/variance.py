@@ -73,7 +73,7 @@ def _of_a_chain(chain):
     """
     factor, squares = 1.0, 0.0
     for row in chain:
-        low, high = (np.nan if x is None else x for x in row.get("interval_95") or (None, None))
+        low, high = np.array(row.get("interval_95") or (None, None), dtype=float)
         if not np.isfinite([low, high]).all():
             return factor - 1, np.sqrt(squares), "not resolved"
         matters = row.get("judged") == "matters"

@@ -26,6 +26,11 @@ def add_options(p, minutes):
     """Add --budget, --set, --jobs, --force."""
     p.add_argument("--budget", type=arguments.minutes, default=minutes, metavar="MIN",
                    help=f"wall time, min (default {minutes:g}); the same call continues")
+    add_runs(p)
+
+
+def add_runs(p):
+    """Add --set, --jobs, --force."""
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=arguments.at_least_one, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")

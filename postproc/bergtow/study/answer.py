@@ -126,8 +126,7 @@ def parts_of(e, rows, value, wind):
         return float(np.nanmean(x)) if np.isfinite(x).any() else 0.0
     drag = mean("mean_drag_force_n")
     water = mean(f"estimates_{load_cases.drag_estimate()}_force_n") if wind else drag
-    out = {name: {"water": water, "wind": drag - water}[name] if key is None else mean(key)
-           for name, key in PARTS}
+    out = {name: {"water": water, "wind": drag - water}[name] if key is None else mean(key) for name, key in PARTS}
     out["fluctuation"] = value - sum(out.values()) if np.isfinite(value) else np.nan
     return out
 

@@ -43,12 +43,10 @@ class Range:
 
 
 #: for keys that no client can measure beforehand; the subject of the question (ice, berg, speed) is not among them
-RANGES = (
-    Range("body.drag.water_form", "0.25", "1.25", DRAG),
-    Range("body.drag.air_form", "0.4", "1.25", AIR),
-    Range("ice.friction", "0.05", "0.48", "polished to natural surfaces: Sukhorukov & Løset 2013"),
-    Range("ice.rafting.kappa", "5", "34", "assumed; published ratios of work to energy, 5 to 17, are 10 to 34"),
-)
+RANGES = (Range("body.drag.water_form", "0.25", "1.25", DRAG),
+          Range("body.drag.air_form", "0.4", "1.25", AIR),
+          Range("ice.friction", "0.05", "0.48", "polished to natural surfaces: Sukhorukov & Løset 2013"),
+          Range("ice.rafting.kappa", "5", "34", "assumed; published ratios of work to energy, 5 to 17, are 10 to 34"))
 
 
 def read(path):

@@ -81,8 +81,7 @@ def numbers(e, of):
     elif not (e.status == FINISHED).any():
         raise conditions.nothing_to_count(e, False)
     else:
-        raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE",
-                       USAGE)
+        raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE", USAGE)
     there = np.isfinite(values)
     return meaning, e.used[there], values[there]
 
@@ -140,8 +139,7 @@ def of_ensemble(e, of=OF[0], computed=None):
     """The budget of a number of an ensemble. The numerical error, numerics(), is known only for the mean ice
     resistance: as a percentage of it, it does not apply to numbers that include drag or inertia. If members of the
     sample failed, or lack the number, the missing values are unknown, and there are no intervals. Raises RunError."""
-    refuse(e.file, "sampling: latin-hypercube" in e.study,
-           "fields: common" in e.study or "fields: numbered" in e.study)
+    refuse(e.file, "sampling: latin-hypercube" in e.study, "fields: common" in e.study or "fields: numbered" in e.study)
     meaning, done, values = numbers(e, of)
     if (without := e.without_bound(np.arange(e.n))) and not of.startswith(BOUNDED):
         raise RunError(e.file, f"has no budget of {of}: {without}", "let ice give way (ice.rafting.kappa, "
@@ -153,8 +151,7 @@ def of_ensemble(e, of=OF[0], computed=None):
     found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
                                computed if of == OF[0] else None)
     if "refused" in found:
-        raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further",
-                       SIGNAL)
+        raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further", SIGNAL)
     units = meaning.get("units") or ("N" if of.endswith("_n") else "")
     if lacking or np.any(e.status[sample] == FAILED):
         found = without_intervals(found)

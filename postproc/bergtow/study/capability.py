@@ -24,6 +24,7 @@ from bergtow._program import program_path
 from bergtow.arguments import measure, read, whole_from
 from bergtow.errors import CASE, SIGNAL, USAGE, BergtowError, RunError
 from bergtow.result import at_least, compared
+from bergtow.result.origins import source_of_ice
 from bergtow.result.run import Run, case_value, parse_case, within
 from bergtow.stats import mean as stat_mean
 from bergtow.study import analysis, bracket, domain_width
@@ -79,13 +80,12 @@ def trial(run, number, least):
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer", CASE)
     if np.sum(within(run["time"], *run.window)) < 2:
-        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less",
-                       CASE)
+        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less", CASE)
     if run.at_least:
         raise RunError(run.path, "the load of the body has no bound in some steps of the window",
                        "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
     domain = run.summary.get("domain") or {}
-    widths, needed = (np.nan if domain.get(k) is None else domain[k] for k in ("body_widths", "body_widths_needed"))
+    widths, needed = np.array([domain.get(k) for k in ("body_widths", "body_widths_needed")], dtype=float).tolist()
     # a body that is adrift before the end of the window has no speed and no tow force, but it has the tension that
     # parted its line
     towed = run.adrift >= run.window[1]
@@ -292,7 +292,7 @@ def check(case, key):
         raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
                        "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
                        "tow.line.breaking_load", CASE)
-    if domain_width.read_ice_of(case):
+    if source_of_ice(case):
         raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
                        "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
                        "each value", CASE)
@@ -314,7 +314,8 @@ def options(p):
     p.add_argument("--resolution", metavar="V", help="width of the bracket at which the search ends (default: "
                    f"1/{PARTS} of the range)")
     p.add_argument("--for", dest="conditions", metavar="KEY=V,V", help="search under each of these values")
-    p.add_argument("--speed", metavar="V", help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
+    p.add_argument("--speed", type=measure("m/s"), metavar="V",
+                   help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
     p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
                    "(default 0.5)")
     p.add_argument("--fields", type=whole_from(6, 1000), default=FIELDS, metavar="N",
@@ -324,14 +325,6 @@ def options(p):
                    "search alone)")
     domain_width.add_option(p)
     analysis.add_options(p, BUDGET)
-
-
-def number(option, text, unit):
-    """A number with a unit from an option, read as the program reads it. Raises RunError."""
-    try:
-        return read(text, unit)
-    except BergtowError as error:
-        raise BergtowError(f"{option} {error}", USAGE) from None
 
 
 def check_options(a):
@@ -357,17 +350,16 @@ def perform(a):
     start, end = (value for _, value in ends)
     if start == end:
         raise RunError(a.search, "the range has no extent", "give --from and --to two values", USAGE)
-    unit, least = case.get(a.search, "").partition(" ")[2], STOPPED * case_value(case, "tow.speed")
+    unit, least = case.get(a.search, "").partition(" ")[2], a.speed or STOPPED * case_value(case, "tow.speed")
     resolution = abs(end - start) / PARTS
     if a.resolution:
-        resolution = number("--resolution", a.resolution, unit)
+        try:
+            resolution = read(a.resolution, unit)
+        except BergtowError as error:
+            raise BergtowError(f"--resolution {error}", USAGE) from None
         if not 0 < resolution <= abs(end - start):
             raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
                            f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
-    if a.speed:
-        least = number("--speed", a.speed, "m/s")
-        if not least > 0:
-            raise RunError(f"--speed {a.speed}", "is not above 0", "give the speed that a tow must keep", USAGE)
     last = began + 60 * a.budget
     runs = CaseRuns(a.case.resolve(), folder, "capability", binary, a.set, a.jobs, last, last)
     replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
@@ -390,15 +382,13 @@ def perform(a):
     # a key whose default follows from a varied key varies with it
     alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
     title = case.get("run.title", "none")
-    found = {
-        "case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
-        "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
-        "range": [start, end], "resolution": resolution, "for": across,
-        "for_unit": case.get(across, "").partition(" ")[2],
-        "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
-        "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
-        "conditions": [found_of(c, least) for c in some]
-    }
+    found = {"case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
+             "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
+             "range": [start, end], "resolution": resolution, "for": across,
+             "for_unit": case.get(across, "").partition(" ")[2],
+             "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
+             "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
+             "conditions": [found_of(c, least) for c in some]}
     if not any(any(c.trials.values()) for c in some):
         runs.tell_failed()
         raise RunError(folder, "the budget does not reach for a run", "raise --budget; the same call continues", SIGNAL)

@@ -33,7 +33,7 @@ from pathlib import Path
 from bergtow._program import program_path
 from bergtow.arguments import above_zero, whole_from
 from bergtow.errors import SIGNAL, USAGE, RunError
-from bergtow.result.origins import BESIDE, annotated
+from bergtow.result.origins import BESIDE, annotated, source_of_ice
 from bergtow.result.run import Run, within
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
@@ -112,8 +112,7 @@ def cut_from(run, larger):
     The smaller domain must be run again for this, because its own field is different, as would be one cut from a still
     larger domain. Rejected: the largest domain of all tries as the extent of each, eight times the ice of the case to
     be generated for a comparison that mostly ends with the first try."""
-    if run.case.get("ice.field", "none") != "none" or run.case.get("ice.outlines", "none") != "none" or not (
-            run.value("ice.concentration") > 0):
+    if source_of_ice(run.case) or not run.value("ice.concentration") > 0:
         return {}
     out = {}
     for axis, size in (("x", "length"), ("y", "width")):

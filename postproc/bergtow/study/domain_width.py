@@ -22,11 +22,6 @@ def reads_ice(case):
     return any(str(says(case, "ice", k) or "none") != "none" for k in ("outlines", "field"))
 
 
-def read_ice_of(values):
-    """The same for a resolved case, {"section.key": text}."""
-    return any(values.get(f"ice.{k}", "none") != "none" for k in ("outlines", "field"))
-
-
 def stays(case, replaced):
     """Does the width of this case stay as it is? replaced: keys that are overridden."""
     return (reads_ice(case) or any(says(case, *key.split(".")[:2]) is not None for key in PLACED)

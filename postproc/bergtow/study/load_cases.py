@@ -145,8 +145,7 @@ def drag_estimate():
 def mean_parts(run):
     """Mean ice resistance in the window of a run, the drag of the water, and the total drag."""
     water = run.number(f"estimates.{drag_estimate()}.force_n")
-    return {"ice": float(run.number("mean_ice_resistance_n")), "water": water,
-            "drag": run.number("mean_drag_force_n")}
+    return {"ice": float(run.number("mean_ice_resistance_n")), "water": water, "drag": run.number("mean_drag_force_n")}
 
 
 def largest_mean(run, scale, start, end, name="tow_force"):

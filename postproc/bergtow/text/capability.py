@@ -104,16 +104,12 @@ def content(found):
     return [limits(found), *([line] for line in (narrow(found), wider(found), meaning(found)) if line), curve(found)]
 
 
-def _numbers(values):
-    return np.array([np.nan if v is None else v for v in values], dtype=float)
-
-
 def _curve(axes, c, name, colour, factor, unit):
-    x = _numbers([p["value"] for p in c["points"]]) * factor
-    mean = _numbers([p[f"mean_{name}"] for p in c["points"]])
-    low, high = np.array([_numbers(p[f"mean_{name}_95"]) for p in c["points"]]).reshape(-1, 2).T
+    x = np.array([p["value"] for p in c["points"]], dtype=float) * factor
+    mean = np.array([p[f"mean_{name}"] for p in c["points"]], dtype=float)
+    low, high = np.array([np.array(p[f"mean_{name}_95"], dtype=float) for p in c["points"]]).reshape(-1, 2).T
     for at, p in zip(x, c["points"]):
-        y, adrift = _numbers(p[name]) / unit, np.isnan(_numbers(p["speed"]))
+        y, adrift = np.array(p[name], dtype=float) / unit, np.isnan(np.array(p["speed"], dtype=float))
         for some, mark in ((~adrift, "."), (adrift, "x")):
             axes.plot(np.full(np.sum(some), at), y[some], mark, color=colour, alpha=0.35, markersize=5)
     axes.plot(x, mean / unit, color=colour, label=c["label"])
@@ -149,10 +145,9 @@ def figure(found):
                 _curve(axes, c, name, colour, factor, unit)
             if c in between:
                 axes.axvspan(factor * c["makes_it"], factor * c["does_not"], color=colour, alpha=0.10, linewidth=0)
-        axes.set_xlabel(words)
-        axes.set_ylabel(label)
+        axes.set(xlabel=words, ylabel=label)
         shown = [0.0, line, *(x for c in some for p in c["points"] for x in p[name] if x is not None)]
-        bands = _numbers([p[f"mean_{name}_95"][1] for c in some for p in c["points"]])
+        bands = np.array([p[f"mean_{name}_95"][1] for c in some for p in c["points"]], dtype=float)
         top = max(max(shown), min(2 * max(shown), max(bands[np.isfinite(bands)], default=0.0)))
         axes.set_ylim(min(shown) / unit, 1.06 * top / unit or 1.0)
         axes.grid(True)
@@ -169,9 +164,8 @@ def figure(found):
             ends = [v for v in (c["makes_it"], c["does_not"]) if v is not None]
             if len(ends) == 2:
                 axes.plot([at, at], [factor * v for v in ends], color=style.INK, linewidth=2)
-        axes.plot(x, factor * _numbers([c["estimate"] for c in some]), "o-", color=style.ICE, markersize=5)
-        axes.set_xlabel(f"{found['for']}, {found['for_unit']}".rstrip(", "))
-        axes.set_ylabel(f"limit, {words}")
+        axes.plot(x, factor * np.array([c["estimate"] for c in some], dtype=float), "o-", color=style.ICE, markersize=5)
+        axes.set(xlabel=f"{found['for']}, {found['for_unit']}".rstrip(", "), ylabel=f"limit, {words}")
         axes.set_ylim(*sorted(factor * v for v in found["range"]))
         axes.grid(True)
     style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",

@@ -31,39 +31,32 @@ def unit_of(s):
 
 def means(s):
     factor, unit = unit_of(s)
-    head = [
-        "condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
-        "standard error in a run", "largest field's share", f"fields for {100 * s['wanted_error']:g} %", "doubts"
-    ]
+    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
+            "standard error in a run", "largest field's share", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
     rows = []
     for c in s["conditions"]:
         r = c["resistance"]
         if not r["n"]:
             rows.append([c["label"], fields_cell(c)] + ["–"] * (len(head) - 3) + [doubts(c)])
             continue
-        rows.append([
-            c["label"],
-            fields_cell(c),
-            number(r["mean"] / factor),
-            pair(r["t_95"], factor),
-            pair(r["bootstrap_95"], factor),
-            number(r["median"] / factor),
-            number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–",
-            number(r["sd_between"] / factor),
-            number(r["se_within"] / factor),
-            f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
-            f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
-            doubts(c)
-        ])
-    note = (
-        "95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth "
-        "of the fields at each end (from 8 fields on). "
-        "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by "
-        "its slowest cosine waves. "
-        "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps "
-        "without a solution, so that its mean and peaks are at least these, J body stood still, N window not steady, "
-        "S short window, F met little ice, X stopped early, O other warning."
-    )
+        rows.append([c["label"],
+                     fields_cell(c),
+                     number(r["mean"] / factor),
+                     pair(r["t_95"], factor),
+                     pair(r["bootstrap_95"], factor),
+                     number(r["median"] / factor),
+                     number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–",
+                     number(r["sd_between"] / factor),
+                     number(r["se_within"] / factor),
+                     f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
+                     f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
+                     doubts(c)])
+    note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an "
+            "eighth of the fields at each end (from 8 fields on). Sd of fields: standard deviation between the means "
+            "of runs; standard error in a run: of one run's mean, by its slowest cosine waves. Largest: share of the "
+            "field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps without a solution, "
+            "so that its mean and peaks are at least these, J body stood still, N window not steady, S short window, F "
+            "met little ice, X stopped early, O other warning.")
     drifting = [
         f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"
     ]
@@ -84,10 +77,8 @@ def estimates(s):
             text = number(e["force"] / factor) + ("" if e["valid"] or not np.isfinite(e["force"]) else "*")
             cells.append(text + (f" ({number(e['ratio'])})" if np.isfinite(e["ratio"]) else ""))
         rows.append(cells)
-    on_top = [
-        f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
-        if s["conditions"][0]["estimates"][name]["on_top"]
-    ]
+    on_top = [f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
+              if s["conditions"][0]["estimates"][name]["on_top"]]
     note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
             "* outside the range the estimate is meant for. –: no value there. The estimates were not made for each "
             "other's conditions and can differ tenfold; none has been checked against a measured tow here.")
@@ -117,25 +108,18 @@ def extremes(s):
     some = [c for c in s["conditions"] if "refused" not in c["extremes"]]
     if not some:
         return [["No peaks: " + s["conditions"][0]["extremes"]["refused"] + "."]]
-    hours = [
-        level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
-        for level in c["extremes"][kind].get("levels", [])
-    ]
+    hours = [level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
+             for level in c["extremes"][kind].get("levels", [])]
     hours = sorted(set(hours))
-    factor, unit = scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]],
-                               "N")
-    head = [
-        "condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
-        *(f"once in {T:g} h" for T in hours)
-    ]
+    factor, unit = scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]], "N")
+    head = ["condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
+            *(f"once in {T:g} h" for T in hours)]
     rows, short = [], []
     for c in some:
         x = c["extremes"]
-        first = [
-            f"{x['hours']:.3g}",
-            number(x["collisions_per_hour"]),
-            number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"
-        ]
+        first = [f"{x['hours']:.3g}",
+                 number(x["collisions_per_hour"]),
+                 number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"]
         for kind, label in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
             f = x[kind]
             if "refused" in f:
@@ -143,12 +127,10 @@ def extremes(s):
                 continue
             at = {level["hours"]: level for level in f["levels"]}
             short += loads_text.cut(c["label"], f, x["hours"])
-            rows.append([
-                c["label"], label, *first,
-                f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
-                number(f["p_value"], 2),
-                *(loads_text.level(at.get(T), factor) for T in hours)
-            ])
+            rows.append([c["label"], label, *first,
+                         f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
+                         number(f["p_value"], 2),
+                         *(loads_text.level(at.get(T), factor) for T in hours)])
     refused = {
         f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}"
         for c in some
@@ -156,12 +138,10 @@ def extremes(s):
         if "refused" in c["extremes"][kind]
     }
     conversions = sorted({c["extremes"]["conversion"] for c in some})
-    text = (
-        f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. "
-        f"GPD: peaks over a threshold; GEV: block maxima. "
-        "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest "
-        f"peak seen. No bound: the upper end is more than {FAR:g} times the level."
-    )
+    text = (f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other "
+            "peaks. GPD: peaks over a threshold; GEV: block maxima. Brackets: 95 %. * beyond the hours simulated. ! "
+            "shape below -0.5: the levels are little more than the largest peak seen. No bound: the upper end is more "
+            f"than {FAR:g} times the level.")
     return [Table(head, rows), [text, *loads_text.cut_note(short), *(f"No fit for {r}." for r in sorted(refused))]]
 
 
@@ -188,10 +168,8 @@ def sensitivity(s):
             cells += [f"{number(i[what], 2)} ({pair(i[f'{what}_95'])})" for what in ("first",
                                                                                      "total")] if i else ["–", "–"]
         rows.append(cells)
-    head = [
-        "parameter", "Spearman", "PRCC",
-        *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))
-    ]
+    head = ["parameter", "Spearman", "PRCC",
+            *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))]
     notes = [(f"{counted(x['members'])}. " if x["of"] == "members" else
               f"Means of {counted(x['samples'], 'condition')}, of {counted(x['members'])}. ") + "Brackets: 95 %."]
     for of, k in kinds:
@@ -214,42 +192,31 @@ def members(s, markdown):
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
     lines = [(f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."]
     if s["waiting"]:
-        lines.append(
-            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
-            f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields."
-        )
+        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
+                     f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields.")
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
-        lines.append(
-            f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: "
-            f"{name}: {why}. Call `bergtow ensemble` again to rerun damaged members."
-        )
+        lines.append(f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the "
+                     f"first: {name}: {why}. Call `bergtow ensemble` again to rerun damaged members.")
     if s["without_mean"]:
-        lines.append(
-            f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no "
-            f"window, nothing that is towed, or a line that parted before the window or early in it."
-        )
+        lines.append(f"{counted(len(s['without_mean']))} without a mean, and in no number "
+                     f"({listed(s['without_mean'])}): no window, nothing that is towed, or a line that parted before "
+                     "the window or early in it.")
     if s["behind"]:
-        lines.append(
-            f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, "
-            f"which takes them in."
-        )
+        lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow "
+                     "ensemble` again, which takes them in.")
     for kind, words in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
-            lines.append(
-                f"{counted(len(s[kind]))} {words}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the "
-                f"first: {name}: {why}"
-            )
+            lines.append(f"{counted(len(s[kind]))} {words}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; "
+                         f"the first: {name}: {why}")
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " +
                      ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     if s["copies"]:
-        lines.append(
-            f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and count with "
-            f"it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): no seed changes ice "
-            f"that is read, or water without floes."
-        )
+        lines.append(f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and "
+                     f"count with it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): "
+                     "no seed changes ice that is read, or water without floes.")
     if s["builds"]:
         lines.append(s["builds"])
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
@@ -257,15 +224,12 @@ def members(s, markdown):
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers" +
                      ("." if markdown else "; --exclude leaves them out."))
     if s["members_without_folder"]:
-        lines.append(
-            f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
-            f"no folder here ({listed(s['members_without_folder'])}): the peaks of their collisions are not known."
-        )
-    heavy = [
-        c["label"]
-        for c in s["conditions"]
-        if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5
-    ]
+        lines.append(f"{counted(len(s['members_without_folder']))} "
+                     f"{'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here "
+                     f"({listed(s['members_without_folder'])}): the peaks of their collisions are not known.")
+    heavy = [c["label"]
+             for c in s["conditions"]
+             if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
     return lines

@@ -65,10 +65,8 @@ def design(s):
         rows.append([c["label"], value(d, factor), ends(d, factor), *tension, number(d["mean"] / factor),
                      number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
                      d.get("model", "–")])
-    notes = [
-        f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without what the "
-        f"warnings name. * beyond the hours simulated: extrapolated by the tail."
-    ]
+    notes = [f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without what the "
+             f"warnings name. * beyond the hours simulated: extrapolated by the tail."]
     notes += [text for text in (steps(s), holds_for(s)) if text]
     return [Table(head, rows), notes + warnings(s)]
 

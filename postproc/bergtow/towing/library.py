@@ -142,8 +142,7 @@ def lightest_line(needed_breaking: float, library: PathLike = None, material: st
     return min(fit, key=lambda x: x.mass, default=None)
 
 
-def smallest_vessel(needed_bollard_pull: float, library: PathLike = None,
-                    known: tuple[str, ...] = ()) -> Vessel | None:
+def smallest_vessel(needed_bollard_pull: float, library: PathLike = None, known: tuple[str, ...] = ()) -> Vessel | None:
     """The vessel of least bollard pull that has at least this pull, N, and for which these members are known, such as
     "free_speed"; None if there is none."""
     fit = [x for x in vessels(library).values()

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Union
 
+import numpy as np
+
 from .. import _library
 from ..errors import CASE, IO, BergtowError
 from ._given import above_zero, not_below_zero
@@ -79,13 +81,7 @@ def pull_share(speed: float, free_speed: float | None = None, curve: Curve = "qu
     free-running speed v_f and assumed; or points of a user's curve."""
     not_below_zero(speed=speed)
     if not isinstance(curve, str):
-        (first, share), last = curve[0], curve[-1]
-        if speed <= first or len(curve) == 1:
-            return share
-        for (low, at_low), (high, at_high) in zip(curve[:-1], curve[1:]):
-            if speed <= high:
-                return at_low + (at_high - at_low) * (speed - low) / (high - low)
-        return last[1]
+        return float(np.interp(speed, *zip(*curve)))
     if curve not in ("quadratic", "linear"):
         raise BergtowError(f"curve: {curve!r} is none; give quadratic, linear, or points (read_curve)")
     if free_speed is None or not 0 < free_speed < math.inf:
