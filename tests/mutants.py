@@ -424,10 +424,9 @@ MUTANTS = {
          "the momentum starts anew with each list"),
     ]),
     "src/solve/batch_residual.c": (SOLVE + ["scenes:walls_closing"], [
-        ("on || was_moved(batch, l) || o->problem->plain", "on || o->problem->plain",
-         "what has just come to 0 leaves its batch"),
-        ("if (same && listed == in_batches) {", "if (same) {", "what closes is not listed"),
-        ("same = same && mark[i] != LEAVES;", "", "what has opened stays in its batch"),
+        ("on |= s.on;", "on = s.on;", "what has just come to 0 leaves its batch"),
+        ("return *listed == in_batches;", "return true;", "what closes is not listed"),
+        ("if (mark[i] == LEAVES) return false;", "", "what has opened stays in its batch"),
     ]),
     "src/solve/batch_sweep.c": (SOLVE + ["scenes:walls_closing"], [
         ("batch->before[c] = now + lag * change;", "batch->before[c] = now;", "missed moves are forgotten"),

@@ -76,9 +76,11 @@ BT_INLINE bt_vec limits_of(const bt_limit *const limit[BT_LANES], int c)
     return bt_smaller(most, (bt_vec){limit[0]->flat[c], limit[1]->flat[c], limit[2]->flat[c], limit[3]->flat[c]});
 }
 
-/// Result for four contacts, lane by lane: the squares of their rows, and which of them bear load or close.
+/// Result for four contacts, lane by lane: the squares of their rows, whether any of these is not 0, and which contacts
+/// bear load or close.
 typedef struct {
     lanes square[3];
+    bool misses;
     bt_mask on;
 } seen;
 
@@ -91,6 +93,7 @@ BT_INLINE seen look_at(look *o, const four *f, const bt_limit *const *limit, int
     const bt_masses *m = &f->m;
     const bt_vec dx = f->b.x - f->a.x, dy = f->b.y - f->a.y, un = r->nx * dx + r->ny * dy;
     bt_vec worst = zero, total = zero;
+    bt_mask right = ~(bt_mask){0};
     seen s = {.on = (r->ln[0] + r->ln[1] > zero) | (r->lt != zero)};
     for (int c = 0; c < 2; c++) {
         const bt_mask there = c ? r->two : r->one;
@@ -106,12 +109,14 @@ BT_INLINE seen look_at(look *o, const four *f, const bt_limit *const *limit, int
         }
         worst = bt_larger(worst, e);
         s.square[c] = lanes_of(e * e);
+        right &= e * e == zero;
         total += bt_only(there, r->ln[c]);
         s.on |= there & ~(w >= zero);
     }
     const bt_vec wt = r->nx * dy - r->ny * dx + r->rbt * f->b.w - r->rat * f->a.w, bound = r->mu * total;
     const bt_vec e = (bt_larger(-bound, bt_smaller(bound, r->lt - wt * m->mt)) - r->lt) * m->wt;
     s.square[2] = lanes_of(e * e);
+    s.misses = bt_joined(~(right & (e * e == zero))) != 0;
     worst = bt_choose(bt_size_of(wt) < endless, bt_larger(worst, bt_size_of(e)), endless);
     const bt_mask counts = first_lanes(n) & (limit ? r->one : ~(bt_mask){0});
     o->most = bt_larger(o->most, bt_only(counts, worst));
@@ -120,10 +125,10 @@ BT_INLINE seen look_at(look *o, const four *f, const bt_limit *const *limit, int
     return s;
 }
 
-static bool lane_is_on(look *o, const seen *s, int l)
+/// Add the squares of lane l.
+BT_INLINE void add_squares(look *o, const seen *s, int l)
 {
     for (int c = 0; c < 3; c++) o->found.squares += s->square[c].of[l];
-    return s->on[l];
 }
 
 /// The same for sheets, one by one.
@@ -136,27 +141,29 @@ static bool sheets_are_on(look *o, const bt_contact *contact, const bt_mass *m, 
     return contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || r > 0;
 }
 
-/// UNSEEN: in no batch. LEAVES: in a batch, but no longer to be swept. LISTED: to be swept.
-enum { UNSEEN, LEAVES, LISTED };
+/// Marks of contacts. UNSEEN: in no batch. LEAVES: in a batch, but no longer to be swept. LISTED: to be swept, as a lane
+/// of a mask.
+enum { UNSEEN = 0, LEAVES = 1, LISTED = -1 };
 
-/// Residuals and marks of contacts index[n] of the cell.
-BT_INLINE void look_at_records(look *o, const bt_cell *cell, bool bounded, const bt_contact *const contact[BT_LANES],
-                               const bt_idx index[BT_LANES], int n, uint8_t *mark)
+/// Residuals of contacts index[n] of the cell. Returns which are to be swept.
+BT_INLINE bt_mask look_at_records(look *o, const bt_cell *cell, bool bounded, const bt_contact *const contact[BT_LANES],
+                                  const bt_idx index[BT_LANES], int n)
 {
     const bt_limit *limit[BT_LANES];
     for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws->limits[index[l]];
     const four f = four_from(contact, o->v, o->inv);
-    const seen s = bounded ? look_at(o, &f, limit, n) : look_at(o, &f, NULL, n);
-    for (int l = 0; l < n; l++) {
-        bool on;
-        if (bounded && contact[l]->n == 0) {
+    seen s = bounded ? look_at(o, &f, limit, n) : look_at(o, &f, NULL, n);
+    bool sheets = false;
+    for (int l = 0; bounded && l < n; l++) sheets = sheets || contact[l]->n == 0;
+    for (int l = 0; (sheets || s.misses) && l < n; l++) { // in sequence: the sum depends on the order
+        if (sheets && contact[l]->n == 0) {
             const bt_mass m = bt_mass_of(contact[l], o->inv);
-            on = sheets_are_on(o, contact[l], &m, limit[l]);
+            s.on[l] = sheets_are_on(o, contact[l], &m, limit[l]) ? LISTED : UNSEEN;
         } else {
-            on = lane_is_on(o, &s, l);
+            add_squares(o, &s, l);
         }
-        if (on || o->problem->plain) mark[index[l]] = LISTED;
     }
+    return o->problem->plain ? (bt_mask){LISTED, LISTED, LISTED, LISTED} : s.on;
 }
 
 /// The sheets in lane l of a batch, with the members that their residual needs.
@@ -167,38 +174,31 @@ static bt_contact sheets_of(const bt_batch *batch, int l)
                         .lt = batch->x[2][l], .a = batch->a[l], .b = batch->b[l]};
 }
 
-/// Has the last sweep changed the contact in lane l?
-static bool was_moved(const bt_batch *batch, int l)
-{
-    return batch->x[0][l] != batch->before[0][l] || batch->x[1][l] != batch->before[1][l] ||
-           batch->x[2][l] != batch->before[2][l];
-}
-
-BT_INLINE void look_at_batch(look *o, const bt_cell *cell, bool bounded, const bt_batch *batch, uint8_t *mark)
+BT_INLINE void look_at_batch(look *o, const bt_cell *cell, bool bounded, const bt_batch *batch, int64_t *mark)
 {
     const bt_limit *limit[BT_LANES];
     const bool sheets = bounded && batch->kind == BT_BATCH_SHEETS;
     for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws->limits[batch->contact[l]];
-    seen s;
-    if (!sheets) {
-        const four f = four_of(batch, o->v);
-        s = bounded ? look_at(o, &f, limit, batch->n) : look_at(o, &f, NULL, batch->n);
-    }
-    for (int l = 0; l < batch->n; l++) {
-        bool on;
-        if (sheets) {
+    // which the last sweep has changed
+    bt_mask on = (batch->x[0] != batch->before[0]) | (batch->x[1] != batch->before[1]) |
+                 (batch->x[2] != batch->before[2]);
+    if (sheets) {
+        for (int l = 0; l < batch->n; l++) {
             const bt_contact contact = sheets_of(batch, l);
             const bt_mass m = {.w = {batch->w[0][l]}, .mn = {batch->mn[0][l]}, .wt = batch->wt[l], .mt = batch->mt[l]};
-            on = sheets_are_on(o, &contact, &m, limit[l]);
-        } else {
-            on = lane_is_on(o, &s, l);
+            if (sheets_are_on(o, &contact, &m, limit[l])) on[l] = LISTED;
         }
-        mark[batch->contact[l]] = on || was_moved(batch, l) || o->problem->plain ? LISTED : LEAVES;
+    } else {
+        const four f = four_of(batch, o->v);
+        const seen s = bounded ? look_at(o, &f, limit, batch->n) : look_at(o, &f, NULL, batch->n);
+        for (int l = 0; s.misses && l < batch->n; l++) add_squares(o, &s, l);
+        on |= s.on;
     }
+    for (int l = 0; l < batch->n; l++) mark[batch->contact[l]] = on[l] || o->problem->plain ? LISTED : LEAVES;
 }
 
 /// Mark the contacts that the last sweep has changed.
-static void mark_moved(const bt_cell *cell, uint8_t *mark)
+static void mark_moved(const bt_cell *cell, int64_t *mark)
 {
     for (bt_idx k = 0; k < cell->work->n_last; k++) {
         const bt_unknowns *last = &cell->work->last[k];
@@ -208,68 +208,93 @@ static void mark_moved(const bt_cell *cell, uint8_t *mark)
     }
 }
 
-/// Process the contacts in no batch, four at a time.
-BT_INLINE void look_at_rest(look *o, const bt_cell *cell, bool bounded, const bt_contact *records, uint8_t *mark)
+/// Process the contacts of a packed cell that are in no batch, four at a time.
+BT_INLINE void look_at_others(look *o, const bt_cell *cell, bool bounded, int64_t *mark)
 {
-    const bt_contact *contact[BT_LANES];
+    const bt_contact *records = bt_batch_others(cell), *contact[BT_LANES];
     bt_idx index[BT_LANES];
     int n = 0;
     for (bt_idx i = 0; i <= cell->n_contacts; i++) {
         const bool ends = i == cell->n_contacts;
-        if (!ends && cell->work->packed && mark[i] != UNSEEN) continue;
+        if (!ends && mark[i] != UNSEEN) continue;
         if (!ends) contact[n] = records++, index[n++] = i;
         if (n == 0 || !(ends || n == BT_LANES)) continue;
         for (int l = n; l < BT_LANES; l++) contact[l] = contact[n - 1], index[l] = index[n - 1];
-        look_at_records(o, cell, bounded, contact, index, n, mark);
+        const bt_mask on = look_at_records(o, cell, bounded, contact, index, n);
+        for (int l = 0; l < n; l++) mark[index[l]] = on[l];
         n = 0;
     }
 }
 
-BT_INLINE void look_at_all(look *o, const bt_cell *cell, bool bounded, uint8_t *mark)
+/// Process the contacts of a cell that is not packed, four at a time.
+BT_INLINE void look_at_unpacked(look *o, const bt_cell *cell, bool bounded, int64_t *mark)
 {
-    const bool packed = cell->work->packed;
-    for (bt_idx k = 0; packed && k < cell->work->n_batches; k++)
-        look_at_batch(o, cell, bounded, &cell->work->batch[k], mark);
-    look_at_rest(o, cell, bounded, packed ? bt_batch_others(cell) : cell->contacts, mark);
+    for (bt_idx i = 0; i < cell->n_contacts; i += BT_LANES) {
+        const bt_contact *contact[BT_LANES];
+        bt_idx index[BT_LANES];
+        const int n = (int)bt_min(BT_LANES, cell->n_contacts - i);
+        for (int l = 0; l < BT_LANES; l++) index[l] = i + (l < n ? l : n - 1), contact[l] = &cell->contacts[index[l]];
+        const bt_mask on = look_at_records(o, cell, bounded, contact, index, n);
+        for (int l = 0; l < n; l++) mark[i + l] |= on[l];
+    }
+}
+
+BT_INLINE void look_at_all(look *o, const bt_cell *cell, bool bounded, int64_t *mark)
+{
+    if (cell->work->packed) {
+        for (bt_idx k = 0; k < cell->work->n_batches; k++)
+            look_at_batch(o, cell, bounded, &cell->work->batch[k], mark);
+        look_at_others(o, cell, bounded, mark);
+    } else {
+        mark_moved(cell, mark);
+        look_at_unpacked(o, cell, bounded, mark);
+    }
     o->found.most = bt_max(o->found.most, bt_largest_lane(o->most));
     o->found.bad += sum_of(o->bad);
     o->found.rows += sum_of(o->rows);
 }
 
 BT_FOR_EACH_CPU
-static void look_at_rigid(look *o, const bt_cell *cell, uint8_t *mark) { look_at_all(o, cell, false, mark); }
+static void look_at_rigid(look *o, const bt_cell *cell, int64_t *mark) { look_at_all(o, cell, false, mark); }
 
 BT_FOR_EACH_CPU
-static void look_at_bounded(look *o, const bt_cell *cell, uint8_t *mark) { look_at_all(o, cell, true, mark); }
+static void look_at_bounded(look *o, const bt_cell *cell, int64_t *mark) { look_at_all(o, cell, true, mark); }
+
+/// Are the marked contacts those in the batches of the cell? *listed: their number.
+static bool same_list(const bt_cell *cell, const int64_t *mark, bt_idx *listed)
+{
+    bt_idx in_batches = 0;
+    *listed = 0;
+    for (bt_idx k = 0; k < cell->work->n_batches; k++) in_batches += cell->work->batch[k].n;
+    for (bt_idx i = 0; i < cell->n_contacts; i++) {
+        if (mark[i] == LEAVES) return false;
+        *listed += mark[i] == LISTED;
+    }
+    return *listed == in_batches;
+}
 
 /// List the marked contacts; batches of the same contacts stay as they are.
-static void list_marked(bt_cell *cell, const uint8_t *mark)
+static void list_marked(bt_cell *cell, const int64_t *mark)
 {
-    bt_idx listed = 0, in_batches = 0;
-    bool same = cell->work->packed;
-    for (bt_idx k = 0; same && k < cell->work->n_batches; k++) in_batches += cell->work->batch[k].n;
-    for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        listed += mark[i] == LISTED;
-        same = same && mark[i] != LEAVES;
+    bt_idx n = 0;
+    if (!cell->work->packed || !same_list(cell, mark, &n)) {
+        bt_batch_unpack(cell);
+        bt_rounds_list(cell);
+        bt_idx *list = cell->work->list;
+        n = 0;
+        for (bt_idx i = 0; i < cell->n_contacts; i++) {
+            list[n] = i;
+            n += mark[i] == LISTED;
+        }
     }
-    if (same && listed == in_batches) {
-        cell->n_listed = listed;
-        return;
-    }
-    bt_batch_unpack(cell);
-    bt_rounds_list(cell);
-    for (bt_idx i = 0; i < cell->n_contacts; i++) {
-        cell->work->list[cell->n_listed] = i;
-        cell->n_listed += mark[i] == LISTED;
-    }
+    cell->n_listed = n;
 }
 
 bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, const bt_problem *problem)
 {
     const size_t n = (size_t)cell->n_contacts;
-    uint8_t few[BT_FEW], *mark = n <= BT_FEW ? few : bt_realloc(NULL, n, sizeof *mark);
-    if (n > 0) memset(mark, UNSEEN, n);
-    if (!cell->work->packed) mark_moved(cell, mark);
+    int64_t few[BT_FEW], *mark = n <= BT_FEW ? few : bt_realloc(NULL, n, sizeof *mark);
+    if (n > 0) memset(mark, 0, n * sizeof *mark); // UNSEEN
     look o = {.problem = problem, .v = v, .inv = inv};
     (cell->laws->limits ? look_at_bounded : look_at_rigid)(&o, cell, mark);
     list_marked(cell, mark);

@@ -48,8 +48,6 @@ BT_INLINE void solve_normals(const bt_batch *batch, const motion *a, const motio
     *l2 = bt_choose(both, both2, bt_choose(first, zero, only2));
 }
 
-BT_INLINE bool any_of(mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
-
 /// As bt_limit_rim.
 BT_INLINE void rim(const bt_batch *batch, const vec bound[2], const vec b[2], vec l[2])
 {
@@ -79,7 +77,7 @@ BT_INLINE void bound_normals(const bt_batch *batch, const vec bound[2], const mo
                              vec *l2)
 {
     const mask over = (*l1 > bound[0]) | (*l2 > bound[1]);
-    if (!any_of(over)) return;
+    if (bt_joined(over) == 0) return;
     const vec un = batch->nx * (q->x - p->x) + batch->ny * (q->y - p->y);
     vec b[2], l[2] = {*l1, *l2};
     for (int i = 0; i < 2; i++)

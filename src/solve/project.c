@@ -57,6 +57,7 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
 {
     (void)context;
     bt_cell *cell = &world->cells->cell[k];
+    double deepest = 0;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];
         bt_gaps *gaps = &cell->gaps[j];
@@ -68,11 +69,13 @@ static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_tota
             gaps->gap[i] += world->par.dt * bt_normal_velocity(contact, i, &world->bodies.vel[contact->a],
                                                                &world->bodies.vel[contact->b]);
             if (cell->laws->limits) gaps->gap[i] += cell->laws->limits[j].grown[i]; // crushed or rafted in this step
-            totals->most = bt_max(totals->most, -gaps->gap[i]);
+            deepest = bt_max(deepest, -gaps->gap[i]);
         }
         if (!world->par.plain_sweeps && turns(world, cell, j, LEFT * world->par.slop))
             bt_sum_add(&totals->sum[TURNS], 1);
     }
+    cell->work->found.most = deepest;
+    totals->most = bt_max(totals->most, deepest);
 }
 
 /// Update the gaps after the first pass, and form the row where a pair that has rotated touches now.
@@ -137,16 +140,13 @@ static void residual_apart(bt_world *world, bt_idx k, const void *problem, bt_to
     bt_solver_residual_of_cell(world, k, problem, totals);
 }
 
-/// Residual before any displacement: 0 where no gap is closed by more than the slop. Most cells stay so, and need no
-/// rows. The large bodies move floes anywhere.
+/// Residual before any displacement: 0 where no gap is closed by more than the slop (find_overlap). Most cells stay so,
+/// and need no rows. The large bodies move floes anywhere.
 static void residual_at_rest(bt_world *world, bt_idx k, const void *problem, bt_totals *totals)
 {
     bt_cell *cell = &world->cells->cell[k];
-    bool takes_part = world->par.plain_sweeps || world->solver->aside[k].formed || k == world->cells->n - 1;
-    for (bt_idx j = 0; j < cell->n_contacts && !takes_part; j++)
-        for (int i = 0; i < cell->contacts[j].n; i++)
-            takes_part = takes_part || cell->gaps[j].gap[i] + world->par.slop < 0;
-    if (takes_part) {
+    if (world->par.plain_sweeps || world->solver->aside[k].formed || k == world->cells->n - 1 ||
+        cell->work->found.most > world->par.slop) {
         residual_apart(world, k, problem, totals);
         return;
     }
