@@ -70,7 +70,7 @@ def whole_from(least, most):
     """Argparse type for a whole number in a range."""
     def number(text):
         if not (text.isdecimal() and least <= int(text) <= most):
-            raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {most}")
+            raise argparse.ArgumentTypeError(f"{text} is not a whole number from {least} to {most}")
         return int(text)
     return number
 
@@ -83,7 +83,7 @@ def add_run(p, output):
 
 
 def add_force(p):
-    p.add_argument("--force", action="store_true", help="replace a file that is there, whoever made it")
+    p.add_argument("--force", action="store_true", help="replace an existing file, whoever made it")
 
 
 def output(a, default, allowed):

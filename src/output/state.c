@@ -407,8 +407,8 @@ static void check_added_laws(const bt_world *world, bt_snapshot *snap)
     char *now = added_laws(world);
     if (strcmp(now, then) && snap->err)
         bt_errors_add(snap->err,
-                      "%s: the run had the added contact laws %s, in this order, and this program has %s; go on in one "
-                      "that registers the same laws in the same order",
+                      "%s: the run had the added contact laws %s, in this order, but this program has %s; continue in "
+                      "a program that registers the same laws in the same order",
                       snap->path, then, *now ? now : "none");
     snap->faulty |= strcmp(now, then) != 0;
     free(now);
@@ -444,8 +444,8 @@ static void load_added_forces(bt_forces *forces, bt_snapshot *snap)
     if (!*next) return;
     if (snap->err)
         bt_errors_add(snap->err,
-                      "%s: the run had %s, which a program had added (force laws, in this order); go on in one that "
-                      "adds the same in the same order, before any other: in a new process",
+                      "%s: the run had %s, which a program had added (force laws, in this order); continue in a new "
+                      "process that adds the same laws in the same order, before any other",
                       snap->path, then);
     snap->faulty = true;
 }
@@ -605,7 +605,7 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
     bt_cells_restore(world, memory, n);
     if (bt_world_hash(world) == hash) return BT_OK;
     return bt_fail(err, BT_ERR_NUMERIC,
-                   "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
-                   "; go on with the program that wrote it",
+                   "%s: the state read from it does not have the hash that it was saved with, %016" PRIx64
+                   "; use the program that wrote it",
                    snap->path, hash);
 }

@@ -229,8 +229,8 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
         if (periods[k] > 0 && need >= periods[k]) {
             bt_errors_add(
                 err,
-                "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
-                "turn, %.4g m; enlarge it or take smaller bodies",
+                "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they turn, "
+                "%.4g m; enlarge it or use smaller bodies",
                 bt_case_name(input), k ? "width" : "length", periods[k], need);
             sound = false;
         }

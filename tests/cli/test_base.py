@@ -156,7 +156,7 @@ def test_a_long_chain_ends(folder):
 
 def test_not_from_the_command_line(folder):
     done = call("check", folder / "near.yml", "--set", "base=far.yml")
-    assert done.returncode != DONE and "what a case is based on cannot be set here" in done.stderr
+    assert done.returncode != DONE and "the base of a case cannot be set here" in done.stderr
 
 
 def test_a_case_is_no_study(folder):

@@ -205,7 +205,7 @@ def test_the_file_that_is_named_is_read(tmp_path):
     assert budget.read_converge(tmp_path / "converge-80.json", tmp_path)["title"] == "NAMED"
     assert budget.read_converge(tmp_path, tmp_path)["title"] == "OTHER"
     for wrong in ("no-such.json", "nowhere"):
-        with pytest.raises(RunError, match="is no converge.json"):
+        with pytest.raises(RunError, match="is not a converge.json"):
             budget.read_converge(tmp_path / wrong, tmp_path)
 
 
@@ -319,7 +319,7 @@ def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):
     assert compared.stale(found, whole) == "of 30 members, while 40 have finished"
     assert compared.stale(compared.state(whole), cut) == "of 40 members, while 30 have finished"
     whole.study += "another"
-    assert compared.stale(found, whole) == "of another study than its folder holds"
+    assert compared.stale(found, whole) == "of a different study from that in its folder"
     assert found["values"] == {"ice.concentration": "0.5"}
     assert compared.common([{"a": "1", "b": "2"}, {"a": "1", "b": "3"}]) == {"a": "1"}
 
@@ -449,7 +449,7 @@ def test_what_is_refused(small, tmp_path):
     assert "set sampling: latin-hypercube and samples" in said(grid, code=3)
     assert "no such file" in subprocess.run([BERGTOW, "budget", "none.yml"], env=environment(BERGTOW_HOME=ROOT),
                                             cwd=tmp_path, capture_output=True, text=True).stderr
-    assert "is no converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
+    assert "is not a converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
     assert "has no number mean_colour" in said(STUDY, "--of", "mean_colour", out=folder / "out", code=2)
     assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
     for wrong in ("tow_force:101", "tow_force:0"):

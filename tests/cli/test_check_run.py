@@ -155,7 +155,7 @@ def test_a_time_step_that_is_too_large_is_a_warning(tmp_path):
     assert checked.returncode == DONE and lines[0].endswith(
         "case.yml: valid, with 2 warnings") and lines[-1] == lines[0]
     assert lines[
-        -3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; take at most 0.1 s"
+        -3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; use at most 0.1 s"
     assert lines[-2].startswith("warning              run.dt: in 0.6 s floes move 0.111 of their size")
     run(tmp_path, case)
     good = call("check", write_case(tmp_path, LOOSE)).stdout
@@ -172,7 +172,7 @@ def test_a_start_that_jerks_the_line_is_a_warning(tmp_path):
 
 
 def test_a_run_that_ends_within_its_ramp_is_a_warning(tmp_path):
-    said = "tow.ramp: the speed rises for 40 s and the run ends after 30 s"
+    said = "tow.ramp: the speed rises for 40 s, but the run ends after 30 s"
     case = changed(LOOSE, tow__ramp=40)
     assert said in call("check", write_case(tmp_path, case)).stdout
     assert any(w.startswith(said) for w in run(tmp_path, case, "--steps", 3).warnings)
@@ -303,7 +303,7 @@ def test_outlines_without_a_thickness(tmp_path):
         assert said.returncode == CASE and "2 of 3 outlines have no property `thickness` (but `" in said.stderr
     assert missing(tmp_path, case, "--set", "ice.thickness=1") == (DONE, [])
     assert missing(tmp_path, changed(case, domain__frame="basin", domain__x0=-1000)) == (DONE, [])
-    text = "--set ice.thickness=none: is none where a value is needed; give it (as in 1 m)"
+    text = "--set ice.thickness=none: is none, but a value is needed; give it (as in 1 m)"
     assert text in call("check", write_case(tmp_path, LOOSE), "--set", "ice.thickness=none").stderr
 
 

@@ -289,7 +289,7 @@ def test_a_member_that_another_run_is_at_stays_open(tmp_path):
     run_lock = open(member / "run.lock", "w")  # as src/base/fileio.c has it
     fcntl.flock(run_lock, fcntl.LOCK_EX)
     result = ensemble(tmp_path, "--no-wait")
-    assert result.returncode == SIGNAL and "1 member at work in other processes" in result.stderr, result
+    assert result.returncode == SIGNAL and "1 member still running in other processes" in result.stderr, result
     assert not (member / "failed.txt").exists() and statuses(tmp_path)["c002-r001"] == 0
     assert "2 members finished, 0 failed, 1 left" in result.stdout
     waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,

@@ -93,7 +93,7 @@ def test_a_limit_of_wall_time(tmp_path):
     """The member at hand stops with a checkpoint, and goes on from there."""
     prepare(tmp_path, STUDY | {"repeats": 1}, LONG)
     result = ensemble(tmp_path, "all", "--max-wall", "1")
-    assert result.returncode == SIGNAL and "stopped by the limit of wall time; the same call goes on with the 4" in \
+    assert result.returncode == SIGNAL and "stopped by the limit of wall time; the same call continues with the 4" in \
         result.stderr
     steps = {p.parent.name: json.loads(p.read_text())["n_steps"] for p in tmp_path.glob("all/members/*/summary.json")}
     assert len(steps) == 1 and 0 < min(steps.values()) < 30000

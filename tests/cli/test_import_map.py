@@ -311,7 +311,7 @@ def test_a_column_of_another_spelling_is_the_thickness_if_it_can_be(tmp_path, va
     found = map_read.read(map_, map_read.Reading())
     assert ([s.thickness for s in found.shapes] == values) == read and found.near == ([] if read else ["THICKNESS"])
     if not read:
-        with pytest.raises(RunError, match="is no thickness in metres"):
+        with pytest.raises(RunError, match="is not a thickness in metres"):
             map_read.read(map_, map_read.Reading(thickness="THICKNESS"))
 
 

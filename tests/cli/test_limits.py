@@ -27,7 +27,7 @@ def refusal(folder, case, *fragments, code=CASE, command="run"):
 
 
 GREEDY = {
-    "floes": ({"ice__size": 1e-4}, "ice.size:", "floes, at most 20000000", "take larger floes"),
+    "floes": ({"ice__size": 1e-4}, "ice.size:", "floes, at most 20000000", "use larger floes"),
     "floes of a power law": ({"ice": {"size_law": "power", "size_min": 1e-5,
                                       "size_max": 1}}, "ice.size_min:", "floes, at most 20000000"),
     "steps": ({"run": {"dt": 1e-6, "duration": 1000},
@@ -93,8 +93,8 @@ TABLES = {
     "bytes": ("t,u,v\n" + "#" * (64 << 20), "t.csv", "larger than 64 MiB"),
     "rows": ("t,u,v\n" +"".join(f"{i},1,1\n" for i in range(2000002)), "t.csv",
              "t.csv:2000002: more than 2000000 rows"),
-    "a long row": ("t,u,v\n0,1," + "1" * 300 + "\n", "t.csv", "t.csv:2: is longer than a row"),
-    "NUL": ("t,u,v\n0,1\0,1\n", "t.csv", "t.csv:2: holds a NUL character"),
+    "a long row": ("t,u,v\n0,1," + "1" * 300 + "\n", "t.csv", "t.csv:2: is too long for a row"),
+    "NUL": ("t,u,v\n0,1\0,1\n", "t.csv", "t.csv:2: contains a NUL character"),
 }
 
 
@@ -129,7 +129,7 @@ def test_every_limit_is_listed():
     for line in ("floes, made or read                          20000000 floes",
                  "steps                                       100000000 steps"):
         assert line in listed
-    assert "refused as too large" in listed
+    assert "refuses anything beyond these limits" in listed
 
 
 # ---- output stays where it was asked for ----

@@ -238,7 +238,7 @@ def test_warnings_name_the_reason_of_the_verdict(tmp_path):
         words = dict(made_up.CODES)[code]
         assert f"Members whose window is not steady, since {words}: concentration 50 % ({n} of 5 members)." in warned
     assert [w for w in warned if "concentration 90 %" in w] == [
-        "Nothing is known of a condition without a member that is in the numbers: concentration 90 % (2 failed)."]
+        "Nothing is known of a condition without a member in the numbers: concentration 90 % (2 failed)."]
 
 
 def test_where_fields_cannot_be_compared_nothing_is_said():
@@ -535,7 +535,7 @@ def test_options_of_the_design_value(statement, tmp_path):
     for option in ("--time-scale", "--tow-hours", "--probability"):
         assert script("statistics", folder, option, "0").returncode == 2
     step = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
-    assert "a step mean is no peak (1 s)" in step.stdout
+    assert "a step mean is not a peak (1 s)" in step.stdout
 
 
 def options(**changes):
@@ -722,7 +722,7 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
     e, (c,) = Members(folder), s["conditions"]
     assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
     told = script("statistics", folder, "--resamples", 1, "--force").stderr
-    assert "take what there is with --partial" in told and "again" not in told  # which would change nothing
+    assert "use the members that exist with --partial" in told and "again" not in told  # which would change nothing
     towed = e.series(0)[1][300:900].mean()
     assert s["members"][0]["mean"] == towed == pytest.approx(1e6, rel=0.02)
     assert c["resistance"]["mean"] == np.mean([e.mean[m] for m in e.used]) and c["resistance"]["min"] > 0.98e6

@@ -137,7 +137,7 @@ def test_a_lead_is_left_where_the_body_cuts_its_corner(tmp_path):
                    lead={"mode": "channel", "width": 120, "length": 1500},
                    tow=LINE | {"line_length": 400, "waypoints": [[600, 0], [600, 800]]})
     text = call("check", write_case(tmp_path, case)).stdout
-    said = re.search(r"cuts the corners of the way by up to ([\d.]+) m", text)
+    said = re.search(r"cuts the corners of its path by up to ([\d.]+) m", text)
     assert float(said[1]) == pytest.approx(0.4806 * 430, rel=0.02)
     assert "cuts the corners" not in call("check", write_case(tmp_path, changed(case, tow__line_length=60))).stdout
 

@@ -456,7 +456,7 @@ def test_latitude_first_of_western_places(tmp_path):
     assert "latitude seems to come first" in field(tmp_path, FRAMES["geographic"], code=CASE)
     write(tmp_path, swapped(-65, 70))
     said = call("check", write_case(tmp_path, FRAMES["geographic"])).stdout
-    assert "in the south; if they are to lie in the north, latitude comes first" in said
+    assert "in the south; if they should lie in the north, latitude comes first" in said
     for lon, lat in ((120, 40), (-65, 70), (50, 75), (0, -70), (-40, -54)):  # in order
         write(tmp_path, lonlat(ARROW, lon, lat))
         r = call("check", write_case(tmp_path, FRAMES["geographic"]))

@@ -268,7 +268,7 @@ def test_a_field_is_what_lies_in_its_file(tmp_path, trick):
     says = trick(tmp_path / "field.h5")
     result = call("check", write_case(tmp_path, READ), timeout=20)
     assert result.returncode == CASE, result.stdout
-    assert "field.h5: holds what this program does not write" in result.stderr and says in result.stderr
+    assert "field.h5: holds data that this program does not write" in result.stderr and says in result.stderr
     assert len(result.stderr.splitlines()) == 1
 
 

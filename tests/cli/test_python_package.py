@@ -54,7 +54,7 @@ def test_a_case_is_read_checked_and_changed(tmp_path):
 
 def test_a_text_that_would_end_at_a_nul_is_refused(tmp_path):
     text = json.dumps(SHORT, indent=1)
-    with pytest.raises(bergtow.CaseError, match=r"^run.title: the value holds the character NUL; take it out$"):
+    with pytest.raises(bergtow.CaseError, match=r"^run.title: the value contains the character NUL; remove it$"):
         bergtow.Case(SHORT, {"run.title": "a\0b"})
     with pytest.raises(bergtow.CaseError, match=rf"^case:{text.count(chr(10)) + 2}: the line holds the character NUL"):
         bergtow.Case.from_text(text + "\n\0\nbogus: 1")
@@ -256,7 +256,7 @@ def test_an_ensemble_with_a_hole(tmp_path, monkeypatch, capfd):
     with pytest.raises(bergtow.BergtowError, match="no member"):
         e.result("c009-r001")
     monkeypatch.setenv("BERGTOW", "build/none/bergtow")
-    with pytest.raises(bergtow.BergtowError, match="build/none/bergtow: is no program"):
+    with pytest.raises(bergtow.BergtowError, match="build/none/bergtow: is not a program"):
         bergtow.Ensemble.run(path, tmp_path / "other")
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     with pytest.raises(bergtow.BergtowError, match="none.yml"):

@@ -160,7 +160,7 @@ def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, dear, force):
     out.mkdir()
     (out / name).write_bytes(dear)
     result = call("run", write_case(tmp_path, SHORT), "-o", out, *force)
-    assert result.returncode == IO and f"{out / name}: is not a file that this program has written" in result.stderr
+    assert result.returncode == IO and f"{out / name}: was not written by this program" in result.stderr
     assert contents(out) == {(out / name).relative_to(out): dear}
 
 

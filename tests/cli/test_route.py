@@ -452,7 +452,7 @@ def test_looks_from_a_line(tmp_path):
     assert len(found["rounds"]) >= 4 and not found["horizon"]["perfect"] and "upper bound" not in done.stdout
     assert towed["horizon"]["arrived"] and "no_go_contact" not in towed["horizon"]["faults"]
     assert "no_go_contact" in towed["straight"]["faults"]
-    assert re.search("straight line: [^;]*touches an area to keep out of", done.stdout)
+    assert re.search("straight line: [^;]*touches a no-go area", done.stdout)
     series = []
     for name in ("look-1", "look-2", "look-3", "tow-horizon"):
         with Run(whole / "out/route" / name / "members/c001-r001") as r:
@@ -555,9 +555,9 @@ def local(geometry):
 
 @pytest.mark.parametrize("changes, words, code, said", [
     ({}, ["--to", "8.5,0", "--no-go", "land.geojson"], CASE,
-     r"--to: the goal lies in an area to keep out of.* \(x 8.5 m, y 0 m, polygon 1, needed .* m\)"),
-    ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* area to keep out of"),
-    ({}, ["--to", "20E,76N"], USAGE, "in degrees, and the map of this case has no place; set ice.origin_lon"),
+     r"--to: the goal lies in a no-go area.* \(x 8.5 m, y 0 m, polygon 1, needed .* m\)"),
+    ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* no-go area"),
+    ({}, ["--to", "20E,76N"], USAGE, "in degrees, but the map of this case has no place; set ice.origin_lon"),
     ({}, ["--to", "8.5,0", "--no-go", "degrees.geojson"], CASE, "the map of this case has no place"),
     ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "no GeoJSON of polygons"),
     ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "--to: no way leads from the start to the goal"),
@@ -569,7 +569,7 @@ def local(geometry):
     ({}, ["--to", "8.5,0", "--no-go", "empty.geojson"], CASE, "it holds none"),
     ({}, ["--to", "8.5,0", "--no-go", "flat.geojson"], CASE, "polygon 2 has no area"),
     ({}, ["--to", "8.5,0", "--no-go", "nan.geojson"], CASE, "polygon 1 has no ring of three finite positions"),
-    ({}, ["--to", "8.5,0", "--no-go", "nowhere.geojson"], CASE, "a geometry is no polygon"),
+    ({}, ["--to", "8.5,0", "--no-go", "nowhere.geojson"], CASE, "a geometry is not a polygon"),
     ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "no whole number from 1 to 16"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--speeds", "0.1,0.2"], USAGE, "one speed"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--map-age", "11 s"], USAGE, "--map-age"),

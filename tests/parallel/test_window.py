@@ -176,8 +176,8 @@ def test_defaults(tmp_path):
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize("changes, text", [
-    ({"tow": {"mode": "none"}}, "domain.ends: moving follows a body that is towed"),
-    ({"body": {"shape": "none"}, "tow": None}, "domain.ends: moving follows a body that is towed"),
+    ({"tow": {"mode": "none"}}, "domain.ends: moving follows a towed body"),
+    ({"body": {"shape": "none"}, "tow": None}, "domain.ends: moving follows a towed body"),
     ({"tow__direction": 80}, "tow.direction: 80 deg: a moving window goes along x"),
     ({"water": {"current_x": 0.9}}, "water.current_x: 0.9 m/s carries the ice along"),
     ({"domain__ahead": 4}, "domain.ahead: 4 m of the 26 m"),

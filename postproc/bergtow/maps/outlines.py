@@ -40,7 +40,7 @@ def place(text):
     try:
         return pair(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: is no place; write two numbers, LON,LAT") from None
+        raise argparse.ArgumentTypeError(f"{text}: is not a place; write two numbers, LON,LAT") from None
 
 
 def metres(text):
@@ -52,14 +52,14 @@ def metres(text):
     except ValueError:
         value = math.nan
     if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: is no length; write for example 500 m")
+        raise argparse.ArgumentTypeError(f"{text}: is not a length; write for example 500 m")
     return value
 
 
 def extent(text):
     parts = text.split(",")
     if len(parts) != 2:
-        raise argparse.ArgumentTypeError(f"{text}: is no extent; write for example 2km,800m")
+        raise argparse.ArgumentTypeError(f"{text}: is not an extent; write for example 2km,800m")
     return tuple(map(metres, parts))
 
 
@@ -69,7 +69,7 @@ def square_metres(text):
     except ValueError:
         value = math.nan
     if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: is no area in square metres")
+        raise argparse.ArgumentTypeError(f"{text}: is not an area in square metres")
     return value
 
 
@@ -97,7 +97,7 @@ def angle(text):
     except ValueError:
         value = math.nan
     if not -360 <= value <= 360:
-        raise argparse.ArgumentTypeError(f"{text}: is no direction in degrees")
+        raise argparse.ArgumentTypeError(f"{text}: is not a direction in degrees")
     return value
 
 
@@ -127,16 +127,17 @@ def options(p):
     p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
                    "about the centre, along x and y of the case")
-    p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out what reaches into this "
-                   "circle about the centre: room for the towed body, which may be on the map itself")
+    p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out floes that reach into this "
+                   "circle about the centre, to make room for the towed body; the map may show the body itself")
     p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
-    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: made straight "
-                   "within half a pixel, each floe keeping its area, or kept but for the tolerance")
+    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: straightened "
+                   "within half a pixel (each floe keeps its area), or kept, apart from the tolerance")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
                    "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
     p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
-    p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
-    p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
+    p.add_argument("--record", metavar="FILE", type=Path, help="write this report as JSON, too")
+    p.add_argument("--picture", metavar="FILE", type=Path,
+                   help="draw the map and the resulting floes (.png, .pdf, .svg)")
     arguments.add_force(p)
 
 def check_files(a):
@@ -273,9 +274,9 @@ def perform(a):
     if distortion["farthest_m"] > farthest:
         raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes "
                        f"{farthest / 1e3:g} km",
-                       "choose a part with --box or --where, or set --centre")
+                       "choose part of it with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:
-        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
+        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m on average, as degrees look in "
                        "metres",
                        "say its crs: --crs EPSG:4326")
     print("\n".join(map_text.plane_lines(plane, distortion, bend)))

@@ -30,7 +30,7 @@ from bergtow.maps.read import INSTALL, local_crs
 WGS84 = "OGC:CRS84"   # degrees, longitude first
 ROUNDING = 1e-3       # degrees outside the valid range, beyond which coordinates cannot be degrees
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
-      "east and north of no place on the earth"
+      "east and north without a place on the earth"
 
 try:
     import pyproj
@@ -59,7 +59,7 @@ def system(path, found, said, implied=False):
     ours = None if said is None else local_crs() if said in ("local", local_crs()) else known(path, said, "--crs")
     theirs = None if found is None else local_crs() if found == local_crs() else known(path, found, "its crs")
     if theirs is None and ours is None:
-        raise RunError(path, "says no coordinate reference system", SAY)
+        raise RunError(path, "names no coordinate reference system", SAY)
     if theirs is None or ours is None:
         return theirs or ours
     if implied:
@@ -83,7 +83,7 @@ def known(path, text, whose):
     if crs.is_geographic or crs.is_projected:
         return crs
     if whose == "--crs":
-        raise RunError(path, f"--crs {text} is {crs.type_name}, neither degrees nor a projection", SAY)
+        raise RunError(path, f"--crs {text} is {crs.type_name}, neither in degrees nor a projection", SAY)
     return None
 
 
@@ -142,7 +142,7 @@ class Plane:
             plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)
             return plane
         if centre and not _library.library().bt_outline_in_degrees(*centre, False):
-            raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is no place on the earth",
+            raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is not a place on the earth",
                            "give longitude and latitude in degrees")
         lonlat = plane._prepare(found, xy)
         plane.centre = centre or middle(lonlat)

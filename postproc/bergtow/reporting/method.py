@@ -107,7 +107,7 @@ def _pack(case):
 def _end(case):
     """The motion of the towing end, in a sentence."""
     return {
-        "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
+        "speed": "The tow holds its speed whatever force this takes: no line or vessel slows down, so "
                  "the tow force holds no dynamics of the line.",
         "line": "The towing end of the line moves as prescribed: the vessel neither slows down nor stops.",
         "thrust": "The vessel is a point with thrust and resistance curves; it does not manoeuvre by itself.",
@@ -143,8 +143,8 @@ def limits(cases, vessel=False):
                "design tow force do not depend on it.")
     out.append("The intervals cover the scatter of fields that are alike and the error of the fit. Where fields differ "
                "in level, return levels and the design value are borne by fields worse than any simulated, and lie "
-               "above the interval more often than it says. The intervals cover neither the values that are assumed "
-               "nor the choice of the model, and there is no safety factor in any number.")
+               "above the interval more often than it says. The intervals cover neither the assumed values nor the "
+               "choice of the model, and there is no safety factor in any number.")
     return out
 
 
@@ -218,7 +218,7 @@ def _convergence(found, e):
 def beyond(results, e):
     """Rows (what, value) from the results of other commands, for the answer; results: {name: found}. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
-    rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
+    rows = [("assumed values, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]

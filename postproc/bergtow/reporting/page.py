@@ -133,10 +133,10 @@ def pages(folder, paths, given, also, size, compressed):
         template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, also)
     else:
         if also:
-            raise RunError(folder, "is a run, and --also is of an ensemble", "leave --also out")
+            raise RunError(folder, "is a run, but --also is for an ensemble", "leave --also out")
         with Run(folder) as run:
             if not len(run["time"]):
-                raise RunError(folder, "has made no step to report on", "go on with it: bergtow resume")
+                raise RunError(folder, "has no step to report on", "continue it with bergtow resume")
             template, context = "run.html", report_run.context(run, 1e6 * size, compressed, given)
     return {path: render(template, context, is_pdf(path)) for path in paths}, context.get("members", [])
 

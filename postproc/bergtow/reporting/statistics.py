@@ -80,7 +80,8 @@ def options(p):
     p.add_argument("--error",
                    type=above_zero,
                    metavar="E",
-                   help="relative error of the mean that the number of fields needed is for (default %(default)s)")
+                   help="relative error of the mean, from which the needed number of fields follows (default "
+                        "%(default)s)")
     p.add_argument("--hours",
                    type=above_zero,
                    nargs="+",
@@ -105,7 +106,7 @@ def options(p):
                    help="resamples for p-values and return levels (default %(default)s)")
     p.add_argument("--partial",
                    action="store_true",
-                   help="exit with 0 even where members of the study are in no number")
+                   help="exit with 0 even if some members of the study are in no number")
     arguments.add_force(p)
     p.set_defaults(**conditions.DEFAULTS | {"exclude": []})
 
@@ -123,4 +124,4 @@ def perform(a):
     if s["holes"] and not a.partial:
         again = "" if np.all(e.status == FINISHED) else "run `bergtow ensemble` again, with --retry-failed for those " \
             "that failed, or "
-        raise RunError(e.path, s["holes"], f"{again}take what there is with --partial")
+        raise RunError(e.path, s["holes"], f"{again}use the members that exist with --partial")

@@ -276,7 +276,7 @@ def add_options(p):
                    action="append",
                    choices=EXCLUDABLE,
                    default=[],
-                   help="leave out members with this doubt, and name them; may be repeated")
+                   help="leave out members with this doubt, and list them; may be repeated")
     p.add_argument("--time-scale",
                    type=above_zero,
                    metavar="S",
@@ -285,9 +285,9 @@ def add_options(p):
     p.add_argument("--tow-hours",
                    type=above_zero,
                    metavar="H",
-                   help="length of the tow that the design values are for, h (default: 24 at full scale)")
+                   help="length of the tow for the design values, h (default: 24 at full scale)")
     p.add_argument("--probability",
                    type=share,
                    default=PROBABILITY,
                    metavar="P",
-                   help="with which the design value is exceeded in such a tow (default %(default)s)")
+                   help="probability that the design value is exceeded in such a tow (default %(default)s)")

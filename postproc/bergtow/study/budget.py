@@ -180,7 +180,7 @@ def read_converge(path, folder):
         return findings.read("converge", folder)
     found = findings.read("converge", path)
     if not isinstance(found, dict) or "rows" not in found:
-        raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
+        raise RunError(path, "is not a converge.json", "name the folder or the file of bergtow converge")
     return found
 
 
@@ -190,8 +190,8 @@ def options(p):
     p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a "
                    "quantile of a load in %%, 100 for the largest value of a tow, as the moving mean over its time "
                    f"scale; may be repeated (default: {', '.join(OF)})")
-    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
-                   "computation adds")
+    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for the part of the "
+                   "computation")
     analysis.add_options(p, BUDGET)
 
 
@@ -211,5 +211,5 @@ def perform(a):
     analysis.keep("budget", found, folder, a.force)
     if found["failed"]:
         raise RunError(folder, f"{len(found['failed'])} of {e.n} members failed ({listed(list(found['failed']))}): the "
-                       "budget is without the values that they have", "mend what made them fail, or narrow the ranges; "
+                       "budget lacks their values", "correct the cause of their failure, or narrow the ranges; "
                        "`bergtow ensemble --retry-failed` tries them again")

@@ -85,7 +85,7 @@ def estimates(s):
             cells.append(text + (f" ({number(e['ratio'])})" if np.isfinite(e["ratio"]) else ""))
         rows.append(cells)
     on_top = [
-        f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
+        f"{label}: no ice resistance; add it to the others." for name, label in labels.items()
         if s["conditions"][0]["estimates"][name]["on_top"]
     ]
     note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
@@ -170,7 +170,7 @@ def sensitivity(s):
     if "refused" in x:
         return [[f"No sensitivity: {x['refused']}."]]
     if len(set(x["ranks"]).union(x["sobol"].get("indices", ()))) == 1:
-        return [["One parameter was varied: there is nothing to share out."]]
+        return [["One parameter was varied: there is nothing to divide."]]
     kinds = (("mean", x["sobol"]), ("logarithm", x["sobol_of_logarithm"]))
     given = [(of, k["indices"]) for of, k in kinds if "refused" not in k]
     names = set(x["ranks"]).union(*(i for _, i in given))

@@ -4,10 +4,10 @@ from bergtow.table import number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
 WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak force", "length": "length of the way"}
-FAULTS = {"missed": "misses the goal", "no_go_contact": "touches an area to keep out of",
+FAULTS = {"missed": "misses the goal", "no_go_contact": "touches a no-go area",
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
-PLANNED = {"no_go": "crosses an area to keep out of", "outside": "leaves the domain",
+PLANNED = {"no_go": "crosses a no-go area", "outside": "leaves the domain",
            "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
 
 
