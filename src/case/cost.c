@@ -178,7 +178,7 @@ void bt_case_check_cost(const bt_check *check)
                        n, (double)bt_case_steps(input), work, BT_MOST_CORE_SECONDS);
     if (result > BT_MOST_RESULT_BYTES)
         bt_check_fault(check, "output.frame_interval",
-                       "frames and series take about %.2g bytes, more than the limit of %g; lengthen "
+                       "frames and series take about %.2g bytes, more than the limit of %g bytes; lengthen "
                        "output.frame_interval, or raise output.sample_every",
                        result, BT_MOST_RESULT_BYTES);
 }
@@ -205,7 +205,7 @@ bt_status bt_cost_fits(const bt_case *input, double n_floes, const bt_comm *comm
     if (result > BT_MOST_RESULT_BYTES) { // a field that was read; with other ice the case is refused
         return bt_fail(err, BT_ERR_CASE,
                        "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, more than "
-                       "the limit of %g; lengthen it, or raise output.sample_every",
+                       "the limit of %g bytes; lengthen it, or raise output.sample_every",
                        bt_case_name(input), n_floes, result, BT_MOST_RESULT_BYTES);
     }
     if (need <= machine) return BT_OK;

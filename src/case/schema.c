@@ -611,7 +611,7 @@ int bt_schema_add(const bt_key *key, bt_errors *err)
     else if (!key->preset || key->preset[0] == '=' || !bt_value_read(&row, &(bt_case){0}, key->preset, true, why))
         bt_errors_add(err, "%s: the default must be a number within the range, or none", key->name);
     else if (!key->doc || strlen(key->doc) < 8 || !is_line(key->doc))
-        bt_errors_add(err, "%s: say in a sentence, in one line, what it is", key->name);
+        bt_errors_add(err, "%s: describe it in one sentence, on one line", key->name);
     if (err->n > before) return -1;
     bt_case_keys[bt_n_case_keys++] = row;
     return place;

@@ -82,8 +82,8 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
     if (law->n_keys < 0 || law->n_keys > BT_MAX_FORCE_OWN)
         bt_errors_add(err, "force law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_FORCE_OWN);
     if (bt_n_force_laws == BT_MAX_FORCE_LAWS)
-        bt_errors_add(err, "force law %s: a program can have at most %d, and this one has them all; give an applied "
-                      "force the name of one whose simulation has ended", name, BT_MAX_FORCE_LAWS);
+        bt_errors_add(err, "force law %s: a program can have at most %d, and all are in use; give an applied force the "
+                      "name of a force whose simulation has ended", name, BT_MAX_FORCE_LAWS);
     if (err->n == before) check_series(law, name, err);
     if (err->n > before || !add_keys(law, err)) return BT_ERR_USAGE;
     bt_force_laws[bt_n_force_laws++] = law;

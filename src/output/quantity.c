@@ -83,8 +83,8 @@ static void registry_check(const char *name, int more, bt_errors *err)
     else if (is_taken(name))
         bt_errors_add(err, "quantity %s: a series of this name exists already; choose another", name);
     if (n_added + more > BT_MAX_ADDED)
-        bt_errors_add(err, "quantity %s: a program can add %d of them, and they are all there; take the name of a "
-                      "force whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
+        bt_errors_add(err, "quantity %s: a program can add at most %d, and all are in use; use the name of a force "
+                      "whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
 }
 
 bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
@@ -93,7 +93,7 @@ bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
     const char *name = quantity->name ? quantity->name : "";
     registry_check(name, 1, err);
     if (!quantity->units || !*quantity->units)
-        bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
+        bt_errors_add(err, "quantity %s: it has no units; give \"1\" for a plain number", name);
     if (!quantity->description || strlen(quantity->description) < 8)
         bt_errors_add(err, "quantity %s: describe it in one sentence (`description`)", name);
     if (!quantity->of_world == !quantity->of_floe)

@@ -28,8 +28,8 @@
 #define WORLD(type, member, units, check, meaning) BT_STATE_ONE(bt_world, #member, type, member, units, check, meaning)
 static const bt_state_row world_rows[] = {
     WORLD(I64, step, "1", COUNT, "steps done"),
-    WORLD(F64, drift_x, "m", FINITE, "way that the water has gone, x"),
-    WORLD(F64, drift_y, "m", FINITE, "way that the water has gone, y"),
+    WORLD(F64, drift_x, "m", FINITE, "distance that the water has moved, x"),
+    WORLD(F64, drift_y, "m", FINITE, "distance that the water has moved, y"),
 };
 
 #define PAR(member, units, check, meaning) BT_STATE_ONE(bt_params, #member, F64, member, units, check, meaning)
@@ -41,7 +41,7 @@ static const bt_state_row par_rows[] = {
     PAR(period_x, "m", FINITE, "length of the domain where x is periodic, 0 = it is not"),
     PAR(period_y, "m", FINITE, "length of the domain where y is periodic, 0 = it is not"),
     PAR(tolerance, "m/s", FINITE, "residual at which the solver stops"),
-    PAR(slop, "m", FINITE, "overlap that is left alone"),
+    PAR(slop, "m", FINITE, "overlap that is tolerated"),
     PAR(size, "m", FINITE, "mean floe diameter"),
     PAR(water_u, "m/s", FINITE, "velocity of the water in the last step, x"),
     PAR(water_v, "m/s", FINITE, "velocity of the water in the last step, y"),
@@ -71,7 +71,7 @@ static const bt_state_row cells_rows[] = {
     CELLS(I32, n_y, "1", ANY, "cells, y"),
     CELLS(I32, wrap_x, "1", ANY, "cells of a period, x; 0 = not periodic"),
     CELLS(I32, wrap_y, "1", ANY, "cells of a period, y; 0 = not periodic"),
-    CELLS(U8, relabel, "1", ANY, "1 = the cells are to be labelled anew"),
+    CELLS(U8, relabel, "1", ANY, "1 = the cells are to be labelled again"),
     CELLS(I64, n_labellings, "1", COUNT, "times that the cells were labelled"),
 };
 
@@ -84,9 +84,9 @@ static const bt_state_row tow_rows[] = {
     TOW(F64, time, "s", ANY, "time of the tow"),
     TOW(F64, carriage_x, "m", FINITE, "towing end of the line, x"),
     TOW(F64, carriage_y, "m", FINITE, "towing end of the line, y"),
-    TOW(F64, travel_x, "m", FINITE, "place of the towed body, not wrapped, x"),
-    TOW(F64, travel_y, "m", FINITE, "place of the towed body, not wrapped, y"),
-    TOW(F64, way, "m", FINITE, "length of path along which the towing end, or the towed body, has been led"),
+    TOW(F64, travel_x, "m", FINITE, "position of the towed body, not wrapped, x"),
+    TOW(F64, travel_y, "m", FINITE, "position of the towed body, not wrapped, y"),
+    TOW(F64, way, "m", FINITE, "distance of the towing end, or of the towed body, along its path"),
     TOW(I32, mark, "1", ANY, "way-points passed"),
     TOW(F64, ux, "1", FINITE, "direction of the tow, x"),
     TOW(F64, uy, "1", FINITE, "direction of the tow, y"),
@@ -98,7 +98,7 @@ static const bt_state_row tow_rows[] = {
     BRANCH("broken_2", U8, 1, broken, "1", ANY, "1 = the second branch has parted"),
     VESSEL(vx, "m/s", FINITE, "velocity of the vessel, x"),
     VESSEL(vy, "m/s", FINITE, "velocity of the vessel, y"),
-    VESSEL(way, "m", FINITE, "way of the vessel along the path"),
+    VESSEL(way, "m", FINITE, "distance of the vessel along the path"),
 };
 
 #define WINDOW(type, width, member, units, axes, check, meaning) \
@@ -114,7 +114,7 @@ static const bt_state_row window_rows[] = {
         "momentum x, y and kinetic energy of the floes taken out, in all"),
     WINDOW(F64, 3, brought, "kg m/s, kg m/s, J", "one momentum_energy", FINITE,
         "momentum x, y and kinetic energy of the floes brought in, in all"),
-    WINDOW(F64, 1, most, "m", "one", FINITE, "largest way of the body through undisturbed ice, along the tow"),
+    WINDOW(F64, 1, most, "m", "one", FINITE, "largest distance of the body through undisturbed ice, along the tow"),
     WINDOW(F64, 1, overtaken, "m", "one", FINITE, "by how much it fell behind that, at most"),
     BT_STATE_ONE(bt_window, "rear_in_ice", F64, rear, "m", FINITE,
         "place of the rear end now, along the tow, in a frame that drifts with undisturbed ice"),
@@ -123,8 +123,8 @@ static const bt_state_row window_rows[] = {
 #define UNDISTURBED(width, member, units, axes, check, meaning) \
     BT_STATE_MEMBER(bt_undisturbed, #member, F64, width, member, units, axes, check, meaning)
 static const bt_state_row undisturbed_rows[] = {
-    UNDISTURBED(1, drift_x, "m", "one", FINITE, "way of the undisturbed ice, x"),
-    UNDISTURBED(1, drift_y, "m", "one", FINITE, "way of the undisturbed ice, y"),
+    UNDISTURBED(1, drift_x, "m", "one", FINITE, "distance that the undisturbed ice has moved, x"),
+    UNDISTURBED(1, drift_y, "m", "one", FINITE, "distance that the undisturbed ice has moved, y"),
     UNDISTURBED(4, vel, "m/s, m/s, rad/s, 1", "one motion", FINITE,
         "velocity of the undisturbed ice, x, y, turning; the last is unused"),
 };

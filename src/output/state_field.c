@@ -14,11 +14,11 @@
 static const bt_state_row stall_rows[] = {
     STALL(I64, windows, "1", COUNT, "windows of time in which the body stood still"),
     STALL(F64, time, "s", FINITE, "time of these"),
-    STALL(F64, asked, "m", FINITE, "way asked for in the window under way"),
+    STALL(F64, asked, "m", FINITE, "distance asked for in the current window"),
     STALL(F64, spent, "s", FINITE, "time spent in it"),
     STALL(F64, from_x, "m", FINITE, "where the body was at its beginning, x"),
     STALL(F64, from_y, "m", FINITE, "where the body was at its beginning, y"),
-    STALL(U8, begun, "1", ANY, "1 = such a window is under way"),
+    STALL(U8, begun, "1", ANY, "1 = such a window has begun"),
     STALL(F64, ice, "N s", FINITE, "impulse of the ice against the tow in it"),
     STALL(F64, pull, "N s", FINITE, "impulse of the tow in it"),
     STALL(F64, inside, "s", ANY, "time for which the towing end was inside the hull, after it had been outside"),

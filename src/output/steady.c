@@ -300,7 +300,7 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
         char when[60] = "to which it begins to turn";
         if (isfinite(passed)) snprintf(when, sizeof when, "passed at %g s", passed);
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_COURSE_CHANGES,
-                "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run before, begin "
+                "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run earlier, begin "
                 "the window later, or read the series",
                 turn * 180 / BT_PI, k + 1, when,
                 mark + arc > steady->led[0] + slack ? "" : " for the body, which follows its line");
@@ -322,8 +322,8 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
     for (int i = 0; i + 1 < input->tow.n_programme; i++) {
         if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= steady->start || p[2 * i] >= steady->end) continue;
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PROGRAMME,
-                "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read "
-                "the series",
+                "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run earlier, or "
+                "read the series",
                 p[2 * i + 1], p[2 * i + 3], steady->start, steady->end);
     }
     for (int64_t i = 0; totals->events && i < totals->events->n; i++) {

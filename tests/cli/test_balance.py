@@ -320,7 +320,7 @@ def test_unconverged_steps_are_reported(tmp_path):
     # Momentum holds all the same: every impulse acts on both bodies.
     assert r.summary["momentum_residual"] <= 1e-10
     good = run(tmp_path, changed(TOW, solver__max_sweeps=5000, solver__tolerance=1e-2), name="good")
-    assert good.summary["unconverged_steps"] == 0 and not warned(good, "limit of work")
+    assert good.summary["unconverged_steps"] == 0 and not warned(good, "work limit")
 
 
 @pytest.mark.slow

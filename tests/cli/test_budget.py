@@ -289,7 +289,7 @@ def test_numbers_are_those_of_the_loads_and_the_computation_that_of_the_ice_resi
     assert budget.of_ensemble(e, computed=known)["numerics"]["bias"] < -0.3
     other = budget.of_ensemble(e, "mean_tow_force_n", known)
     assert other["numerics"] is None
-    assert "knows what the computation adds to the mean ice resistance alone" in budget_text.notes(plain(other))
+    assert "knows only what the computation adds to the mean ice resistance" in budget_text.notes(plain(other))
 
 
 def test_what_comes_after_a_line_parted_is_in_no_budget(tmp_path):

@@ -353,7 +353,7 @@ def test_what_is_refused(tmp_path):
     assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=3)
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
     assert "4 is not a whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
-    assert "each field has a seed of its own" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
+    assert "each field has its own seed" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
 
 
 def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, monkeypatch):

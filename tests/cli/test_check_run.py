@@ -32,7 +32,7 @@ REFUSED = {
     "a field that is not there": (reading(TOW, "none.h5"), IO, "none.h5"),
     "no field": (reading(TOW, "case.yml"), CASE, "case.yml"),
     "a table that is not there": (changed(TOW, water__current_table="none.csv"), IO, "none.csv"),
-    "too many floes": (changed(TOW, domain__length=1e5, domain__width=1e4), CASE, "at most 20000000 are simulated"),
+    "too many floes": (changed(TOW, domain__length=1e5, domain__width=1e4), CASE, "more than the limit of 20000000"),
 }
 
 
@@ -130,11 +130,11 @@ def test_memory_beyond_the_machine(tmp_path):
     # 18 million floes
     case = changed(TOW, domain__length=6000, domain__width=2000, ice__concentration=0.6, run__duration=0.1)
     checked, ran = both(tmp_path, case)
-    assert ran.returncode == CASE and "GB of memory, and this machine has" in ran.stderr
+    assert ran.returncode == CASE and "GB of memory, but this machine has" in ran.stderr
     assert (checked.returncode, checked.stderr) == (ran.returncode, ran.stderr)
     (tmp_path / "study.yml").write_text('{"base": "case.yml", "parameters": {"tow.speed": [0.1, 0.2]}}')
     studied = call("check", tmp_path / "study.yml")
-    assert studied.returncode == CASE and "GB of memory, and this machine has" in studied.stderr
+    assert studied.returncode == CASE and "GB of memory, but this machine has" in studied.stderr
 
 
 def test_a_field_of_another_domain(tmp_path):
@@ -203,7 +203,7 @@ def test_thirty_lengths_of_a_disc_are_thirty_widths(tmp_path):
     found = json.loads(call("check", write_case(tmp_path, case), "--json").stdout)["domain"]
     assert found["body_widths"] == found["body_widths_needed"] == 30
     assert "arches of rigid floes not expected" in call("check", tmp_path / "case.yml").stdout
-    assert "take at least 30 body widths" in call("check", tmp_path / "case.yml", "--set", "domain.width=2390").stdout
+    assert "use at least 30 body widths" in call("check", tmp_path / "case.yml", "--set", "domain.width=2390").stdout
 
 
 def test_warnings_of_a_study(tmp_path):
@@ -379,11 +379,11 @@ def test_rows_of_a_table_that_no_step_sees(tmp_path):
     rows = "t,u,v\n0,0,0\n5,0.01,0\n5.04,0.02,0\n5.08,0,0\n5.12,0,0\n5.22,0.01,0\n40,0.01,0\n40.01,0,0\n"
     (tmp_path / "current.csv").write_text(rows)
     case = write_case(tmp_path, changed(TOW, water__current_table="current.csv"))
-    said = ("water.current_table: rows that change the velocity within less than a time step of 0.1 s: 2, the first at "
-            "5.04 s")
+    said = ("water.current_table: some rows change the velocity within less than a time step of 0.1 s (2 rows, the "
+            "first at 5.04 s)")
     assert said in call("check", case).stdout
     assert [w for w in run(tmp_path, case, "--steps", 5).warnings if w.startswith(said)]
-    assert "rows that change" not in call("check", case, "--set", "run.dt=0.04").stdout
+    assert "some rows change" not in call("check", case, "--set", "run.dt=0.04").stdout
 
 
 # ---- splitting ----
@@ -422,8 +422,8 @@ def test_what_splits_the_mean_floe(tmp_path):
         for key, n, low, high in (("toughness", 0.15, 50, 250), ("strength", 0.3, 200, 500))]
     assert odd(("toughness", "150"), case=changed(MAP, domain={"length": 2000, "width": 1000})) == []
     text = call("check", write_case(tmp_path, MAP), "--set", "ice.splitting.toughness=150 kPa√m").stdout
-    assert "mean floe, as a square, splits under" in text and "without the time that splits" in text
+    assert "mean floe, as a square, splits under" in text and "without the time for splits" in text
     speed = float(re.search(r"reference speed +(\S+) m/s", text)[1])
-    assert f"moves {MAP['run']['dt'] * speed / 3:.3g} of the least width of a piece a step" in text
+    assert f"moves {MAP['run']['dt'] * speed / 3:.3g} of the least width of a piece per step" in text
     text = call("check", write_case(tmp_path, MAP)).stdout
-    assert "least width of a piece" not in text and "without the time that splits" not in text
+    assert "least width of a piece" not in text and "without the time for splits" not in text

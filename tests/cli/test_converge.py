@@ -478,7 +478,7 @@ def test_the_length_grows_ahead_of_the_body():
     assert converge.longer(Towed(0, 20), 1) == ahead
     assert converge.longer(Towed(180), 1) == ahead | {"domain.x0": -150.0}
     for headings in ((90,), (0, 90), (0, 180)):
-        with pytest.raises(RunError, match="does not go along the domain"):
+        with pytest.raises(RunError, match="does not run along the domain"):
             converge.longer(Towed(*headings), 1)
 
 

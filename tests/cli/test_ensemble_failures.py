@@ -133,7 +133,7 @@ def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
     (tmp_path / "all/members/there").write_bytes(b"x" * 16384)
     result = ensemble(tmp_path)
     assert result.returncode == IO and re.search(
-        r"member c003-r001 failed \(4\): .*No space left.*; nor could that be recorded",
+        r"member c003-r001 failed \(4\): .*No space left.*; this could not be recorded",
         result.stderr) and "worked on by other" not in result.stdout
     assert {j["member"]
             for j in journal(tmp_path)

@@ -144,7 +144,7 @@ def test_values_in_place_of_those_of_the_study(tmp_path):
     assert again.returncode == CASE and "holds the members of another study" in again.stderr
     assert ensemble(tmp_path, "all", *given).returncode == DONE
     refused = ensemble(tmp_path, "other", "--set", "tow.speed=0.3")
-    assert refused.returncode == CASE and "would win; change it there" in refused.stderr
+    assert refused.returncode == CASE and "takes precedence; change it there" in refused.stderr
 
 
 def test_the_keys_of_a_study_are_listed():

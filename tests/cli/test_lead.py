@@ -141,7 +141,7 @@ def test_a_polygon_has_the_lead_of_the_shape_it_draws(tmp_path):
 
 BAD = {
     "nothing is towed": ({"tow": {"mode": "none"},
-                          "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow, and nothing is towed"),
+                          "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow, but nothing is towed"),
     "no body": ({"body": {"shape": "none"}, "tow": {"mode": "none"},
                  "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow"),
     "no piece size": ({"lead": {"mode": "managed"}},

@@ -554,7 +554,8 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     above = "above the breaking load of the line"
     assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
     # in the start
-    assert f"step, by which a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 MN)" in found
+    assert f"step, which decides when a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 " \
+           "MN)" in found
 
 
 def test_too_little_is_reported_and_not_guessed(tmp_path):
@@ -621,8 +622,8 @@ def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
     c, = s["conditions"]
     x = c["loads"]["tow_force"]
     assert x["fields"] == 7 and x["members"] == 10
-    assert ("members without a tow force, or without a window of 5 time scales in which it is known throughout, are in "
-            "no number of it", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
+    assert ("members without a tow force, or without a window of 5 time scales where it is known throughout, are left "
+            "out of its numbers", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
     assert "Members without tow force and ice resistance and vessel thrust, or without a window of 5 time scales in " \
         "which they are known throughout, are in no number of these: concentration 10 % (3 of 10)." in text
     # a moving mean leaves 2e-10 N of a constant
@@ -771,8 +772,8 @@ def test_each_branch_has_its_own_breaking_load(tmp_path):
     assert s["conditions"][0]["design"]["breaking_load"] == BREAKING / 2
     assert two["design"] < BREAKING / 2 < two["largest_step"] and one["largest_step"] < BREAKING
     said, = [w for w in warnings_of(s) if "above the breaking load" in w]
-    assert said.startswith("the largest mean tension over one step, by which a line parts, is above the breaking load "
-                           "of the line (750 kN of the tension of the second branch, which reaches ")
+    assert said.startswith("the largest mean tension over one step, which decides when a line parts, is above the "
+                           "breaking load of the line (750 kN of the tension of the second branch, which reaches ")
     assert "snap loads, which are shorter, are not in it" in text and "breaking load 1500 kN" in text
 
 

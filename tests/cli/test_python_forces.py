@@ -401,7 +401,7 @@ parent.step(1000)
 assert set(states) == {{parent.state_hash}}
 """, OMP_NUM_THREADS="2")
     assert done.returncode == 0, done.stderr
-    assert "that this one is a fork of" in done.stdout and "spawn" in done.stdout
+    assert "belongs to the parent of this forked process" in done.stdout and "spawn" in done.stdout
 
 
 def test_floes_at_rest_wake_when_a_force_begins():

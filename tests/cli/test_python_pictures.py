@@ -176,7 +176,7 @@ def test_reports(towed, speeds, tmp_path):
     path = bergtow.Ensemble(speeds).report(tmp_path / "ensemble.html")
     assert "design" in path.read_text().lower()
     (tmp_path / "mine.html").write_text("a page of my own")
-    with pytest.raises(bergtow.BergtowError, match="is there already"):
+    with pytest.raises(bergtow.BergtowError, match="already exists"):
         bergtow.report(towed, tmp_path / "mine.html")
     assert bergtow.report(towed, tmp_path / "mine.html", replace=True).stat().st_size > 1e5
 

@@ -213,7 +213,7 @@ def test_contacts_replace_nothing_without_force(tmp_path):
     to.write_text("dear to somebody")
     words = ["run", path, "-o", tmp_path / "out", "--quiet", "--dump-contacts", f"20:{to}"]
     result = call(*words)
-    assert result.returncode == IO and f"{to}: is there already" in result.stderr
+    assert result.returncode == IO and f"{to}: already exists" in result.stderr
     assert to.read_text() == "dear to somebody" and not (tmp_path / "out").exists()
     assert call(*words, "--force").returncode == DONE and to.read_bytes()[:4] == b"\x89HDF"
 

@@ -154,7 +154,7 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     again = call("resume", "out", cwd=tmp_path)
     assert again.returncode == IO and f"another run is using this folder (process {p.pid} on" in again.stderr
     again = call("run", path, "-o", "out", "--force", cwd=tmp_path)
-    assert again.returncode == IO and "another run is at work" in again.stderr
+    assert again.returncode == IO and "another run is using" in again.stderr
     p.kill()
     p.communicate()
     again = call("run", path, "-o", "out", cwd=tmp_path)
@@ -189,7 +189,7 @@ def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
     (["nowhere"], IO, "nowhere: there is no such folder"),
     (["empty"], IO, "empty: holds no checkpoint"),
     (["empty", "--max-wall", "2 parsecs"], USAGE, "--max-wall 2 parsecs"),
-    (["empty", "--max-wall", "0"], USAGE, "give a time of more than 0"),
+    (["empty", "--max-wall", "0"], USAGE, "give a time above 0"),
     (["empty", "--stops"], USAGE, "did you mean --steps?"),
     (["empty/notes.txt"], REFUSED, "empty/notes.txt: is not this program's checkpoint file"),
     (["empty/field.h5"], REFUSED, "empty/field.h5: is a field file, but a checkpoint file is needed here"),
@@ -254,7 +254,8 @@ def of_an_earlier_format(path):
 
 ENDS = {
     "cut": (lambda path: os.truncate(path, 5000), r"is truncated: only 5000 of \d+ bytes"),
-    "cut in the seal": (lambda path: os.truncate(path, path.stat().st_size - 1), r"is truncated: only \d+ of \d+ bytes"),
+    "cut in the seal": (lambda path: os.truncate(path, path.stat().st_size - 1),
+                        r"is truncated: only \d+ of \d+ bytes"),
     "cut before the seal": (lambda path: os.truncate(path, path.stat().st_size - 128), "has no seal at its end"),
     "opened to change it": (opened_to_change_it, "has no seal at its end: .*another program has changed"),
     "seal": (lambda path: flip(path, -60), "is damaged"),
@@ -262,7 +263,7 @@ ENDS = {
     "longer": (lambda path: path.write_bytes(path.read_bytes() + bytes(200)), "is damaged"),
     "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is not this program's checkpoint file"),
     "empty": (lambda path: path.write_bytes(b""), "is not this program's checkpoint file"),
-    "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", this program reads "checkpoint \d+"'),
+    "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", but this program reads "checkpoint \d+"'),
 }
 
 
@@ -533,6 +534,7 @@ def test_a_failure_is_told_before_the_state_is_made_again(tmp_path):
     time.sleep(max(0, start + 4.1 - time.time()))
     p.send_signal(signal.SIGCONT)
     rest = p.stderr.read() # communicate would lose what has been read ahead
-    assert re.search(r"the \d+ steps up to the state before .*\n.*made again: stopped meanwhile; .*resume out", rest)
+    assert re.search(r"the \d+ steps up to the state before .*\n.*computed again: stopped meanwhile; .*resume out",
+                     rest)
     ended(p, NUMERIC)
     assert not (tmp_path / "out/failure.h5").exists()

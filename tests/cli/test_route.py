@@ -467,7 +467,7 @@ def test_looks_from_a_line(tmp_path):
     process.kill()
     process.wait()
     assert not (killed / "out/horizon.yml").exists()
-    while "another run is at work" in (again := called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)).stderr:
+    while "another run is using" in (again := called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)).stderr:
         time.sleep(0.1)  # the program still writes the ensemble of the last look
     assert again.returncode == DONE, again.stderr
     other = json.loads((killed / "out/route.json").read_text())
@@ -563,14 +563,14 @@ def local(geometry):
     ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "--to: no way leads from the start to the goal"),
     ({}, ["--to", "8.5,0", "--no-go", "list.geojson"], CASE, r"polygons \(it is built otherwise\)"),
     ({}, ["--to", "50,0"], CASE, "--to: the goal lies outside the domain"),
-    ({}, ["--to", "2.5,0"], CASE, "--to 2.5,0: is reached where the tow starts"),
-    ({}, ["--to", "3,0.1"], CASE, "--to 3,0.1: is reached where the tow starts"),
+    ({}, ["--to", "2.5,0"], CASE, "--to 2.5,0: is reached at the start of the tow"),
+    ({}, ["--to", "3,0.1"], CASE, "--to 3,0.1: is reached at the start of the tow"),
     ({}, ["--to", "nan,0"], USAGE, "--to: nan: "),
     ({}, ["--to", "8.5,0", "--no-go", "empty.geojson"], CASE, "it holds none"),
     ({}, ["--to", "8.5,0", "--no-go", "flat.geojson"], CASE, "polygon 2 has no area"),
     ({}, ["--to", "8.5,0", "--no-go", "nan.geojson"], CASE, "polygon 1 has no ring of three finite positions"),
     ({}, ["--to", "8.5,0", "--no-go", "nowhere.geojson"], CASE, "a geometry is not a polygon"),
-    ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "no whole number from 1 to 16"),
+    ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "not a whole number from 1 to 16"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--speeds", "0.1,0.2"], USAGE, "one speed"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--map-age", "11 s"], USAGE, "--map-age"),
     ({}, ["--to", "8.5,0", "--force-limit", "1e-3"], CASE, "takes more than --force-limit"),

@@ -392,7 +392,7 @@ def test_a_damaged_ensemble_file_is_refused(tmp_path):
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0) for _ in range(2)])
     assert Members(folder).n == 2
     flip(folder / "ensemble.h5", (folder / "ensemble.h5").stat().st_size - 9)
-    with pytest.raises(RunError, match="do not fit their digest; run `bergtow ensemble` again"):
+    with pytest.raises(RunError, match="do not match their digest; run `bergtow ensemble` again"):
         Members(folder)
 
 
@@ -645,4 +645,4 @@ def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
         plot_chains.read(tmp_path / "none.h5")
     with h5py.File(tmp_path / "c.h5", "a") as f:
         del f["places"]
-    assert "does not say where" in script("plot-chains", tmp_path / "out", tmp_path / "c.h5").stderr
+    assert "does not give the places" in script("plot-chains", tmp_path / "out", tmp_path / "c.h5").stderr

@@ -287,7 +287,7 @@ def test_bollard_pull_is_that_of_the_simulated_vessel(tmp_path):
 
 
 @pytest.mark.parametrize("text, said", [
-    ("speed,share\n1,1\n", ":1: the head is not"), ("speed_m_s,share\n1,x\n", ":2: share: 'x'"),
+    ("speed,share\n1,1\n", ":1: the header is not"), ("speed_m_s,share\n1,x\n", ":2: share: 'x'"),
     ("speed_m_s,share\n1,1\n1,0.5\n", ":3: speed_m_s: 1 is not above 1"), ("speed_m_s,share\n", ":1: there is no row")])
 def test_a_curve_that_is_none(tmp_path, text, said):
     file = tmp_path / "curve.csv"

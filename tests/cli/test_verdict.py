@@ -206,7 +206,7 @@ def test_packed_ice_that_reaches_the_end_wall_is_reported(tmp_path):
     long = run(tmp_path, case, name="long")
     said = [w for w in long.warnings if "reaches the wall" in w]
     assert len(
-        said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
+        said) == 1 and "at about 5.8" in said[0] and "the run ends at 8 s" in said[0] and said[0] in long.result.stdout
     short = run(tmp_path, case, "--steps", 45, name="short")
     assert not any("reaches the wall" in w for w in short.warnings)
 
@@ -312,7 +312,7 @@ def test_a_gap_of_a_field_file_is_seen(tmp_path):
     assert call("resume", "out", "--quiet", cwd=tmp_path).returncode == DONE
     said = reasons(json.loads((r.dir / "summary.json").read_text()))
     for text in (checked, said):
-        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s, and comes into", text)[1]) == pytest.approx(200, rel=0.02)
+        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s, and enters", text)[1]) == pytest.approx(200, rel=0.02)
 
 
 def test_a_strip_of_ice_is_left_through_the_open_end(tmp_path):

@@ -178,7 +178,7 @@ TEST(what_will_not_do_is_refused)
         {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
         {{.name = "Big", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without functions"}, "`on` and `bound`"},
-        {{.name = "mute", .on = fender_on, .bound = fender_bound}, "say in a line"},
+        {{.name = "mute", .on = fender_on, .bound = fender_bound}, "describe it in one line"},
         {{.name = "odd", .doc = "a law with a bad unit", .on = fender_on, .bound = fender_bound, .keys = furlong,
           .n_keys = 1}, "unit furlong"},
         {{.name = "sad", .doc = "a law with an idle number", .on = fender_on, .bound = fender_bound,

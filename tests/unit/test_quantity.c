@@ -22,7 +22,7 @@ TEST(what_will_not_do_is_refused)
         {{.name = "a_name_of_more_than_forty_eight_letters_is_too_long", SOUND}, "at most 48"},
         {{.name = "tow_force", SOUND}, "a series of this name exists"},
         {{.name = "bare", .description = "a number of the test", .of_world = one}, "no units"},
-        {{.name = "mute", .units = "N", .of_world = one}, "say in a sentence"},
+        {{.name = "mute", .units = "N", .of_world = one}, "describe it in one sentence"},
         {{.name = "idle", .units = "N", .description = "a number of the test"}, "give it one of"},
         {{.name = "both", SOUND, .of_floe = one_each}, "give it one of"},
         {{.name = "odd", SOUND, .keep = (bt_keep)9}, "none of its kinds"},

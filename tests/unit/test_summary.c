@@ -139,7 +139,7 @@ TEST(every_doubt_is_reported)
                                        "momentum is conserved only to 0.001",
                                        "2 floes left",
                                        "differs from tow - drag - Coriolis - tilt - inertia",
-                                       "from the one by momentum",
+                                       "from that by momentum",
                                        "crushed to a depth of 0.9 m, 45 % of the mean floe size",
                                        "stood still for 12 s of 60 s"};
     for (size_t k = 0; k < sizeof reported / sizeof *reported; k++)

@@ -374,7 +374,7 @@ def dataset(t, place, start, title):
     time = {"standard_name": "time", "long_name": "time", "axis": "T", "calendar": "standard",
             "units": f"seconds since {named:%Y-%m-%d %H:%M:%S}"}
     if start is None:
-        time["comment"] = "assumed: the case gives no date, and time zero is that of the run"
+        time["comment"] = "assumed: the case gives no date, and time zero is the start of the run"
     lonlat, at = place.lonlat(t.xy), place.coordinates(t.xy)
     coordinates = {}
     if lonlat is not None:

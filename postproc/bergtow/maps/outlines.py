@@ -149,7 +149,7 @@ def check_files(a):
         arguments.ends_in(a.picture, writing.PICTURES)
     written = [f for f in (a.output, a.record, a.picture) if f]
     if len({f.resolve() for f in [a.map, *written]}) <= len(written):
-        raise BergtowError("the map and the files to write need names of their own", USAGE)
+        raise BergtowError("the map and the files to write need different names", USAGE)
     for file in written:
         writing.may_write(file, a.force)
 
@@ -272,7 +272,7 @@ def perform(a):
     distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
     farthest = _library.limit("map_farthest_m")
     if distortion["farthest_m"] > farthest:
-        raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes "
+        raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow allows "
                        f"{farthest / 1e3:g} km",
                        "choose part of it with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:

@@ -66,7 +66,7 @@ def system(path, found, said, implied=False):
         return ours
     local = isinstance(theirs, str), isinstance(ours, str)
     if local[0] != local[1] or not local[0] and not same(theirs, ours):
-        raise RunError(path, f"is in {name_of(theirs)}, and --crs says {name_of(ours)}",
+        raise RunError(path, f"is in {name_of(theirs)}, but --crs says {name_of(ours)}",
                        "leave --crs out, or correct the file (ogr2ogr -a_srs, gdal_edit.py -a_srs)")
     return theirs
 
@@ -161,7 +161,7 @@ class Plane:
         if not np.isfinite(lonlat).all():
             bad = xy[~np.isfinite(lonlat).all(axis=1)][0]
             raise RunError(found.path, f"has a vertex {bad[0]:.8g}, {bad[1]:.8g}, which is no place in "
-                           f"{name_of(self.crs)}", "correct the crs of the file, or take the outline out")
+                           f"{name_of(self.crs)}", "correct the crs of the file, or remove the outline")
         lon, lat = middle(lonlat)
         around = AreaOfInterest(lon - 1, max(lat - 1, -90), lon + 1, min(lat + 1, 90))
         with warnings.catch_warnings():

@@ -170,7 +170,7 @@ def from_layer(path, source, how):
         retrace(found.shapes)
     if not found.shapes:
         others = sum(len(names) for names in found.skipped.values())
-        raise RunError(path, f"holds no polygons ({others} of its features are none)" if others else
+        raise RunError(path, f"holds no polygons ({others} of its features are not polygons)" if others else
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
     return found
 

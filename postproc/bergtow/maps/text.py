@@ -117,8 +117,8 @@ def floe_lines(numbers):
     if not numbers["with_thickness"]:
         lines.append("thickness: no floe has one; give ice.thickness in the case")
     else:
-        lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m in "
-                     "the mean")
+        lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m on "
+                     "average")
     lines.append("       size, m          floes   share of the ice")
     return lines + [f"{row['from_m']:9.4g} to {row['to_m']:<9.4g} {row['floes']:6d} {100 * row['share_of_area']:8.1f} %"
                     for row in numbers["distribution"]]

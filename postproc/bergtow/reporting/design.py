@@ -520,4 +520,4 @@ def perform(a):
     print(f"{(time.monotonic() - began) / 60:.1f} min")
     holes = Members(a.output).holes()
     if holes:
-        raise RunError(a.output, holes, "call again: it goes on; bergtow ensemble --retry-failed tries failed ones")
+        raise RunError(a.output, holes, "call again: it continues; bergtow ensemble --retry-failed tries failed ones")

@@ -16,8 +16,7 @@ EVIDENCE = (
      "channels of 5 to 15 floes"),
     ("ship model in floes", "none: a prediction"))
 NO_FORCE = ("No measured mean force of a tow with complete conditions is public. No force of this report has been "
-            "compared with a measured one; the cases compare where and in which form ice jams with what was reported "
-            "of laboratories.")
+            "compared with a measured one; the cases compare where and how ice jams with reports from laboratories.")
 SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"),
            ("d", "draft of the body, m"),
            ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
@@ -58,7 +57,7 @@ def pull_of(cases, answer):
     the answer, or else the bollard pull of the case, part of which is lost at speed; NaN if no vessel is named."""
     at_speed = [x["has_n"] for x in (answer or {}).get("speeds", []) if x.get("has_n")]
     if at_speed:
-        return float(min(at_speed)), "what the vessel pulls at the speed asked for"
+        return float(min(at_speed)), "pull of the vessel at the requested speed"
     return (max((case.bollard_pull for _, case in cases), default=np.nan),
             "the bollard pull; at speed less of it is left")
 

@@ -122,7 +122,7 @@ def answer(e, s, cases, results, told=None):
     notes += [loads_text.steps(s)] if loads_text.steps(s) else []
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
-    out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
+    out += [{"kind": "pairs", "label": "line, vessel, and limits of the intervals",
              "rows": report_method.beyond(results, e)[1:] if told else
              report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
     return out + [lines(held)] * bool(held)

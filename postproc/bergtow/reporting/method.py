@@ -28,7 +28,7 @@ def _fields(s, cases):
     if any(source_of_ice(case.texts) for _, case in cases):
         return ""
     seeds = {m["seed"] for m in s["members"]}
-    return ", each through an ice field of its own" if len(seeds) == len(s["members"]) else \
+    return ", each through its own ice field" if len(seeds) == len(s["members"]) else \
         f", whose ice is made from {len(seeds)} seeds, the same in all conditions"
 
 

@@ -102,8 +102,8 @@ def options(p):
         type=float,
         default=LIMIT / 1e6,
         help=
-        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page says so "
-        "(default: %(default)g)"
+        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page reports "
+        "this (default: %(default)g)"
     )
     p.add_argument("--no-compression",
                    action="store_true",

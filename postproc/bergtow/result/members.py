@@ -35,7 +35,7 @@ LEAST_TOW = 150.0
 DOUBTS = {
     "unconverged": "steps reached the work limit before the tolerance",
     "unbounded": "the load on the body has no bound in some steps of its window: its means and peaks are lower bounds",
-    "jammed": "the towed body stood still while the tow asked for motion",
+    "jammed": "the towed body stood still although the tow demanded motion",
     "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or unsolved "
                 "steps",
     "short": "no window, or fewer than 20 independent samples in it",
@@ -151,7 +151,7 @@ class Members:
             self.unsound = self._unsound()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise RunError(self.file, f"is not an ensemble ({str(error).splitlines()[0]})",
-                           "run `bergtow ensemble` again: it makes the file anew") from None
+                           "run `bergtow ensemble` again: it makes the file again") from None
         self._dropped = {}
 
     def _read(self):
@@ -159,8 +159,8 @@ class Members:
             integrity.check_seal(self.file, "ensemble")
         except BergtowError as error:
             why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
-            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file anew") from None
-        with opened(self.file, "run `bergtow ensemble` again: it makes the file anew") as f:
+            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file again") from None
+        with opened(self.file, "run `bergtow ensemble` again: it makes the file again") as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
                 setattr(self, key, f[f"members/{key}"][()])

@@ -64,8 +64,9 @@ STATUS = {
 
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
-    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, in degrees "
-                   "as 20.1E,76.5N where the map has a place; X,Y:X,Y is a line, at any point of which the tow may end")
+    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, or in "
+                   "degrees as 20.1E,76.5N if the map has a place; X,Y:X,Y is a line, and the tow may end at any of "
+                   "its points")
     p.add_argument("--from", dest="start", metavar="X,Y", help="start (default: where the case has the body)")
     p.add_argument("--map", type=Path, metavar="FILE", help="the ice: outlines (.geojson) or a field (.h5) in place of "
                    "that of the case")
@@ -102,7 +103,7 @@ def options(p):
     p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
     p.add_argument("--no-page", action="store_true", help="leave out route.html, the page with the replays")
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
-                   "the same call goes on")
+                   "the same call continues")
     analysis.add_options(p, BUDGET)
 
 

@@ -177,7 +177,7 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
     for key in OWN:
         merged.get("tow", {}).pop(key, None)
     out = folder / "route-base.yml"
-    text = f"# {path.name} without the way of the tow, which each route says; {writing.MARK}\n"
+    text = f"# {path.name} without the path of the tow, which each route gives; {writing.MARK}\n"
     writing.write_text(text + json.dumps(merged, indent=1, ensure_ascii=False) + "\n", out, force)
     return out, ramp
 

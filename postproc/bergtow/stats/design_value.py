@@ -174,7 +174,7 @@ def _of_the_sample(e, rows, c, load):
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
     if load["fields"] < load["members"]:
         out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
-                    "in which it is known throughout, are in no number of it",
+                    "where it is known throughout, are left out of its numbers",
                     f"{load['members'] - load['fields']} of {load['members']} members"))
     if load["fields"] < SHORT_FIELDS:
         out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
@@ -281,15 +281,17 @@ def _of_the_line(e, rows, lines):
                 for k in sorted({v["subject"] for v in broken} - {0})]
         first = min((v["time_s"] for v in broken if np.isfinite(v["time_s"])), default=np.nan)
         out.append(("tow force and tension have no design value where a line parts: they are cut off there, or, where "
-                    "one branch of two holds, go on as those of another tow, whose body lies otherwise and can load "
-                    "that branch more; means and largest values are of each tow until nothing tows it, of a tension "
-                    "until its branch parts, and mix the two; for a design value simulate without breaking_load",
+                    "one branch of two holds, continue as those of a different tow, whose body lies differently and "
+                    "can load that branch more. Means and largest values cover each tow until nothing tows it (a "
+                    "tension until its branch parts), and mix the two; for a design value simulate without "
+                    "breaking_load",
                     ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
     known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # these are reported above
     for words, key, some in (("the design tension is", "design", lines),
-                             ("the largest mean tension over one step, by which a line parts, is", "largest_step",
+                             ("the largest mean tension over one step, which decides when a line parts, is",
+                              "largest_step",
                               [x for x in lines if x["series"] not in known])):
         above = [f"{quantity(x['breaking_load'], 'N')} of the {x['label']}, which reaches {quantity(x[key], 'N')}"
                  for x in some if x[key] > x["breaking_load"]]

@@ -74,7 +74,7 @@ def _floe_force(run):
     return Load("floe_force", "force of one floe", run.units("largest_quasi_static_load"),
                 "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion=conversion,
-                refused=f"of every {steps} steps the largest alone was kept; set output.sample_every: 1"
+                refused=f"of every {steps} steps only the largest was kept; set output.sample_every: 1"
                 if steps > 1 else ""), np.maximum(push, peak)
 
 

@@ -52,7 +52,7 @@ def quantile(e, rows, name, share):
     for k, m in enumerate(rows):
         for load, field, _ in loads.in_window(e, m, scale):
             if load.name == name and (why := load.refused or loads.cut_off(e, rows, load)):
-                raise RunError(e.file, f"has no {load.label}: {why}", "name another with --of, or run it anew")
+                raise RunError(e.file, f"has no {load.label}: {why}", "name another with --of, or run it again")
             if load.name == name and field is not None:
                 known, out[k] = load, np.percentile(field["peak"], share)
     if known is None:

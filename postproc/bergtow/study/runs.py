@@ -103,7 +103,7 @@ class CaseRuns:
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
-            raise RunError("--set ice.seed", "changes nothing, for each field has a seed of its own", "leave it out",
+            raise RunError("--set ice.seed", "changes nothing, because each field has its own seed", "leave it out",
                            USAGE)
 
     @cached_property

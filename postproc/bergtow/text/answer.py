@@ -25,8 +25,8 @@ REASONS = {
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
     "budget": "the budget is not enough for it", "run_failed": "the run failed",
     "domain_too_short": "the domain is too short",
-    "case_has_path": "the case has a path of its own: it is in the steady tow",
-    "case_has_programme": "the case has a programme of its own",
+    "case_has_path": "the case has its own path: it is in the steady tow",
+    "case_has_programme": "the case has its own programme",
     "environment_from_table": "the case has current or wind from a table",
     "line_not_known": "stiffness and length of the line are not known: give --line and --line-length",
     "line_length_not_known": "the length of the line is not known: give --line-length",
@@ -283,7 +283,7 @@ def plan(p):
              "nothing": "not one"}[p["gives"]]
     return (f"A design value takes some {short(p['needs_hours'], 2)} h of tow in windows: {fields}, some "
             f"{short(p['needs_min'], 2)} min here. The budget allows {p['budget_fields']} fields, {gives}. "
-            "(Estimates: the program's own of its speed, and of how soon the ice in contact is other ice.)")
+            "(Both are estimates: of the program's speed, and of how soon new ice is in contact.)")
 
 
 def took(a):

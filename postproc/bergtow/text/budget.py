@@ -71,7 +71,7 @@ def numerics_notes(found):
     if not n:
         return " Numerics: run `bergtow converge` on the base case and name its file with --converge." \
             if found["of"] == "mean_ice_resistance_n" else \
-            " Numerics: `bergtow converge` knows what the computation adds to the mean ice resistance alone."
+            " Numerics: `bergtow converge` knows only what the computation adds to the mean ice resistance."
     if "refused" in n:
         return f" Numerics: {n['refused']}."
     said = ""

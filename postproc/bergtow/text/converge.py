@@ -66,6 +66,6 @@ def doubtful(found):
 def content(found):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
     note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what "
-            "it is of the error that other ice for each value would leave. What is below "
-            f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
+            "it is of the error that other ice for each value would leave. Effects below "
+            f"{100 * found['margin']:g} % do not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return [*doubtful(found), Table(head, [cells(row) for row in found["rows"]]), [note]]

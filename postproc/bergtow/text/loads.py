@@ -66,7 +66,7 @@ def design(s):
                      number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
                      d.get("model", "–")])
     notes = [
-        f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without what the "
+        f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without the effects that the "
         f"warnings name. * beyond the hours simulated: extrapolated by the tail."
     ]
     notes += [text for text in (steps(s), holds_for(s)) if text]
@@ -302,7 +302,7 @@ def returns(s, markdown):
                              number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
                              number(x["hours"])])
     note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
-            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
+            "hours of tow on average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
             "below 0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, profile likelihood, widened "
             "by the scatter between fields that are alike. * beyond the hours simulated: extrapolated. ! shape below "
             "-0.5: the levels "

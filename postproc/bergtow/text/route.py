@@ -82,7 +82,7 @@ def answer(found):
         much = f"{chosen} has {percent(c['relative'])} of {objective}" if c and c["relative"] is not None else \
             f"{chosen} cannot be compared with it"
         return (f"No route shown better than the straight line: there is one member, and no interval ({much} in it). "
-                "If the map is perfect, that is the answer; take --members and errors of the map for one that counts.")
+                "If the map is perfect, that is the answer; give --members and errors of the map for an interval.")
     return f"No route shown better than the straight line: {objective} of {chosen} {interval(c)}."
 
 
@@ -140,6 +140,6 @@ def rounds(found, markdown=False):
     names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
     told = "; ".join(", ".join([f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}",
                                 *(FAULTS[f] for f in t["faults"])]) for k, t in h["tows"].items())
-    bound = ("The looks are perfect: what is gained is an upper bound. " if h["perfect"] else "")
+    bound = ("The looks are perfect, so the gain is an upper bound. " if h["perfect"] else "")
     return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
            f"{told}. {bound}One tow is one sample, and has no interval."

@@ -92,8 +92,8 @@ def _read(path: Path, columns: tuple[tuple[str, str, float | None, bool], ...],
                 if not any(c.strip() for c in row) or row[0].lstrip().startswith("#"):
                     continue
                 if len(row) != len(head):
-                    raise BergtowError(f"{where}: {len(row)} cells, but the header has {len(head)}; correct the row (a "
-                                       "text with a comma takes quotes)", CASE)
+                    raise BergtowError(f"{where}: {len(row)} cells, but the header has {len(head)}; correct the row "
+                                       "(put a text with a comma in quotes)", CASE)
                 one = make(**{member: _value(where, column, text.strip(), factor, optional)
                               for text, (column, member, factor, optional) in zip(row, columns)})
                 if one.name in out:

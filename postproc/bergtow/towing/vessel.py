@@ -87,7 +87,7 @@ def pull_share(speed: float, free_speed: float | None = None, curve: Curve = "qu
                 return at_low + (at_high - at_low) * (speed - low) / (high - low)
         return last[1]
     if curve not in ("quadratic", "linear"):
-        raise BergtowError(f"curve: {curve!r} is none; give quadratic, linear, or points (read_curve)")
+        raise BergtowError(f"curve: {curve!r} is not a curve; give quadratic, linear, or points (read_curve)")
     if free_speed is None or not 0 < free_speed < math.inf:
         raise BergtowError(f"free_speed: {free_speed} is not a speed, and a {curve} curve needs it; give the "
                            "free-running speed in m/s, or points of a curve")
