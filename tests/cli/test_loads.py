@@ -625,7 +625,7 @@ def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
     assert ("members without a tow force, or without a window of 5 time scales where it is known throughout, are left "
             "out of its numbers", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
     assert "Members without tow force and ice resistance and vessel thrust, or without a window of 5 time scales in " \
-        "which they are known throughout, are in no number of these: concentration 10 % (3 of 10)." in text
+        "which they are known throughout, enter none of these numbers: concentration 10 % (3 of 10)." in text
     # a moving mean leaves 2e-10 N of a constant
     assert "Line tension is left out: constant, 1230 N, in all 7 fields: concentration 10 %." in text
     assert c["loads_left_out"]["line_tension_1"]["label"] == "line tension"

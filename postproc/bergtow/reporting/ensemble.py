@@ -106,7 +106,7 @@ def answer(e, s, cases, results, told=None):
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
     if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
-        notes.append("In the start: of the same moving mean, the largest that begins before the window, which is in "
+        notes.append("In the start: of the same moving mean, the largest that begins before the window, which enters "
                      "no other number.")
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]

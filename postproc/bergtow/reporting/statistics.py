@@ -106,7 +106,7 @@ def options(p):
                    help="resamples for p-values and return levels (default %(default)s)")
     p.add_argument("--partial",
                    action="store_true",
-                   help="exit with 0 even if some members of the study are in no number")
+                   help="exit with 0 even if some members of the study enter no statistics")
     arguments.add_force(p)
     p.set_defaults(**conditions.DEFAULTS | {"exclude": []})
 

@@ -116,8 +116,8 @@ class WithoutBound:
         some, ended = (f" ({listed(names)})" if named else "" for names in (self.some, self.ended))
         parts = [f"the load on the body has no bound in some steps of {len(self.some)} of {self.tows} tows{some}, "
                  f"{100 * self.share:.2g} % of the steps of all that finished"] * bool(self.some)
-        parts += [f"{len(self.ended)} of {self.tows} tows ended for lack of a solution (guard.no_solution) and are in "
-                  f"no number{ended}"] * bool(self.ended)
+        parts += [f"{len(self.ended)} of {self.tows} tows ended for lack of a solution (guard.no_solution) and enter "
+                  f"no statistics{ended}"] * bool(self.ended)
         return "; ".join(parts)
 
 
@@ -373,7 +373,7 @@ class Members:
                  ("failed", [self.name[m]
                              for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
         parts = [f"{len(names)} {kind} ({listed(names)})" for kind, names in kinds if names]
-        return (f"{sum(len(names) for _, names in kinds)} of {self.n} members are in no number: {', '.join(parts)}"
+        return (f"{sum(len(names) for _, names in kinds)} of {self.n} members enter no statistics: {', '.join(parts)}"
                 if parts else "")
 
     def exclude(self, kinds):

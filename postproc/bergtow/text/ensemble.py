@@ -88,9 +88,10 @@ def estimates(s):
         f"{label}: no ice resistance; add it to the others." for name, label in labels.items()
         if s["conditions"][0]["estimates"][name]["on_top"]
     ]
-    note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
-            "* outside the range the estimate is meant for. –: no value there. The estimates were not made for each "
-            "other's conditions and can differ tenfold; none has been checked against a measured tow here.")
+    note = ("In brackets: simulated / estimate, where the estimate is meant for the conditions and depends on the "
+            "concentration. * outside the range the estimate is meant for. –: no value there. The estimates were not "
+            "made for each other's conditions and can differ tenfold; none has been checked against a measured tow "
+            "here.")
     return [Table(head, rows), [" ".join([note, *on_top])]]
 
 
@@ -215,18 +216,18 @@ def members(s, markdown):
     lines = [(f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."]
     if s["waiting"]:
         lines.append(
-            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
+            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and left out "
             f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields."
         )
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
         lines.append(
-            f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: "
+            f"{counted(len(s['unsound']))} not sound, and left out ({listed(list(s['unsound']))}); the first: "
             f"{name}: {why}. Call `bergtow ensemble` again to rerun damaged members."
         )
     if s["without_mean"]:
         lines.append(
-            f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no "
+            f"{counted(len(s['without_mean']))} without a mean, and left out ({listed(s['without_mean'])}): no "
             f"window, nothing that is towed, or a line that parted before the window or early in it."
         )
     if s["behind"]:
@@ -234,7 +235,7 @@ def members(s, markdown):
             f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, "
             f"which takes them in."
         )
-    for kind, words in (("failed", "failed, and in no number"), ("died", "whose process died")):
+    for kind, words in (("failed", "failed, and left out"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
             lines.append(
@@ -246,8 +247,8 @@ def members(s, markdown):
                      ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     if s["copies"]:
         lines.append(
-            f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and count with "
-            f"it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): no seed changes ice "
+            f"{counted(len(s['copies']))} ended in the same state as another one of the same condition, and count once "
+            f"with it ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): no seed changes ice "
             f"that is read, or water without floes."
         )
     if s["builds"]:
