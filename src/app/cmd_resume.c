@@ -44,7 +44,7 @@ static void refuse_case(const struct argp_state *state, const char *path)
     const bt_file_kind kind = bt_case_kind_of(path);
     if (kind == BT_FILE_CASE) argp_error(state, "%s: this is a case: bergtow run %s", path, path);
     if (kind == BT_FILE_STUDY)
-        argp_error(state, "%s: this is a study, which its own call resumes: bergtow ensemble %s", path, path);
+        argp_error(state, "%s: this is a study; resume it with bergtow ensemble %s", path, path);
 }
 
 static error_t parse(int key, char *arg, struct argp_state *state)

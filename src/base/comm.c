@@ -403,7 +403,7 @@ static bt_status put_in_order(int64_t from, int64_t count, int64_t n, const bt_g
     for (int64_t i = 0; i < n; i++) {
         const int64_t at = gid[i] - from;
         if (at < 0 || at >= count) {
-            bt_errors_add(err, "a body has the id %lld, which does not exist; please report this case",
+            bt_errors_add(err, "a body has the unknown id %lld; please report this case",
                           (long long)gid[i]);
             wrong = true;
             continue;

@@ -345,7 +345,7 @@ static void check_path(const bt_check *check, int n, const double *v)
     if (isinf(reach)) return;
     const double time = bt_case_tow_last(input, reach);
     bt_check_fault(check, "run.duration",
-                   "the tow is %g m long and a wall stands in its way after %g m; shorten the run to %g s, or slow the "
+                   "the tow is %g m long and a wall is in its way after %g m; shorten the run to %g s, or slow the "
                    "tow, or enlarge the domain",
                    way, reach, time);
 }

@@ -563,7 +563,7 @@ static void check_waypoints(const bt_check *check)
                      ly = input->tow.waypoints[2 * i + 3] - input->tow.waypoints[2 * i + 1];
         if (lx * bt_case_tow_sign(input) >= 0.5 * bt_hypot(lx, ly)) continue;
         bt_check_fault(check, "tow.waypoints",
-                       "the leg from way-point %d leads %g deg from x, and a moving window goes along x; keep within "
+                       "the leg from way-point %d leads %g deg from x, but a moving window moves along x; keep within "
                        "60 deg of that, or set domain.ends: periodic or open",
                        i + 1, bt_atan2(ly, lx) * 180 / BT_PI);
         break;

@@ -62,7 +62,7 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
     if (fabs(bt_cos(input->tow.direction)) < 0.5) {
         snprintf(
             why, 256,
-            "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
+            "%g deg: a moving window moves along x; tow within 60 deg of that, or set domain.ends: periodic or open",
             input->tow.direction * 180 / BT_PI);
         return "tow.direction";
     }
@@ -100,7 +100,7 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
     for (bt_idx i = 0; i < input->n_floes; i++) {
         if (!input->floes[i].fixed) continue;
         snprintf(why, 256,
-                 "moving cannot take floes[%d] along, which is fixed; remove it, or set domain.ends: periodic or open",
+                 "moving cannot take the fixed floes[%d] along; remove it, or set domain.ends: periodic or open",
                  (int)i);
         return "domain.ends";
     }

@@ -114,7 +114,7 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
                 (long long)counts->split);
     if (counts->read && !counts->bare && input->n_floes == 0 && bt_case_changed(input, "ice.thickness"))
         bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
-                "ice.thickness: no effect, for all outlines have a thickness of their own");
+                "ice.thickness: no effect, because all outlines have their own thickness");
     warn_of_region(counts, warnings);
     warn_of_latitude(counts, input, warnings);
     warn_of_plane(counts, input, warnings);

@@ -372,7 +372,7 @@ void bt_lead_stats_print(const bt_lead_stats *stats)
     if (stats->mode == BT_LEAD_CHANNEL) printf("removed");
     else printf("cut into %lld pieces of %.3g m", (long long)stats->pieces, stats->mean_piece);
     if (isnan(stats->concentration_after))
-        printf("; concentration of the field's ice region, which its file does not name");
+        printf("; concentration of the field's ice region, unknown from its file");
     else printf("; concentration %.4g", stats->concentration_after);
     printf(", was %.4g\n", stats->concentration_before);
 }

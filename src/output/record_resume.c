@@ -61,8 +61,8 @@ static void refuse(bt_h5_reader *old, const bt_snapshot *snap, const char *why)
 {
     if (old->status != BT_OK) return;
     old->status = bt_fail(old->err, BT_ERR_CASE,
-        "%s: belongs to another run than %s: %s; restore the result of that run, or continue from a checkpoint of this "
-        "one",
+        "%s: does not belong to the run of %s: %s; restore the result of that run, or continue from a checkpoint of "
+        "this one",
         old->path, snap->path, why);
 }
 
@@ -336,7 +336,7 @@ static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int
                   width = bt_h5_size(old, "/frames/pose", 1);
     if (old->status != BT_OK || (there >= entries && pictures >= frames && width == floes)) return;
     old->status = bt_fail(old->err, BT_ERR_CASE,
-        "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint expects %lld, %lld and %lld: it "
+        "%s: holds %lld entries and %lld frames of %lld floes, but the checkpoint expects %lld, %lld and %lld: it "
         "belongs to another run, or is older; restore it",
         old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries,
         (long long)frames, (long long)floes);

@@ -60,7 +60,7 @@ static const bt_state_row cells_rows[] = {
     CELLS(F64, y0, "m", FINITE, "low corner of the grid of cells, y"),
     CELLS(F64, side_x, "m", FINITE, "side of a cell, x"),
     CELLS(F64, side_y, "m", FINITE, "side of a cell, y"),
-    CELLS(F64, allowance, "m", ANY, "how far a centroid may stand outside its cell"),
+    CELLS(F64, allowance, "m", ANY, "how far a centroid may be outside its cell"),
     CELLS(F64, reach, "m", NOT_NEGATIVE, "largest radius of a floe"),
     CELLS(F64, heaviest, "kg", NOT_NEGATIVE, "mass of the heaviest floe"),
     CELLS(U8, rebounds, "1", ANY, "1 = some body has a restitution"),

@@ -388,7 +388,7 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
                 totals->stall.time, steady->end);
     else if (way < BT_STALL_SHARE * asked && !steady->turns) { // with turns the body may be on the previous leg
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NO_HEADWAY,
-                "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
+                "the tow asked for %.4g m within the window, %g to %g s, but the body has %s %.3g m over ground: it "
                 "makes no headway",
                 asked, steady->start, steady->end, way < 0 ? "gone astern by" : "moved ahead by", fabs(way));
         bt_warn_number(&steady->reasons, "way_m", way);

@@ -66,7 +66,7 @@ static void summary_window_warn(bt_errors *warnings, const bt_window *window)
     if (places > 0 && (double)window->missed > SHARE_LIMIT * places)
         bt_warn(warnings, BT_WARN_PLACES_MISSED,
                 "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
-                "along, or pushes them far ahead; it meets that much less ice; use a longer domain",
+                "along, or pushes them far ahead, and so meets that much less ice; use a longer domain",
                 100 * (double)window->missed / places);
     if (floes > 0 && (double)window->kept > SHARE_LIMIT * floes)
         bt_warn(warnings, BT_WARN_FLOES_KEPT,

@@ -186,9 +186,9 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
         const bt_estimate_input *in = &summary->estimate;
         printf("  estimates           at %.4g m/s through the ice", in->along);
         if (fabs(in->along - in->ordered) > 0.01 * fabs(in->ordered)) printf(" (%.4g ordered)", in->ordered);
-        printf(": force, ice resistance of this run / estimate where that knows the concentration%s and holds, "
-               "regime\n",
-               in->channel ? " (none knows the channel)" : "");
+        printf(": force, ice resistance of this run / estimate where the estimate depends on the concentration%s and "
+               "holds, regime\n",
+               in->channel ? " (none accounts for the channel)" : "");
         bt_estimates_print(in, bt_summary_held_against(summary), "    ", false);
     }
     if (history->n)

@@ -176,8 +176,8 @@ static bool check_prescribed(const bt_case *input, const bt_world *world, const 
                 if (!meet(input, world, i, j, j >= first_wall)) continue;
                 bt_errors_add(
                     err,
-                    "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
-                    "fixed floe, or tow on a line",
+                    "%s: on its prescribed path %s meets %s, which cannot give way; shorten the run, move the fixed "
+                    "floe, or tow on a line",
                     bt_case_name(input), roster->names[j - roster->n_floes],
                     towed && j != bt_world_towed(world) ? "the towed body" : "a fixed floe of the list floes");
                 sound = false;

@@ -184,8 +184,8 @@ static int axis_of(const bt_study_reader *reader, int line, const char *name)
         if (strncmp(name, parameter->name, n) || name[n] != '=') continue;
         if (parameter->key < 0) {
             bt_study_complain(reader, line,
-                              "with: %.120s: keys that go with a variant stand under its name in `variants`; "
-                                            "move them there", name);
+                              "with: %.120s: keys of a variant belong under its name in `variants`; move them "
+                                            "there", name);
             return -1;
         }
         if (parameter->continuous && study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {

@@ -48,7 +48,7 @@ STUDIES = {
                                "  ice.size=1: {run.dt: 1}\n  tow.speed=2: {run.dt: 2}\n",
                                "study.yml:5: run.dt: is given under `with`, and under `with` in study.yml:4: "),
     "with of a variant": ("variants: {a: {}, b: {ice.size: 3}}\nwith: {variant=b: {run.dt: 2}}\n",
-                          "study.yml:3: with: variant=b: keys that go with a variant stand under its name"),
+                          "study.yml:3: with: variant=b: keys of a variant belong under its name"),
     "with of a range that is drawn from": (
         "sampling: latin-hypercube\nsamples: 3\nparameters: {ice.size: {from: 1, to: 2}}\n"
         "with: {ice.size=1: {run.dt: 2}}\n", "study.yml:5: with: ice.size=1: ice.size is drawn from a range"),

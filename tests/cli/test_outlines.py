@@ -475,7 +475,7 @@ def test_a_thickness_that_may_be_in_centimetres(tmp_path, changes, says):
 
 def test_a_thickness_of_the_case_that_no_floe_has(tmp_path):
     write(tmp_path, feature(at(SQUARE, 8, 0), properties={"thickness": 0.1}))
-    says = "ice.thickness: no effect, for all outlines have a thickness of their own"
+    says = "ice.thickness: no effect, because all outlines have their own thickness"
     assert says in warnings_of(tmp_path, BASE)[0]
     write(tmp_path, feature(at(SQUARE, 8, 0), properties={"thickness": 0.1}), feature(at(SQUARE, 12, 0)))
     assert says not in warnings_of(tmp_path, BASE)[0]

@@ -285,7 +285,7 @@ TEST(without_a_towed_body_forces_are_null)
     json = summary_of(&c, 0, &none, FLOES, NULL);
     assert_string_equal(json_value(json, "contacts_mean"), "null");
     assert_string_equal(json_value(json, "sim_time_s"), "0");
-    assert_non_null(strstr(json, "no window: it would begin at 0 s and the run ends at 0 s"));
+    assert_non_null(strstr(json, "no window: it would begin at 0 s, but the run ends at 0 s"));
     free(json);
 }
 
