@@ -41,7 +41,7 @@ def _within(text, number, fits, words):
     try:
         value = number(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text or 'nothing'} is no {'whole ' * (number is int)}number") from None
+        raise argparse.ArgumentTypeError(f"{text or 'nothing'} is not a {'whole ' * (number is int)}number") from None
     if not fits(value):
         raise argparse.ArgumentTypeError(f"{text} is {words}")
     return value

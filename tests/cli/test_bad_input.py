@@ -73,7 +73,7 @@ TEXTS = {
                        "bad.yml:3: ice.density: 1000 kg/m3 is more than water.density, 900 kg/m3", "correct one"),
     "concentration above one": (GOOD.replace("0.3",
                                              "1.2"), "bad.yml:3: ice.concentration: 1.2 is out of range", "[0, 0.95]"),
-    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force and this is a speed",
+    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force, but this is a speed",
                    "m/s"),
     "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
     "trailing junk": (GOOD.replace("0.3", "0.8x"), 'bad.yml:3: ice.concentration: "x"'),

@@ -418,7 +418,7 @@ def test_a_study_end_to_end(small):
 
 
 @pytest.mark.parametrize("keys, words", [
-    ({"sampling": "grid"}, "is no Latin hypercube"), ({"fields": "common"}, "has common fields"),
+    ({"sampling": "grid"}, "is not a Latin hypercube"), ({"fields": "common"}, "has common fields"),
     ({"samples": 7}, "has 7 samples, too few for a budget; take 8 or more")])
 def test_a_study_without_a_budget_is_refused_before_its_members_run(tmp_path, keys, words):
     write_case(tmp_path, BASE, "base.yml")
@@ -457,6 +457,6 @@ def test_what_is_refused(small, tmp_path):
     # the folder holds another study: its numbers are no answer to this one
     for study, more in ((STUDY | {"samples": 10}, ()), (STUDY, ("--set", "ice.size=0.8"))):
         assert "another study" in said(study, *more, out=folder / "out", code=3)
-    with pytest.raises(RunError, match="is no Latin hypercube"):
+    with pytest.raises(RunError, match="is not a Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Members(made_up.write(tmp_path / "g", [one])))

@@ -25,7 +25,7 @@ REFUSED = {
                                        floes=[PIER | {"x": 10, "length": 1.3, "fixed": False}]), CASE,
                                "no room for the two largest bodies"),
     "a pier on the path": (changed(WATER, tow__speed=0.3,
-                                   floes=[PIER]), CASE, "which cannot give way, on its prescribed path"),
+                                   floes=[PIER]), CASE, "which cannot give way; shorten the run"),
     "floes in each other": (changed(WATER, floes=[PIER | {"x": 9, "y": 2, "fixed": False},
                                                   PIER | {"x": 9.5, "y": 2}]), CASE, "overlap by"),
     "a floe on the body": (changed(WATER, floes=[PIER | {"x": 3, "y": 1, "fixed": False}]), CASE, "overlap by"),

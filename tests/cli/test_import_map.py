@@ -727,7 +727,7 @@ def test_negative_labels(tmp_path):
 @pytest.mark.parametrize("kind, first", [(np.uint32, 2 ** 31 + 5), (np.int64, 2 ** 40), (np.uint64, 2 ** 63 + 1),
                                          (np.float64, 2.0 ** 50)])
 def test_labels_of_any_size(tmp_path, kind, first):
-    """Red: "has values that are no labels (whole numbers)", which they are."""
+    """Red: "has values that are not labels (whole numbers)", which they are."""
     labels = np.where(GRID > 0, GRID.astype(kind) + kind(first), kind(0))
     map_ = labelled(tmp_path / "map.npy", labels)
     rings, record = outlines(map_, "--pixel", "2", "--thickness", f"{int(kind(first) + kind(1))}=0.5")

@@ -188,7 +188,7 @@ def test_pictures_and_report_follow_the_roles(left):
                 assert q["label"] in drawn, q["name"]
         panels = [axes.get_ylabel() for axes in plot_force.draw_diagnostics(run).axes]
         assert [p.split(" (")[0] for p in panels] == [q["label"] for q in by_role["diagnostic"]]
-        rows = [row[0].split(",")[0] for row in report_run.forces(run) if "it has parted" not in row[3]]
+        rows = [row[0].split(",")[0] for row in report_run.forces(run) if "it parted" not in row[3]]
         for q in forces + by_role["load"]:
             assert (q["label"] in rows) == (np.isfinite(run.number(q["summary"]))
                                             or q["name"] in ("ice_resistance", "tow_force")), q["name"]

@@ -77,7 +77,7 @@ def integers(text):
     try:
         return tuple(int(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: are no labels; write whole numbers, 0,3") from None
+        raise argparse.ArgumentTypeError(f"{text}: are not labels; write whole numbers, 0,3") from None
 
 
 def corners(text):
@@ -87,7 +87,7 @@ def corners(text):
     except ValueError:
         numbers = []
     if len(numbers) < 6 or len(numbers) % 2 or not all(map(math.isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f"{text}: are no corners; write at least three, column,row,column,row,...")
+        raise argparse.ArgumentTypeError(f"{text}: are not corners; write at least three, column,row,column,row,...")
     return tuple(zip(numbers[::2], numbers[1::2]))
 
 

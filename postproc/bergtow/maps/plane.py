@@ -160,7 +160,7 @@ class Plane:
         lonlat = np.array(first.transform(*xy.T)).T
         if not np.isfinite(lonlat).all():
             bad = xy[~np.isfinite(lonlat).all(axis=1)][0]
-            raise RunError(found.path, f"has a vertex {bad[0]:.8g}, {bad[1]:.8g}, which is no place in "
+            raise RunError(found.path, f"has a vertex {bad[0]:.8g}, {bad[1]:.8g}, which is not a place in "
                            f"{name_of(self.crs)}", "correct the crs of the file, or remove the outline")
         lon, lat = middle(lonlat)
         around = AreaOfInterest(lon - 1, max(lat - 1, -90), lon + 1, min(lat + 1, 90))

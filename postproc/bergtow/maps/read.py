@@ -431,7 +431,7 @@ def of_labels(found, labels, valid, water, place, how):
     ice = valid & ~water
     some = labels[ice]
     if labels.dtype.kind == "f" and np.any(some != np.rint(some)):
-        raise RunError(found.path, "has values that are no labels (whole numbers)", "classify the image first")
+        raise RunError(found.path, "has values that are not labels (whole numbers)", "classify the image first")
     if some.size and some.min() < 0:
         raise RunError(found.path, f"has the label {some.min():.0f}, which programs that group pixels give to pixels "
                        "outside floes", f"say which labels are not ice: --water {some.min():.0f}, or with 0 among "

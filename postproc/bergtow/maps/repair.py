@@ -46,7 +46,7 @@ NAMED = 20               # at most so many floes are named in the record
 #: kinds of change, in the order of the report
 KINDS = {
     "empty": "features without a geometry, left out",
-    "no polygon": "features that are no polygons, left out",
+    "no polygon": "features that are not polygons, left out",
     "fewer than 3 vertices": "rings of fewer than 3 vertices, left out",
     "crossing": "outlines that crossed or touched themselves, repaired",
     "joined": "features in pieces that meet (as at the 180th meridian), joined",

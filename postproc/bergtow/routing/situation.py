@@ -128,7 +128,7 @@ def no_go_file(path, place):
         raise RunError(path, f"cannot be read ({error.strerror})", "name a GeoJSON file of polygons") from None
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
         why = error if type(error) in (ValueError, json.JSONDecodeError) else "it is built otherwise"
-        raise RunError(path, f"is no GeoJSON of polygons ({why})", "write Polygon or MultiPolygon features, in "
+        raise RunError(path, f"is not a GeoJSON file of polygons ({why})", "write Polygon or MultiPolygon features, in "
                        "degrees", CASE) from None
     local = _library.limit("map_local_crs")
     if crs not in ("", local) and not crs.upper().endswith("CRS84"):

@@ -131,7 +131,7 @@ def without_intervals(found):
 def refuse(file, latin, common):
     """Raises RunError if a study cannot have a budget, however many of its members are run."""
     if not latin:
-        raise RunError(file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study", CASE)
+        raise RunError(file, "is not a Latin hypercube", "set sampling: latin-hypercube and samples in the study", CASE)
     if common:
         raise RunError(file, "has common fields, whose scatter is in all conditions alike", "set fields: own", CASE)
 
