@@ -198,7 +198,7 @@ TABLES = {
     "four columns": ("t,u,v\n0,1,1,1\n99,1,1\n", "bad.csv:2:"),
     "junk": ("t,u,v\n0,1,1\n# two lines\n\n99,1x,1\n", "bad.csv:5: \"x\" is not a unit of speed"),
     "not a number": ("t,u,v\n0,nan,1\n99,1,1\n", "bad.csv:2: \"nan\" is not a number"),
-    "wrong unit": ("t,u,v\n0 m,1,1\n99,1,1\n", "bad.csv:2: m is the unit of a length and this is a time"),
+    "wrong unit": ("t,u,v\n0 m,1,1\n99,1,1\n", "bad.csv:2: m is the unit of a length, but this is a time"),
     "out of range": ("t,u,v\n0,1,1\n99,1000,1\n", "bad.csv:3: a speed is out of range"),
     "not sorted": ("t,u,v\n0,1,1\n50,1,1\n50,2,1\n99,0,0\n", "bad.csv:4: its time is not later"),
     "late": ("t,u,v\n1,1,1\n99,1,1\n", "case.yml", "water.current_table: the table begins at 1 s"),

@@ -66,7 +66,7 @@ TEST(cross_checks_refuse)
         {"water.slope_x=0.001", "has no effect without water.tilt"},
         {"tow.programme=[[0,1],[5,2],[5,0]]", "point 3 is at 5 s, not later than the point before"},
         {"tow.programme=[[0,1],[5,60]]", "point 2: 60 is out of range; give a value in [0, 50] m/s"},
-        {"tow.programme=[[0 m,1]]", "point 1: m is the unit of a length and this is a time"},
+        {"tow.programme=[[0 m,1]]", "point 1: m is the unit of a length, but this is a time"},
         {"tow.programme=[[0,0],[5,1]];tow.speed=2", "has no effect with tow.programme, whose largest speed is 1 m/s"},
         {"tow.programme=[[0,0],[5,1]];tow.ramp=4", "reaches its largest speed at 5 s"},
         {"tow.mode=none;tow.programme=[[0,1]]", "has no effect with tow.mode: none"},

@@ -84,7 +84,7 @@ TEST(refuses_what_is_not_a_number_with_a_unit_of_the_kind)
         const char *fragment;
     } bad[] = {
         {"0.8x", BT_UNIT_RATIO, "\"x\" is not a unit"},
-        {"10 kN", BT_UNIT_LENGTH, "kN is the unit of a force and this is a length"},
+        {"10 kN", BT_UNIT_LENGTH, "kN is the unit of a force, but this is a length"},
         {"10 ms", BT_UNIT_SPEED, "unit of a time"},
         {"1.5 kt", BT_UNIT_SPEED, "unit of a mass"},
         {"3 m", BT_UNIT_NONE, "plain number"},
