@@ -294,7 +294,7 @@ def test_a_member_that_another_run_is_at_stays_open(tmp_path):
     assert "2 members finished, 0 failed, 1 left" in result.stdout
     waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
                                env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
-    assert any("waiting for 1 member at work" in line for line in waiting.stdout)
+    assert any("waiting for 1 member in other processes" in line for line in waiting.stdout)
     run_lock.close()
     out = waiting.communicate(timeout=60)[0]
     assert waiting.returncode == DONE and "3 members finished, 0 failed, 0 left" in out
