@@ -236,7 +236,7 @@ def test_values_in_place_of_those_of_the_study(tmp_path):
     assert line(text, "set") == "output.frame_interval=-1 s, ice.friction=0.3, run.dt=0.05"
     assert rows(text)[1][0][4] == "400"
     for given, words in (("tow.speed=0.2", "--set tow.speed=0.2: tow.speed: is set under `parameters` of study.yml"),
-                         ("run.duration=9", "run.duration: stands under `with` of study.yml"),
+                         ("run.duration=9", "run.duration: is set under `with` of study.yml"),
                          ("ice.sise=1", "--set ice.sise=1: ice.sise: unknown key; did you mean ice.size?"),
                          ("run.dt=fast", "--set run.dt=fast: run.dt: "), ("run.dt", "--set run.dt: is not key=value"),
                          ("ice.seed=4", "take their seeds from `seed`")):

@@ -879,7 +879,7 @@ BAD = {
     "no map": (lambda p: text(p / "map.gpkg", "hello"), (), "not a map that GDAL can read"),
     "a word for a number": (lambda p: text(p / "map.geojson", json.dumps({"type": "FeatureCollection", "features": [
         {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [
-            [[-50, 60], ["a", 60], [-50, 61], [-50, 60]]]}}]})), (), "; mend the file"),
+            [[-50, 60], ["a", 60], [-50, 61], [-50, 60]]]}}]})), (), "; correct the file"),
     "degrees as metres": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS], "EPSG:32633"), (),
                           "as degrees do"),
     "degrees as local": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS],

@@ -69,7 +69,7 @@ def test_a_lock_below_the_tolerance_is_not_silent(tmp_path):
     assert r.summary["locked_steps"] == 0
     case["solver"]["tolerance"] = float(said[0].rsplit(" ", 1)[1])
     locked = run(tmp_path, changed(case, run__duration=1), name="b")
-    assert locked.summary["locked_steps"] > 5 and not warned(locked, "takes .* for rest")
+    assert locked.summary["locked_steps"] > 5 and not warned(locked, "treats speeds .* as rest")
 
 
 def column():
