@@ -16,8 +16,8 @@ const bt_key bt_base_key = {
     .name = "base",
     .type = BT_KEY_TEXT,
     .preset = "none",
-    .doc = "a case file whose keys hold where this file says nothing; relative to the folder of this file, as are the "
-           "files that each of the two names",
+    .doc = "a case file whose keys apply where this file gives none; paths in either file are relative to the folder "
+           "of that file",
 };
 
 static const bt_node *entry(const bt_node *root, const char *key, int *line)
