@@ -204,7 +204,7 @@ TABLES = {
     "late": ("t,u,v\n1,1,1\n99,1,1\n", "case.yml", "water.current_table: the table begins at 1 s"),
     "short": ("t,u,v\n0,1,1\n49,1,1\n", "case.yml",
               "water.current_table: the table ends at 49 s, but the run needs it until 50 s"),
-    "long line": ("t,u,v\n" + "0" * 300 + ",1,1\n", "bad.csv:2: is longer"),
+    "long line": ("t,u,v\n" + "0" * 300 + ",1,1\n", "bad.csv:2: is too long"),
 }
 
 

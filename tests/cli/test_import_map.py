@@ -736,7 +736,7 @@ def test_labels_of_any_size(tmp_path, kind, first):
         "area_m2"]
     source = json.loads((tmp_path / "out.geojson").read_text())["features"][0]["properties"]["source"]
     assert str(GRID.max()) in source or str(GRID[GRID > 0].min()) in source
-    assert "no labels" in outlines(labelled(tmp_path / "half.npy", GRID / 2.0), "--pixel", "2", code=IO,
+    assert "not labels" in outlines(labelled(tmp_path / "half.npy", GRID / 2.0), "--pixel", "2", code=IO,
                                    name="no.geojson")
 
 
@@ -897,7 +897,7 @@ BAD = {
     "where": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--where", "none = 2"), "--where"),
     "not finite": (lambda p: not_finite(p / "map.gpkg"), ("--crs", "local"), "not a finite number"),
     "a grid by GDAL's name": (lambda p: p / "NETCDF:map.nc:labels", (), "no such file"),
-    "float labels": (lambda p: array(p / "map.npy", np.full((3, 3), 0.5)), ("--pixel", "1"), "no labels"),
+    "float labels": (lambda p: array(p / "map.npy", np.full((3, 3), 0.5)), ("--pixel", "1"), "not labels"),
     "only water": (lambda p: array(p / "map.npy", np.zeros((3, 3))), ("--pixel", "1"), "no label of ice"),
     "cube": (lambda p: array(p / "map.npy", np.ones((3, 3, 3))), ("--pixel", "1"), "one label a pixel"),
     "not for it": (lambda p: array(p / "map.npy", np.ones((3, 3))), ("--layer", "a"), "there is no --layer"),
@@ -937,7 +937,7 @@ def test_bad_maps(tmp_path, name):
 
 
 @pytest.mark.parametrize("words, says", [
-    (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "no length"),
+    (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "not a length"),
     (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--unseen", "x"), "whole numbers"),
     (("--footprint", "1,2,3,4"), "at least three"), (("--record", "a.txt"), ".json"),
     (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "different names")])

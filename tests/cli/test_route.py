@@ -559,7 +559,7 @@ def local(geometry):
     ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* no-go area"),
     ({}, ["--to", "20E,76N"], USAGE, "in degrees, but the map of this case has no place; set ice.origin_lon"),
     ({}, ["--to", "8.5,0", "--no-go", "degrees.geojson"], CASE, "the map of this case has no place"),
-    ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "no GeoJSON of polygons"),
+    ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "not a GeoJSON file of polygons"),
     ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "--to: no way leads from the start to the goal"),
     ({}, ["--to", "8.5,0", "--no-go", "list.geojson"], CASE, r"polygons \(it is built otherwise\)"),
     ({}, ["--to", "50,0"], CASE, "--to: the goal lies outside the domain"),
