@@ -75,8 +75,9 @@ def keys(program, folder):
              *table_of(table["floe_keys"]), "", "## base", "", *table_of(table["file_keys"]), "",
              "## Keys of a study", "", "A study file has these keys in place of sections ([studies]"
              "(../../cases/studies/README.md#study-file-format)).", "", *table_of(table["study_keys"]), ""]
-    limits = said(program, "--list-keys").split("What is refused as too large", 1)[1]
-    page += ["## Limits of size", "", "```text", "What is refused as too large" + limits.rstrip(), "```", ""]
+    limits = said(program, "--list-keys").split("The program refuses anything beyond these limits", 1)[1]
+    page += ["## Limits of size", "", "```text", "The program refuses anything beyond these limits" + limits.rstrip(),
+             "```", ""]
     write(folder / "keys.md", "\n".join(page))
 
 

@@ -76,7 +76,7 @@ def has(case):
         "with a tow line": line,
         "with a tow line of two branches": line and value_of(case, "tow.line.branches", 1) == 2,
         "with a vessel": line and mode == "thrust",
-        "where collisions are told apart": body and value_of(case, "impact.conversion", "duration") != "none",
+        "where collisions are identified": body and value_of(case, "impact.conversion", "duration") != "none",
         "with a moving window": value_of(case, "domain.ends") == "moving",
     }
 

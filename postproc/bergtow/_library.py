@@ -196,8 +196,8 @@ def threads_here(asked: int) -> int:
             team = os.getpid()
         return asked
     if asked > 1:
-        raise BergtowError(f"threads: {asked} cannot be had in a fork of a process that has had simulations; take 1, "
-                           'or start processes by multiprocessing.get_context("spawn")')
+        raise BergtowError(f"threads: {asked} are not available in a fork of a process that has run simulations; give "
+                           '1, or start processes with multiprocessing.get_context("spawn")')
     return 1
 
 
@@ -294,7 +294,7 @@ def start_mpi() -> None:
 def whole(text: bytes, what: str, status: int = USAGE) -> bytes:
     """A text to pass to the library. Raises BergtowError for a text that contains NUL, which would end it in C."""
     if b"\0" in text:
-        raise (CaseError if status == CASE else BergtowError)(f"{what} holds the character NUL; take it out", status)
+        raise (CaseError if status == CASE else BergtowError)(f"{what} contains the character NUL; remove it", status)
     return text
 
 

@@ -36,7 +36,7 @@ def program_path() -> str:
     if named:
         found = shutil.which(named)
         if not found:
-            raise BergtowError(f"{named}: is no program; name bergtow by its whole path in BERGTOW", IO)
+            raise BergtowError(f"{named}: is not a program; name bergtow by its whole path in BERGTOW", IO)
         return found
     for path in _places():
         if _compiled(path):

@@ -53,7 +53,7 @@ def _within(text, number, fits, words):
     try:
         value = number(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text or 'nothing'} is no {'whole ' * (number is int)}number") from None
+        raise argparse.ArgumentTypeError(f"{text or 'nothing'} is not a {'whole ' * (number is int)}number") from None
     if not fits(value):
         raise argparse.ArgumentTypeError(f"{text} is {words}")
     return value
@@ -96,7 +96,7 @@ def add_run(p, output):
 
 
 def add_force(p):
-    p.add_argument("--force", action="store_true", help="replace a file that is there, whoever made it")
+    p.add_argument("--force", action="store_true", help="replace an existing file, whoever made it")
 
 
 def output(a, default, allowed):

@@ -92,7 +92,7 @@ class Picture:
         displayed; the other formats are drawn again from the current contents of the folder."""
         path = Path(file)
         if path.exists() and not path.is_file():
-            raise BergtowError(f"{path}: is no regular file and is not replaced; give another name", IO)
+            raise BergtowError(f"{path}: is not a regular file and is not replaced; give another name", IO)
         kind = path.suffix.lstrip(".")
         if kind in self._kept and path.parent.is_dir():
             path.write_bytes(self._kept[kind])

@@ -116,7 +116,7 @@ class Simulation:
         if self._address is None:
             raise BergtowError("the simulation has ended")
         if self._process != os.getpid():
-            raise BergtowError("the simulation is of the process that this one is a fork of; begin one here")
+            raise BergtowError("the simulation belongs to the parent of this forked process; begin a new one here")
         return self._address
 
     @property

@@ -38,12 +38,12 @@ def may_write(path, force):
         if not path.exists():
             return
         if not path.is_file():
-            raise RunError(path, "is there already, and is no file", "choose another place with -o")
+            raise RunError(path, "already exists and is not a file", "choose another place with -o")
         if force or made_here(path):
             return
     except OSError as error:
         raise RunError(path, f"cannot be read ({error.strerror or error})", "choose another place with -o") from None
-    raise RunError(path, "is there already, and was not made by bergtow",
+    raise RunError(path, "already exists and was not made by bergtow",
                    "choose another place with -o, or --force to replace it")
 
 

@@ -105,18 +105,19 @@ static void warn_of_step(const bt_case *input, const bt_check_ice *ice, bt_error
     const bt_check_step step = bt_check_step_of(input, ice);
     if (!step.contact)
         bt_warn(warnings, BT_WARN_LONG_STEP,
-                      "run.dt: %g s is longer than a collision lasts %s; take at most %g s",
+                      "run.dt: %g s is longer than a collision lasts %s; use at most %g s",
                       input->run.dt,
                       input->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", step.longest);
     if (!step.floes)
         bt_warn(warnings, BT_WARN_FAST_FLOES,
-            "run.dt: in %g s %s move %.3g of their size, more than 0.1; take at most %.3g s",
+            "run.dt: in %g s %s move %.3g of their size, more than 0.1; use at most %.3g s",
             input->run.dt, step.pieces ? "pieces of the lead" : "floes", step.passed, 0.1 * step.size / step.speed);
     const double reference = bt_case_reference_speed(input);
     if (ice->count >= 1 && step.speed > SLOW * reference)
         bt_warn(warnings, BT_WARN_LOW_REFERENCE_SPEED,
-                      "solver.reference_speed: %.3g m/s, and the ice comes at up to %.3g m/s: contacts are solved more "
-                      "strictly than a result needs, and slower hits count as collisions; set it to that",
+                      "solver.reference_speed: %.3g m/s, but the ice approaches at up to %.3g m/s: contacts are solved "
+                      "more strictly than a result needs, and slower hits count as collisions; set it to the speed of "
+                      "the ice",
                       reference, step.speed);
 }
 
@@ -141,7 +142,7 @@ static void warn_of_track(const bt_case *input, const bt_field *field, const bt_
         const double fall = bt_track_fall(input, &track);
         if (fall > BT_WINDOW_STRIDE * ice->size)
             bt_warn(warnings, BT_WARN_ICE_OVERTAKES,
-                          "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, and a "
+                          "domain.ends: wind and water carry the ice past the body from behind, by %.3g m, but a "
                           "moving window takes in new ice only ahead; set domain.ends: periodic or open, or tow faster",
                           fall);
     }

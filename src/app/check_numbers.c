@@ -298,7 +298,7 @@ static void room(sink *to, const bt_checked *c)
                                                                         c->ice->concentration);
     number(to, "domain.ahead_m", "moving window", "the body keeps %.4g m from its front", c->input->domain.ahead);
     number(to, "domain.behind_m", NULL, " and %.4g m from its rear", c->input->domain.length - c->input->domain.ahead);
-    number(to, "domain.windows", NULL, "; the tow is %.3g windows of ice long", bt_track_laps(c->input, &track));
+    number(to, "domain.windows", NULL, "; the tow is %.3g windows long", bt_track_laps(c->input, &track));
     bt_setup_track_free(&track);
 }
 
@@ -405,7 +405,7 @@ static void steps(sink *to, const bt_checked *c)
     number(to, "run.widths_of_a_piece_a_step", "time step, splits", "moves %.3g",
            where(any && input->ice.splitting.toughness > 0, dt * speed / input->ice.splitting.least_size));
     if (any && input->ice.splitting.toughness > 0)
-        word(to, NULL, NULL, " of the least width of a piece a step; from some 0.2 on (assumed) pieces may overlap");
+        word(to, NULL, NULL, " of the least width of a piece per step; above about 0.2 (assumed) pieces may overlap");
 }
 
 static void cost(sink *to, const bt_checked *c)
@@ -426,9 +426,9 @@ static void cost(sink *to, const bt_checked *c)
     number(to, "cost.core_time_s", "wall time", "rough estimate %.2g s on one core", bt_check_seconds(input, ice));
     number(to, "cost.us_a_floe_and_step", NULL, " (%.2g us a floe and step at this concentration",
            1e6 * bt_cost_floe_step(input, ice->concentration));
-    number(to, "cost.making_of_ice_s", NULL, making > 0 ? "; the making of ice %.2g s of it" : NULL, making);
+    number(to, "cost.making_of_ice_s", NULL, making > 0 ? "; making the ice takes %.2g s of it" : NULL, making);
     if (input->ice.splitting.toughness > 0)
-        word(to, NULL, NULL, "; without the time that splits and their pieces take");
+        word(to, NULL, NULL, "; without the time for splits and their pieces");
     word(to, NULL, NULL, ")");
 }
 

@@ -87,8 +87,8 @@ static bt_status check_study(const options *opt, bt_errors *err)
     if (!(opt->scale > 0) && !opt->json) return bt_check_study(&opt->file, bt_comm_world()->size, err);
     return bt_fail(err, BT_ERR_USAGE,
                    opt->json
-                       ? "%s: is a study, and --json is for a case; check its base case, with --set for what varies"
-                       : "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
+                       ? "%s: is a study, but --json is for a case; check its base case, with --set for the varied keys"
+                       : "%s: is a study, but --scale is for a case; scale its base case, and give that as `base`",
                    opt->file.path);
 }
 

@@ -132,7 +132,7 @@ static bt_status check_conditions(const bt_study *study, numbers *sums, bt_error
     bt_status status = bt_study_base_case(study, &input, err); // faults common to all conditions
     bt_case_free(&input);
     if (status != BT_OK) {
-        bt_errors_add(err, "%s: base: %s with `set` is not a valid case, which every condition needs; correct that "
+        bt_errors_add(err, "%s: base: %s with `set` is not a valid case, but every condition needs it; correct it "
                            "first",
                       study->path, study->base_name);
         return status;
@@ -260,7 +260,7 @@ static void print_range(const bt_study *study, const numbers *sums)
            duration(hi.seconds, b));
     if (large)
         printf("time step            TOO LARGE in %" PRId64
-               " conditions; warnings below say why\n",
+               " conditions; see the warnings below\n",
                large);
     else printf("time step            ok\n");
 }
@@ -313,8 +313,8 @@ static void print_study(const bt_study *study, const numbers *sums, const bt_err
     if (study->ranks > 1) printf(", %" PRId64 " ranks each", study->ranks);
     printf("\n");
     if (fixed)
-        printf("                     in %" PRId64 " condition%s the ice does not depend on the seed, as it is read, or "
-               "there is none: the fields of each are one run\n",
+        printf("                     in %" PRId64 " condition%s no ice depends on the seed (ice from a file, or none): "
+               "the fields of each are one run\n",
                fixed, bt_plural(fixed));
     if (study->n_conditions <= MOST_ROWS) print_table(study, sums);
     else print_range(study, sums);

@@ -71,8 +71,8 @@ static void jobs_start(void *of, int n, int threads)
         const int error = posix_spawn(&pid, "/proc/self/exe", NULL, NULL, words, environ);
         jobs->pid[jobs->n++] = error == 0 ? pid : 0;
         if (error != 0)
-            bt_errors_warn("warning: job %d of %d could not be started: %s; the others take its members; to have as "
-                           "many, raise the limit on processes (ulimit -u), or ask for fewer with --jobs",
+            bt_errors_warn("warning: job %d of %d could not be started: %s; the others take over its members; raise "
+                           "the limit on processes (ulimit -u), or use fewer --jobs",
                            i + 2, n + 1, strerror(error));
     }
     unsetenv(mark);
@@ -91,8 +91,8 @@ static void jobs_end(void *of, bool stop)
         while (jobs->pid[i] > 0 && waitpid((pid_t)jobs->pid[i], &how, 0) < 0 && errno == EINTR) continue;
         // it has reported any other error itself
         if (!stop && WIFSIGNALED(how))
-            bt_errors_warn("warning: job %d of %d was ended by signal %d (%s); the others took its members over; where "
-                           "memory is short, ask for fewer jobs with --jobs",
+            bt_errors_warn("warning: job %d of %d was ended by signal %d (%s); the others took over its members; if "
+                           "memory is short, use fewer --jobs",
                            i + 2, jobs->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
     }
     jobs->n = 0;
@@ -131,22 +131,21 @@ static const struct argp_option ensemble_options[] = {
     {"output", 'o', "DIR", 0, "folder of the ensemble, default out/ and the name of the study without .yml", 0},
     {"threads", 't', "N", 0,
      "OpenMP threads of each rank, default run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node "
-     "shared by its ranks; results do not depend on it",
+     "divided among its ranks; results do not depend on it",
      0},
     {"jobs", 'j', "N", 0,
-     "processes on this machine that share the members; default as many as the cores are enough for, with one thread "
-     "for each 15,000 floes of a member, where no number of threads is given; always 1 under mpirun or srun, and with "
-     "--steps",
+     "processes on this machine that share the members; default: as many as fit on the cores, with one thread per "
+     "15,000 floes of a member unless the number of threads is given; always 1 under mpirun or srun, and with --steps",
      0},
-    {"steps", KEY_STEPS, "N", 0, "stop each member after N steps of this call; the same call goes on", 0},
+    {"steps", KEY_STEPS, "N", 0, "stop each member after N steps of this call; the same call continues", 0},
     {"max-wall", KEY_WALL, "TIME", 0,
-     "write checkpoints of the members at hand and stop after this wall time, as in 2h, 90min or 600; the same call "
-     "goes on",
+     "write checkpoints of the current members and stop after this wall time, as in 2h, 90min or 600; the same call "
+     "continues",
      0},
-    {"quiet", 'q', NULL, 0, "no line for each member", 0},
+    {"quiet", 'q', NULL, 0, "do not print a line for each member", 0},
     {"retry-failed", KEY_RETRY, NULL, 0, "try failed members again", 0},
     {"no-wait", KEY_LEAVE, NULL, 0,
-     "end when nothing is left to begin, with code 6 if other calls are still at work on members of the folder", 0},
+     "end when no member is left to start; exit code 6 if other calls are still running members of the folder", 0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
@@ -155,10 +154,10 @@ static const struct argp ensemble_argp = {
     .parser = parse,
     .args_doc = "STUDY.yml",
     .children = children,
-    .doc = "Run the members of a study, or those that are left of it: the same call goes on where an earlier one "
-           "ended, however it ended. Results that are missing or damaged are run again; the exit code is 0 only when "
-           "every member is finished and sound. Under mpirun the members are assigned to groups of ranks (`ranks` of "
-           "the study); several calls may work on one folder."};
+    .doc = "Run the members of a study. The same call continues where an earlier one ended, however it ended, and runs "
+           "members with missing or damaged results again. The exit code is 0 only when every member is finished and "
+           "sound. Under mpirun the members are assigned to groups of ranks (`ranks` of the study); several calls may "
+           "work on one folder."};
 
 int bt_cmd_ensemble(int argc, char **argv)
 {

@@ -37,15 +37,16 @@ static const struct argp estimate_argp = {.options = estimate_options,
                                           .parser = parse,
                                           .args_doc = "CASE.yml",
                                           .children = children,
-                                          .doc = "Print the resistance of broken ice by Lichey & Hellmer 2001, by "
-                                                 "three closures of Marchenko et al. 2010, in the dilute "
-                                                 "limit and by a regression of ships in pack ice, and the drag of open "
-                                                 "water, for the body, ice and speed of a case. Nothing is simulated."};
+                                          .doc = "Print estimates of the resistance of broken ice for the body, ice "
+                                                 "and speed of a case: by Lichey & Hellmer 2001, by three closures of "
+                                                 "Marchenko et al. 2010, in the dilute limit, and by a regression of "
+                                                 "ships in pack ice. Print the drag of open water, too. Nothing is "
+                                                 "simulated."};
 
 static void print_table(const options *opt, const bt_case *input, const bt_estimate_input *in)
 {
     printf("%s: estimates, nothing simulated\n", opt->file.path);
-    printf("ice                  concentration %.4g, thickness %.4g m, floe radius %.4g m (means weighted with area), "
+    printf("ice                  concentration %.4g, thickness %.4g m, floe radius %.4g m (means weighted by area), "
            "density %.4g kg/m3\n",
            in->concentration, in->thickness, in->floe_radius, in->ice_density);
     printf("body                 %.4g m across the tow%s, %.4g m/s through the ice%s\n", in->width,
@@ -84,7 +85,7 @@ int bt_cmd_estimate(int argc, char **argv)
     if (status == BT_OK && bt_case_reads_field(&input)) status = bt_field_load(&input, &field, &err);
     if (status == BT_OK && input.tow.mode == BT_TOW_NONE)
         status = bt_fail(&err, BT_ERR_CASE,
-            "%s: %s, and the estimates are of the force on a towed body; %s", opt.file.path,
+            "%s: %s, but the estimates are of the force on a towed body; %s", opt.file.path,
             input.body.shape == BT_BODY_ABSENT ? "body.shape: none" : "tow.mode: none",
             input.body.shape == BT_BODY_ABSENT ? "give it a body and a tow" : "set tow.mode and tow.speed");
     if (status == BT_OK) {

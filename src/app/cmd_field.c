@@ -37,10 +37,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option field_options[] = {
     {"output", 'o', "FILE", 0,
-     "file to write: HDF5 (FIELD.h5), or outlines on the map (FIELD.geojson): degrees where ice.origin_lon says where "
-     "the field is, otherwise metres east and north; or fixed floes, as a coast from a map (COAST.yml)",
+     "file to write: HDF5 (FIELD.h5), outlines on the map (FIELD.geojson, in degrees if ice.origin_lon places the "
+     "field, otherwise in metres east and north), or fixed floes, for example a coast from a map (COAST.yml)",
      0},
-    {"force", KEY_FORCE, NULL, 0, "replace a file of that name, whatever it is", 0},
+    {"force", KEY_FORCE, NULL, 0, "replace any file of that name", 0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
@@ -50,7 +50,7 @@ static const struct argp field_argp = {.options = field_options,
                                        .children = children,
                                        .doc = "Make the ice field of a case, or read it from its ice.outlines, and "
                                               "write it; another case reads it with ice.field or ice.outlines, or "
-                                              "has it as fixed floes with base."};
+                                              "includes it as fixed floes with base."};
 
 static bool ends_in(const char *path, const char *one, const char *other)
 {
@@ -92,16 +92,16 @@ int bt_cmd_field(int argc, char **argv)
         const double took = bt_clock() - start;
         if (input.lead.mode != BT_LEAD_NONE)
             bt_errors_add(&warnings,
-                          "lead.mode: %s: the file holds the ice without the lead; a run of the case that reads the "
-                          "file opens it",
+                          "lead.mode: %s: the file holds the ice without the lead; a run that reads the file opens the "
+                          "lead",
                           input.lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed");
         input.lead.mode = BT_LEAD_NONE; // no floe of this field is a piece: sizes are as drawn
         const bt_field_sizes sizes = bt_field_sizes_of(&input, &field);
         printf("%s: %d floes, concentration %.4f of %.6g m2, mean diameter %.4g m, %s in %.2f s\n", opt.output, field.n,
                field.concentration, field.ice_area, sizes.mean, bt_case_reads_field(&input) ? "read" : "made", took);
         if (field.strip > 0)
-            printf("  cut from a larger extent: floes within %.4g m of the cut, or across it, are those of this region "
-                   "alone\n", field.strip);
+            printf("  cut from a larger extent: floes within %.4g m of the cut, or across it, belong to this region "
+                   "only\n", field.strip);
         bt_outline_warn(&field.outlines, &input, &warnings);
         bt_field_size_warn(&input, &sizes, &warnings);
     }

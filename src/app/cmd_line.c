@@ -119,7 +119,7 @@ double bt_cmd_duration(const struct argp_state *state, const char *option, const
     double seconds = 0;
     char why[BT_WHY] = "";
     if (!bt_units_parse(text, BT_UNIT_TIME, &seconds, why)) argp_error(state, "%s %s: %s", option, text, why);
-    if (!(seconds > 0)) argp_error(state, "%s %s: give a time of more than 0, as in 2h, 90min or 600", option, text);
+    if (!(seconds > 0)) argp_error(state, "%s %s: give a time above 0, as in 2h, 90min or 600", option, text);
     return seconds;
 }
 
@@ -160,8 +160,8 @@ bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, b
     if (stat(case_path, &input) == 0 && there.st_dev == input.st_dev && there.st_ino == input.st_ino)
         bt_errors_add(err, "%s: is the case file itself; give the output another name", path);
     else if (!ours && !force && !(S_ISREG(there.st_mode) && there.st_size == 0))
-        bt_errors_add(err, "%s: is there already, and not known as a file of this command; give another name, or "
-                           "--force to replace it", path);
+        bt_errors_add(err, "%s: already exists and is not a file of this command; give another name, or --force to "
+                           "replace it", path);
     else return BT_OK;
     return BT_ERR_IO;
 }
@@ -171,7 +171,8 @@ bt_status bt_cmd_each_may_read(const bt_comm *comm, const char *path, bt_errors 
     struct stat s;
     const bool pipe = comm->size > 1 && stat(path, &s) == 0 && !S_ISREG(s.st_mode) && !S_ISDIR(s.st_mode);
     if (pipe)
-        bt_errors_add(err, "%s: is not a file, and each of the %d ranks would read it; write it to a file first", path,
+        bt_errors_add(err, "%s: is not a regular file, but each of the %d ranks must read it; write it to a file "
+                           "first", path,
                       comm->size);
     return bt_comm_agree(comm, pipe ? BT_ERR_USAGE : BT_OK);
 }
@@ -181,8 +182,8 @@ int bt_cmd_end(const bt_comm *comm, bt_status status, bt_errors *err)
     const bool lost = fflush(stdout) != 0 || ferror(stdout);
     if (lost)
         bt_errors_add(err,
-                      "standard output: cannot be written; give it a place with space, or a reader that stays to "
-                      "the end, or use the files of the result");
+                      "standard output: cannot be written; free some space, keep the reading program running to the "
+                      "end, or use the files of the result");
     if (lost && status == BT_OK) status = BT_ERR_IO;
     status = bt_comm_agree(comm, status);
     bt_comm_errors(comm, err);

@@ -44,7 +44,7 @@ static void refuse_case(const struct argp_state *state, const char *path)
     const bt_file_kind kind = bt_case_kind_of(path);
     if (kind == BT_FILE_CASE) argp_error(state, "%s: this is a case: bergtow run %s", path, path);
     if (kind == BT_FILE_STUDY)
-        argp_error(state, "%s: this is a study, which its own call resumes: bergtow ensemble %s", path, path);
+        argp_error(state, "%s: this is a study; resume it with bergtow ensemble %s", path, path);
 }
 
 static error_t parse(int key, char *arg, struct argp_state *state)
@@ -74,16 +74,16 @@ static const struct argp_option resume_options[] = {
      "not depend on it", 0},
     {"steps", KEY_STEPS, "N", 0, "stop after N more steps", 0},
     {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600", 0},
-    {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
+    {"quiet", 'q', NULL, 0, "print neither progress nor the final table", 0},
     {0},
 };
 static const struct argp resume_argp = {.options = resume_options,
                                         .parser = parse,
                                         .args_doc = "DIR",
                                         .doc =
-                                            "Go on with the run in the result folder DIR from its last checkpoint, on "
-                                            "any number of ranks and threads: the result is that of a run that was "
-                                            "never stopped. In place of DIR a checkpoint file in it may be given."};
+                                            "Continue the run in the result folder DIR from its last checkpoint, on "
+                                            "any number of ranks and threads. The result is that of a run that was "
+                                            "never stopped. DIR may also be a checkpoint file in the folder."};
 
 int bt_cmd_resume(int argc, char **argv)
 {
@@ -127,9 +127,8 @@ static error_t parse_two(int key, char *arg, struct argp_state *state)
 static const struct argp diff_argp = {
     .parser = parse_two,
     .args_doc = "A [B]",
-    .doc = "Name the first difference between the states of two checkpoints (files, or the folders they are in); of "
-           "one, print what it holds. Exit code 0: the same, "
-           "1: different."};
+    .doc = "Name the first difference between the states of two checkpoints (files or their folders), or print the "
+           "contents of one. Exit code 0: the same, 1: different."};
 
 int bt_cmd_diff(int argc, char **argv)
 {

@@ -61,9 +61,9 @@ static const struct argp_option run_options[] = {
      0},
     {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
     {"max-wall", KEY_WALL, "TIME", 0,
-     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume goes on", 0},
-    {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
-    {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds, and the file of --dump-contacts", 0},
+     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume continues", 0},
+    {"quiet", 'q', NULL, 0, "print neither progress nor the final table", 0},
+    {"force", KEY_FORCE, NULL, 0, "replace the result in the folder, and the file of --dump-contacts", 0},
     {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
     {0},
 };

@@ -29,19 +29,19 @@ static const struct {
     {"field", "make the ice field of a case only", bt_cmd_field, false, true},
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
      true, true},
-    {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
+    {"converge", "find out how a result depends on the computation: width, length, time step, tolerance, start",
      bt_cmd_python, false, false},
-    {"budget", "find out how much of the scatter is of the fields, of each assumed value, of the computation",
+    {"budget", "find out how much of the scatter comes from the fields, each assumed value, and the computation",
      bt_cmd_python, false, false},
-    {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it",
+    {"capability", "find out how fast a vessel tows in which ice, and what ice stops it",
      bt_cmd_python, false, false},
-    {"design", "from a case or a study to the report of the design tow force, as a page and as PDF",
+    {"design", "write the report of the design tow force of a case or a study, as a page and as PDF",
      bt_cmd_python, false, false},
-    {"route", "plan the way and the speed of a tow through known ice, and verify them by tows",
+    {"route", "plan the path and the speed of a tow through known ice, and verify them by simulated tows",
      bt_cmd_python, false, false},
-    {"outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines",
+    {"outlines", "convert a map of the ice (outlines or an image of labels) into floes for ice.outlines",
      bt_cmd_python, false, false},
-    {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true, true},
+    {"resume", "continue a run from its last checkpoint", bt_cmd_resume, true, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false, false},
     {"report", "write the report of a run, with a replay, or of an ensemble, as a page or as PDF",
@@ -50,7 +50,7 @@ static const struct {
      bt_cmd_python, false, false},
     {"export", "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, trajectories",
      bt_cmd_python, false, false},
-    {"contents", "list what the folder of a run holds", bt_cmd_python, false, false},
+    {"contents", "list the contents of the folder of a run", bt_cmd_python, false, false},
     {"film", "make a film of a run", bt_cmd_python, false, false},
     {"plot-force", "draw the forces of a run against time", bt_cmd_python, false, false},
     {"plot-field", "draw the ice field before, during and after the tow", bt_cmd_python, false, false},
@@ -83,11 +83,10 @@ static void print_help(FILE *out)
     fputs("Usage: bergtow COMMAND [OPTION...]\n"
           "Simulate a body, such as an iceberg, that is towed through broken sea ice.\n\n", out);
     for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-15s %s\n", commands[i].name, commands[i].summary);
-    fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n"
-          "  --list-quantities  the numbers that a run leaves: series, summary, estimates, with units and meaning; "
-          "--json too\n"
-          "  --version    version, revision, compiler and MPI\n"
-          "  --help       this text; bergtow COMMAND --help, or bergtow help COMMAND, for the options of a command\n\n"
+    fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n  "
+          "--list-quantities  the numbers that a run writes: series, summary, estimates, with units and meaning; "
+          "--json too\n  --version    version, revision, compiler and MPI\n  --help       this text; bergtow COMMAND "
+          "--help, or bergtow help COMMAND, for the options of a command\n\n"
           "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
           "6 stopped on a signal or a limit, with a checkpoint.\n",
           out);

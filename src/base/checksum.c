@@ -71,7 +71,7 @@ bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST]
     if (!reason && !odd && !digest(fd, st.st_size, out)) reason = errno;
     if (fd >= 0) close(fd);
     if (gone || odd)
-        return bt_fail(err, BT_ERR_CASE, "%s: %s", path, gone ? "is missing" : "is no regular file");
+        return bt_fail(err, BT_ERR_CASE, "%s: %s", path, gone ? "is missing" : "is not a regular file");
     *bytes = reason ? 0 : (int64_t)st.st_size;
     return reason ? bt_file_fail(path, "read the file", reason, err) : BT_OK;
 }
@@ -132,23 +132,24 @@ static bt_status refuse(const char *path, const char *kind, const ends *e, bt_er
     const off_t end = end_of_hdf5(e);
     const bool ends_there = end >= 0 && end != e->size;
     if (*found && strncmp(found, kind, word + 1))
-        bt_errors_add(err, "%s: is a %.*s file, and a %.*s file is needed here; give the right one", path,
+        bt_errors_add(err, "%s: is a %.*s file, but a %.*s file is needed here; give the right one", path,
                       (int)strcspn(found, " "), found, (int)word, kind);
     else if (*found && strcmp(found, kind))
-        bt_errors_add(err, "%s: has the format \"%s\", this program reads \"%s\"; use the program that wrote it", path,
+        bt_errors_add(err, "%s: has the format \"%s\", but this program reads \"%s\"; use the program that wrote "
+                           "it", path,
                       found, kind);
     else if (!seal && ends_there && e->size < end + BT_CHECKSUM_BYTES)
-        bt_errors_add(err, "%s: is cut off: %lld of %lld bytes are there; take another copy of it", path,
+        bt_errors_add(err, "%s: is truncated: only %lld of %lld bytes are there; use another copy of it", path,
                       (long long)e->size, (long long)end + BT_CHECKSUM_BYTES);
     else if (!seal && end == e->size)
         bt_errors_add(err,
-                      "%s: has no seal at its end: it is cut off there, or another program has changed or written it; "
-                      "take another copy of it",
+                      "%s: has no seal at its end: it is truncated, or another program has changed or written it; use "
+                      "another copy of it",
                       path);
     else if (!seal && end < 0)
         bt_errors_add(err, "%s: is not this program's %.*s file, or is damaged; give the right one, or another copy",
                       path, (int)word, kind);
-    else bt_errors_add(err, "%s: is damaged: its bytes do not fit their digest; take another copy of it", path);
+    else bt_errors_add(err, "%s: is damaged: its bytes do not match their digest; use another copy of it", path);
     return BT_ERR_CASE;
 }
 

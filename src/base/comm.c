@@ -92,7 +92,7 @@ static void on_mpi_error(MPI_Comm *mpi, int *code, ...)
     char text[MPI_MAX_ERROR_STRING] = "unknown error";
     int length;
     MPI_Error_string(*code, text, &length);
-    fprintf(stderr, "bergtow: rank %d: MPI: %s; the other ranks are ended; start the run again\n", world.rank, text);
+    fprintf(stderr, "bergtow: rank %d: MPI: %s; the other ranks end, too; start the run again\n", world.rank, text);
     bt_comm_abort(BT_ERR_NUMERIC);
 }
 
@@ -182,8 +182,9 @@ static bool knows_all(const bt_launcher *by)
     if (size > 1 || by->size < 2) return true;
     char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
     if (by->first)
-        fprintf(stderr, "bergtow: %d processes were started, but each is alone: this program was built with %s; start "
-                "it with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work apart)\n",
+        fprintf(stderr, "bergtow: %d processes were started, but each runs alone: this program was built with %s; "
+                "start it with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work "
+                "separately)\n",
                 by->size, bt_comm_library(mpi));
     else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // else the launcher ends rank 0 in mid-message
     MPI_Finalize();
@@ -402,7 +403,7 @@ static bt_status put_in_order(int64_t from, int64_t count, int64_t n, const bt_g
     for (int64_t i = 0; i < n; i++) {
         const int64_t at = gid[i] - from;
         if (at < 0 || at >= count) {
-            bt_errors_add(err, "a body has the id %lld, which does not exist; please report this case",
+            bt_errors_add(err, "a body has the unknown id %lld; please report this case",
                           (long long)gid[i]);
             wrong = true;
             continue;

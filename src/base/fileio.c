@@ -153,8 +153,8 @@ static int open_input(const char *path, const char *what, bool text, bool stream
     else if (S_ISDIR(st.st_mode)) bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
     else
         bt_errors_add(err,
-                      "%s: is %s, not a regular file, and is not opened; write its output to a file, and give the path "
-                      "of that as %s",
+                      "%s: is %s, not a regular file, and is not opened; write its output to a file, and give that "
+                      "file as %s",
                       path, kind, what);
     return -1;
 }
@@ -357,8 +357,8 @@ static void tell_holder(int fd, const char *dir, bt_errors *err)
     const ssize_t n = pread(fd, who, sizeof who - 1, 0);
     who[n > 0 ? n : 0] = 0;
     who[strcspn(who, "\n")] = 0;
-    bt_errors_add(err, "%s: another run is at work in this folder (%s); wait for its end, or give another folder", dir,
-                  *who ? who : "it has not said who");
+    bt_errors_add(err, "%s: another run is using this folder (%s); wait until it ends, or give another folder", dir,
+                  *who ? who : "of an unknown process");
 }
 
 int bt_lock_take(const char *dir, bool *busy, bt_errors *err) { return bt_lock_take_file(dir, "run.lock", busy, err); }

@@ -17,8 +17,8 @@ static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, voi
     const whole *w = data;
     if (info->type != H5L_TYPE_HARD) {
         bt_errors_add(w->err,
-                      "%s: holds what this program does not write: /%.200s is %s link, which can lead to any other "
-                      "file and is not followed; store the data itself there",
+                      "%s: holds data that this program does not write: /%.200s is %s link. A link can lead to any "
+                      "other file and is not followed; store the data itself there",
                       w->path, name,
                       info->type == H5L_TYPE_SOFT       ? "a soft"
                       : info->type == H5L_TYPE_EXTERNAL ? "an external"
@@ -38,7 +38,7 @@ static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, voi
     H5Oclose(o);
     if (kind)
         bt_errors_add(w->err,
-                      "%s: holds what this program does not write: /%.200s is %s, whose numbers lie in another file "
+                      "%s: holds data that this program does not write: /%.200s is %s. Its numbers lie in another file "
                       "and are not read; store them in this file",
                       w->path, name, kind);
     return kind != NULL;
@@ -48,7 +48,7 @@ bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
 {
     const herr_t found = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, look_at, &(whole){path, err});
     if (found < 0)
-        bt_errors_add(err, "%s: is cut off or damaged: HDF5 cannot list its objects; write it again", path);
+        bt_errors_add(err, "%s: is truncated or damaged: HDF5 cannot list its objects; write it again", path);
     return found == 0 ? BT_OK : BT_ERR_CASE;
 }
 
@@ -66,8 +66,8 @@ void bt_h5_fail(bt_h5_reader *reader, const char *why)
 static void fail(bt_h5_reader *reader, const char *name)
 {
     char why[300];
-    snprintf(why, sizeof why, "%.100s cannot be read or has another shape than expected; use the program that wrote "
-             "the file", name);
+    snprintf(why, sizeof why, "%.100s cannot be read or has an unexpected shape; use the program that wrote the "
+             "file", name);
     bt_h5_fail(reader, why);
 }
 

@@ -13,19 +13,19 @@ void bt_largest_print(FILE *out)
         const char *unit;
     } rows[] = {
         {"case or study file", BT_MOST_TEXT_BYTES, "bytes"},
-        {"files that a case is based on", BT_MOST_BASES, ""},
+        {"base files of a case", BT_MOST_BASES, ""},
         {"its nesting", BT_TREE_DEPTH, "levels"},
         {"its values", BT_TREE_NODES, "in all"},
         {"keys of one section", BT_TREE_MAP, ""},
         {"a text", BT_MAX_TEXT, "bytes"},
-        {"floes by hand", BT_MAX_FLOES_BY_HAND, "floes"},
+        {"floes given by hand", BT_MAX_FLOES_BY_HAND, "floes"},
         {"tow.programme, tow.waypoints", BT_MOST_POINTS, "points each"},
         {"corners of a polygon", BT_MAX_VERTICES, "vertices"},
         {"floes, made or read", BT_MOST_FLOES, "floes"},
         {"steps", BT_MOST_STEPS, "steps"},
         {"frames", BT_MOST_FRAMES, "frames"},
         {"series and frames of a run", BT_MOST_RESULT_BYTES, "bytes, estimated"},
-        {"work of a run", BT_MOST_CORE_SECONDS, "s of one core, estimated"},
+        {"work of a run", BT_MOST_CORE_SECONDS, "s on one core, estimated"},
         {"CSV table", BT_MOST_TABLE_BYTES, "bytes"},
         {"its rows", BT_MOST_ROWS, "rows"},
         {"GeoJSON file", BT_MOST_OUTLINE_BYTES, "bytes"},
@@ -34,7 +34,7 @@ void bt_largest_print(FILE *out)
         {"parameters of a study", BT_MAX_PARAMETERS, ""},
         {"values of one parameter", BT_MOST_VALUES, ""},
         {"members of a study", BT_MAX_MEMBERS, "members"},
-        {"errors of one case that are reported", BT_MOST_COMPLAINTS, "errors"},
+        {"errors reported for one case", BT_MOST_COMPLAINTS, "errors"},
     };
     const struct {
         const char *what;
@@ -45,12 +45,13 @@ void bt_largest_print(FILE *out)
         {"mean size of the floes", BT_LEAST_SIZE, "m"},
         {"thickness of a floe", BT_LEAST_THICKNESS, "m"},
     };
-    fputs("\nWhat is refused as too large, with the remedy. Beyond these, a run that needs more memory than the "
-          "machine has is refused before it begins.\n\n",
+    fputs("\n"
+          "The program refuses anything beyond these limits, and names a remedy. It also refuses, before it begins, a "
+          "run that needs more memory than the machine has.\n\n",
           out);
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         fprintf(out, "%-40s %12.10g %s\n", rows[i].what, rows[i].most, rows[i].unit);
-    fputs("\nWhat is refused as too small to be ice.\n\n", out);
+    fputs("\nThe program refuses anything below these limits as too small to be ice.\n\n", out);
     for (size_t i = 0; i < sizeof floors / sizeof *floors; i++)
         fprintf(out, "%-40s %12.10g %s\n", floors[i].what, floors[i].least, floors[i].unit);
 }

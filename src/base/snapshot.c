@@ -117,7 +117,7 @@ void bt_snapshot_want(bt_snapshot *snap, bool good, const char *name, int64_t ro
     char where[32] = "";
     if (row >= 0) snprintf(where, sizeof where, ", row %" PRId64 ",", row);
     if (!snap->faulty && snap->err)
-        bt_errors_add(snap->err, "%s: /%s%s %s; no run writes that: take another checkpoint, or start the run again",
+        bt_errors_add(snap->err, "%s: /%s%s %s; no run writes that: use another checkpoint, or start the run again",
                       snap->path ? snap->path : "checkpoint", name, where, what);
     snap->faulty = true;
 }
@@ -134,7 +134,7 @@ static const bt_item *demand(bt_snapshot *snap, const char *name, bt_item_type t
     const bt_item *item = bt_snapshot_find(snap, name);
     if (!item) complain(snap, name, "is missing");
     else if (item->type != type || item->width != width || (n >= 0 && item->n != n))
-        complain(snap, name, "has another shape than expected");
+        complain(snap, name, "has an unexpected shape");
     else if (type == BT_ITEM_U8 && !yes_and_no(item))
         bt_snapshot_want(snap, false, name, -1, "holds values other than 0 and 1");
     else return item;

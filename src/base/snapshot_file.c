@@ -245,7 +245,7 @@ bt_status bt_snapshot_read(bt_snapshot *snap, const char *path, bt_errors *err)
     bt_h5_reader reader;
     if (bt_h5_open(&reader, path, BT_CHECKSUM_CHECKPOINT, err) != BT_OK) return bt_h5_end(&reader);
     if (H5Literate(reader.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, snap) < 0)
-        bt_h5_fail(&reader, "holds what this program does not write; use the program that wrote it");
+        bt_h5_fail(&reader, "holds data that this program does not write; use the program that wrote it");
     const bt_status status = bt_h5_end(&reader);
     if (status != BT_OK) bt_snapshot_free(snap);
     return status;

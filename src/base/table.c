@@ -46,7 +46,7 @@ static const char *read_row(char *line, double row[3], char why[BT_WHY])
 {
     for (int i = 0; i < 3; i++) {
         char *comma = strchr(line, ',');
-        if ((comma == NULL) != (i == 2)) return "has not three columns; write t,u,v";
+        if ((comma == NULL) != (i == 2)) return "needs three columns; write t,u,v";
         if (comma) *comma = 0;
         if (!bt_units_parse(line, i == 0 ? BT_UNIT_TIME : BT_UNIT_SPEED, &row[i], why)) return why;
         if (i > 0 && fabs(row[i]) > largest_speed) return "a speed is out of range; give a value in [-100, 100] m/s";
@@ -77,7 +77,7 @@ static void read_lines(bt_table *table, char *rest, const char *end, const char 
     for (int number = 1; err->n - before < MOST_COMPLAINTS && (line = next_line(&rest, end, &length)); number++) {
         if (length > LONGEST_LINE || strlen(line) != length) {
             bt_errors_add(err, "%s:%d: %s; write t,u,v in each line", path, number,
-                          length > LONGEST_LINE ? "is longer than a row of a table can be" : "holds a NUL character");
+                          length > LONGEST_LINE ? "is too long for a row of a table" : "contains a NUL character");
             return;
         }
         char *text = trimmed(line);
@@ -92,13 +92,13 @@ static void read_lines(bt_table *table, char *rest, const char *end, const char 
         double row[3];
         const char *fault = read_row(text, row, why);
         if (!fault && table->n && !(row[0] > table->row[3 * (table->n - 1)]))
-            fault = "its time is not after that of the row before; sort the rows and remove doubles";
+            fault = "its time is not later than that of the row before; sort the rows and remove duplicates";
         if (fault) {
             bt_errors_add(err, "%s:%d: %s", path, number, fault);
             continue;
         }
         if (table->n == BT_MOST_ROWS) {
-            bt_errors_add(err, "%s:%d: more than %d rows; take longer steps between them", path, number, BT_MOST_ROWS);
+            bt_errors_add(err, "%s:%d: more than %d rows; use longer steps between them", path, number, BT_MOST_ROWS);
             return;
         }
         if (table->n == cap)
@@ -106,7 +106,7 @@ static void read_lines(bt_table *table, char *rest, const char *end, const char 
         memcpy(table->row + 3 * table->n++, row, sizeof row);
     }
     if (err->n == before && table->n == 0)
-        bt_errors_add(err, "%s: holds no row; write the header t,u,v and below it a row for each time", path);
+        bt_errors_add(err, "%s: has no rows; write the header t,u,v and below it a row for each time", path);
 }
 
 bt_status bt_table_read(bt_table *table, const char *path, bt_errors *err)

@@ -69,7 +69,7 @@ static int colon_missing(const text_line *line, int number, char *why)
     if (!n || strchr("-[]{},\"'#", *text)) return 0; // no key begins with these
     with_colon(text, n, right);
     if (word < n && text[word] == ':')
-        snprintf(why, BT_SYNTAX_WHY, "a blank is missing after the colon; write %s", right);
+        snprintf(why, BT_SYNTAX_WHY, "a space is missing after the colon; write %s", right);
     else snprintf(why, BT_SYNTAX_WHY, "a colon is missing after the key; write %s", right);
     return number;
 }
@@ -93,8 +93,8 @@ static int colon_out_of_place(const bt_syntax *syntax, char *why)
     const size_t colon = key_end(&here, 0);
     if (colon < here.n && key_end(&here, colon + 1) < here.n) {
         snprintf(why, BT_SYNTAX_WHY,
-                 "two keys in one line; write the second below the first, both in { } with a comma between them, or a "
-                 "text with a colon in quotes");
+                 "two keys on one line; write the second below the first, put both in { } with a comma between them, "
+                 "or put a text with a colon in quotes");
         return syntax->line;
     }
     if (!above || here.blank <= line.blank) return 0;
@@ -108,7 +108,8 @@ static int syntax_explain(const bt_syntax *syntax, char why[BT_SYNTAX_WHY])
 {
     const text_line here = line_of(syntax, syntax->line);
     if (memchr(here.begin, '\t', here.blank)) {
-        snprintf(why, BT_SYNTAX_WHY, "the line begins with a tab; YAML is indented by blanks alone, write two blanks");
+        snprintf(why, BT_SYNTAX_WHY, "the line begins with a tab, but YAML is indented by spaces only; write two "
+                                     "spaces");
         return syntax->line;
     }
     if (strstr(syntax->problem, "could not find expected ':'") && syntax->begun) {
@@ -218,10 +219,10 @@ static bool plain_event(parser *yaml, const yaml_event_t *e, int line)
     if (e->type == YAML_ALIAS_EVENT || anchor)
         return refuse(yaml, line,
                       "anchors and aliases (& and *) are not read in a case file; write the value out, or quote a text "
-                      "that begins so");
+                      "that begins with one of these");
     if (tag)
         return refuse(yaml, line,
-                      "tags (!) are not read in a case file; remove the tag, or quote a text that begins so");
+                      "tags (!) are not read in a case file; remove the tag, or quote a text that begins with !");
     return true;
 }
 
@@ -240,9 +241,9 @@ static void read_map(parser *yaml, bt_node *map, int depth)
         bool good = plain_event(yaml, &e, line);
         if (good && e.type != YAML_SCALAR_EVENT) good = refuse(yaml, line, "a key must be a word; write key: value");
         if (good && memchr(e.data.scalar.value, 0, e.data.scalar.length))
-            good = refuse(yaml, line, "a key holds a NUL character; remove it");
+            good = refuse(yaml, line, "a key contains a NUL character; remove it");
         if (good && map->n >= BT_TREE_MAP)
-            good = refuse(yaml, line, "more than 256 keys in one map; see bergtow --list-keys for the keys there are");
+            good = refuse(yaml, line, "more than 256 keys in one map; see bergtow --list-keys for all known keys");
         char *key = good ? copy_text(e.data.scalar.value, e.data.scalar.length) : NULL;
         yaml_event_delete(&e);
         if (!good) return;
@@ -304,7 +305,7 @@ static bt_node *read_node(parser *yaml, const yaml_event_t *first, int depth)
         node->kind = BT_NODE_SCALAR;
         node->plain = first->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
         if (memchr(first->data.scalar.value, 0, first->data.scalar.length))
-            refuse(yaml, line, "a text holds a NUL character; remove it");
+            refuse(yaml, line, "a text contains a NUL character; remove it");
         node->text = copy_text(first->data.scalar.value, first->data.scalar.length);
     }
     return node;
@@ -319,7 +320,7 @@ static bt_node *read_document(parser *yaml)
         if (!next(yaml, &e)) break;
         if (e.type == YAML_STREAM_END_EVENT) end = true;
         else if (e.type == YAML_DOCUMENT_START_EVENT && ++n_documents > 1)
-            refuse(yaml, (int)e.start_mark.line + 1, "a second document begins (---); keep one case in a file");
+            refuse(yaml, (int)e.start_mark.line + 1, "a second document begins (---); keep only one case in a file");
         else if (e.type == YAML_SCALAR_EVENT || e.type == YAML_MAPPING_START_EVENT ||
                  e.type == YAML_SEQUENCE_START_EVENT || e.type == YAML_ALIAS_EVENT)
             root = read_node(yaml, &e, 0);

@@ -135,7 +135,7 @@ static bool refuse_unit(const char *number, size_t n_number, const char *symbol,
         snprintf(why, BT_WHY, "\"%.*s%s\" after the number; give a plain number, as in %.*s", shown, symbol, cut,
                  digits, number);
     else if (other)
-        snprintf(why, BT_WHY, "%s is the unit of %s and this is %s; use %s", other->symbol, kinds[other->kind].noun,
+        snprintf(why, BT_WHY, "%s is the unit of %s, but this is %s; use %s", other->symbol, kinds[other->kind].noun,
                  kinds[kind].noun, known);
     else
         snprintf(why, BT_WHY, "\"%.*s%s\" is not a unit of %s; use %s", shown, symbol, cut,
@@ -158,7 +158,8 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
         const bool decimals = !memchr(text, '.', n) && strspn(symbol + 1, "0123456789") != 3; // else thousands, perhaps
         char mended[64] = "";
         if (decimals) snprintf(mended, sizeof mended, ", as in %.*s.%.20s", n > 20 ? 20 : (int)n, text, symbol + 1);
-        snprintf(why, BT_WHY, "%.40s has a comma; write decimals with a point%s, and no sign between thousands", text,
+        snprintf(why, BT_WHY, "%.40s has a comma; write decimals with a point%s, and thousands without a "
+                              "separator", text,
                  mended);
         return false;
     }
@@ -177,13 +178,13 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
         unit = find_unit(kinds[kind].bare, strlen(kinds[kind].bare), kind);
     }
     if (number == 0 && strcspn(text, "123456789") < strcspn(text, "eE") && strcspn(text, "123456789") < n) {
-        snprintf(why, BT_WHY, "%.*s is too small for a number of this program; give 0, or at least 1e-300",
+        snprintf(why, BT_WHY, "%.*s is too small a number; give 0, or at least 1e-300",
                  n > 40 ? 40 : (int)n, text);
         return false;
     }
     double si = unit ? number * unit->up / unit->down : number;
     if (!isfinite(si)) {
-        snprintf(why, BT_WHY, "%.*s is too large for a number of this program; give at most 1e308",
+        snprintf(why, BT_WHY, "%.*s is too large a number; give at most 1e308",
                  n > 40 ? 40 : (int)n, text);
         return false;
     }

@@ -106,16 +106,15 @@ void bt_arch_warn(const bt_arch *arch, bt_errors *warnings)
 {
     if (arch->possible)
         bt_warn(warnings, BT_WARN_NARROW_DOMAIN,
-                      "%s: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
-                      "resistance is also a property of "
-                      "that width; take at least %g body widths (assumed), or compare widths",
+                      "%s: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the resistance also depends "
+                      "on that width; use at least %g body widths (assumed), or compare widths",
                       arch->key, arch->bodies, 100 * arch->concentration, arch->sides, bt_arch_floes(arch),
                       arch->needed);
     if (arch->water > 0)
         bt_warn(warnings, BT_WARN_ICE_STRIP,
                       "%s: %.4g m of open water beside the tow, where the ice ends before the domain does: floes are "
                       "pushed out into it, and the resistance is that of a strip of ice; leave both keys out to fill "
-                      "the domain, unless that is meant",
+                      "the domain, unless that is intended",
                       arch->region, arch->water);
     if (arch->gap > 0)
         bt_warn(warnings, BT_WARN_ICE_GAP,
@@ -124,10 +123,10 @@ void bt_arch_warn(const bt_arch *arch, bt_errors *warnings)
                       arch->gap);
     if (arch->unbounded)
         bt_warn(warnings, BT_WARN_LOAD_UNBOUNDED,
-                      "ice.concentration: %.0f %% of %s: from some %.0f %% on (assumed) they lock, and their "
-                      "load has no upper bound; read it as a property of this model, or let floes raft "
-                      "(ice.rafting.kappa, 10 to 34) or crush (ice.crushing.pressure)",
+                      "ice.concentration: %.0f %% of %s: above about %.0f %% (assumed) they lock, and their load has "
+                      "no upper bound; read it as a property of this model, or let floes raft (ice.rafting.kappa, 10 "
+                      "to 34) or crush (ice.crushing.pressure)",
                       100 * arch->concentration,
-                      arch->splits ? "floes that split, into pieces that are rigid" : "rigid floes",
+                      arch->splits ? "floes that split into rigid pieces" : "rigid floes",
                       100 * BT_BOUND_CONCENTRATION);
 }

@@ -16,8 +16,8 @@ const bt_key bt_base_key = {
     .name = "base",
     .type = BT_KEY_TEXT,
     .preset = "none",
-    .doc = "a case file whose keys hold where this file says nothing; relative to the folder of this file, as are the "
-           "files that each of the two names",
+    .doc = "a case file whose keys apply where this file gives none; paths in either file are relative to the folder "
+           "of that file",
 };
 
 static const bt_node *entry(const bt_node *root, const char *key, int *line)
@@ -135,10 +135,12 @@ static bt_status read_base(bt_case_files *files, const bt_node *value, int line,
     size_t size = 0;
     bt_errors why = {0};
     if (twin)
-        bt_errors_add(err, "%s:%d: base: %s is read already: it, or its base, leads here; remove one of these keys",
+        bt_errors_add(err, "%s:%d: base: %s is being read already: it, or its base, leads back here; remove one of "
+                           "these keys",
                       from, line, twin->path);
     else if (files->n > BT_MOST_BASES)
-        bt_errors_add(err, "%s:%d: base: more than %d files, each based on the next; write the keys into fewer", from,
+        bt_errors_add(err, "%s:%d: base: more than %d files, each based on the next; write the keys into fewer "
+                           "files", from,
                       line, BT_MOST_BASES);
     else status = bt_file_read_to(path, "a case file", BT_MOST_TEXT_BYTES, &text, &size, &why);
     for (size_t i = 0; i < why.n; i++) bt_errors_add(err, "%s:%d: base: %s", from, line, why.text[i]);

@@ -166,7 +166,7 @@ static void check_at_sea(const bt_check *check, bool by_hand)
         }
         if (may_miss(input, row->name, by_hand)) continue;
         if (is_basin(input))
-            bt_check_fault(check, row->name, "is none where a value is needed; give it (%s)", row->at_sea);
+            bt_check_fault(check, row->name, "is none, but a value is needed; give it (%s)", row->at_sea);
         else
             bt_check_fault(check, row->name,
                            "missing, and in domain.frame: geographic it has no default (that would be a model "
@@ -186,11 +186,12 @@ static void check_run(const bt_check *check)
     double steps = (double)bt_case_steps(input);
     if (steps > BT_MOST_STEPS)
         bt_check_fault(check, "run.dt",
-                       "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run",
+                       "makes %.3g steps of run.duration, more than the limit of %d; lengthen the step or shorten the "
+                       "run",
                        steps, BT_MOST_STEPS);
     if (bt_check_sound(check, "output.frame_interval") && input->run.duration / input->output.frame_interval >
         BT_MOST_FRAMES)
-        bt_check_fault(check, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it",
+        bt_check_fault(check, "output.frame_interval", "makes %.3g frames, more than the limit of %d; lengthen it",
                        input->run.duration / input->output.frame_interval, BT_MOST_FRAMES);
 }
 
@@ -234,7 +235,7 @@ static void check_floes_made(const bt_check *check)
     const double n = bt_case_floes_made(input);
     if (n > BT_MOST_FLOES)
         bt_check_fault(check, power ? "ice.size_min" : "ice.size",
-                       "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n,
+                       "makes about %.3g floes, more than the limit of %d; use larger floes or a smaller region", n,
                        BT_MOST_FLOES);
 }
 
@@ -262,11 +263,11 @@ static bool check_body(const bt_check *check, int *n, double *v)
                too_wide = bounds.y_max - bounds.y_min >= input->domain.width;
     if (too_long)
         bt_check_fault(check, extent,
-                       "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length",
+                       "the body spans %g m along x in a domain of %g m; use a smaller body or a larger domain.length",
                        bounds.x_max - bounds.x_min, input->domain.length);
     if (too_wide)
         bt_check_fault(check, extent,
-                       "the body spans %g m along y in a domain of %g m; take a smaller body or a larger domain.width",
+                       "the body spans %g m along y in a domain of %g m; use a smaller body or a larger domain.width",
                        bounds.y_max - bounds.y_min, input->domain.width);
     if (too_long || too_wide) return false;
     char axis = outside(input, bounds, input->body.x, input->body.y);
@@ -344,7 +345,7 @@ static void check_path(const bt_check *check, int n, const double *v)
     if (isinf(reach)) return;
     const double time = bt_case_tow_last(input, reach);
     bt_check_fault(check, "run.duration",
-                   "the tow is %g m long and a wall stands in its way after %g m; shorten the run to %g s, or slow the "
+                   "the tow is %g m long and a wall is in its way after %g m; shorten the run to %g s, or slow the "
                    "tow, or enlarge the domain",
                    way, reach, time);
 }
@@ -405,7 +406,7 @@ static void check_floe(const bt_check *check, int index)
     bool polygon = floe->shape == BT_BODY_POLYGON;
     const size_t before = check->err->n;
     if (polygon && !floe->n_vertices)
-        bt_errors_add(check->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
+        bt_errors_add(check->err, "%s: has shape polygon but no vertices; give them as [[x, y], [x, y], ...]", where);
     if (!polygon && floe->n_vertices)
         bt_errors_add(
             check->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices",
@@ -436,7 +437,7 @@ static void check_floe(const bt_check *check, int index)
                long_y = input->domain.sides == BT_BOUND_PERIODIC && bounds.y_max - bounds.y_min >= input->domain.width;
     if (long_x || long_y)
         bt_errors_add(check->err,
-                      "%s: spans more than the period of the domain in %c; take a shorter floe or a larger domain",
+                      "%s: spans more than the period of the domain in %c; use a shorter floe or a larger domain",
                       where, long_x ? 'x' : 'y');
     // A fixed body may stand in a wall, as a pier does.
     if (floe->fixed) bounds = (box){floe->x, floe->x, floe->y, floe->y};
@@ -500,13 +501,13 @@ void bt_case_warn_body(const bt_case *input, bt_errors *warnings)
     const double height = least_gyration2(n, v) / input->body.draft - 0.5 * input->body.sail;
     if (input->body.draft <= BT_ODD_DRAFT * least && height < 0 && input->domain.frame == BT_FRAME_GEOGRAPHIC)
         bt_warn(warnings, BT_WARN_BERG_STABILITY,
-                "body.draft: %g m and a sail of %.4g m: a column of ice with this waterline would roll over, its "
-                "metacentric height is %.3g m, at a least width of %.4g m; check them, or expect a berg with a foot",
+                "body.draft: %g m with a sail of %.4g m: a column of ice with this waterline would roll over "
+                "(metacentric height %.3g m, least width %.4g m); check them, or expect a berg with a foot",
                 input->body.draft, input->body.sail, height, least);
     if (input->body.draft > BT_ODD_DRAFT * least)
         bt_warn(warnings, BT_WARN_ODD_DRAFT,
-                "body.draft: %g m is %.3g times the least width of the body, %.4g m, which would capsize; check both, "
-                "and their units",
+                "body.draft: %g m is %.3g times the least width of the body, %.4g m, so the body would capsize; check "
+                "both, and their units",
                 input->body.draft, input->body.draft / least, least);
     if (input->impact.conversion == BT_IMPACT_DURATION && input->impact.duration > BT_LONG_IMPACT * input->run.dt)
         bt_warn(warnings, BT_WARN_LONG_IMPACT,

@@ -31,11 +31,11 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
 {
     const size_t before = err->n;
     if (!name || !bt_is_name(name, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "shape \"%s\": the name must be of lower-case letters, digits and _, at most 40",
+        bt_errors_add(err, "shape \"%s\": the name must have only lower-case letters, digits and _, at most 40",
                       name ? name : "");
     for (int k = 0; err->n == before && bt_body_shapes[k]; k++)
         if (!strcmp(bt_body_shapes[k], name))
-            bt_errors_add(err, "shape %s: there is a shape of this name; choose another", name);
+            bt_errors_add(err, "shape %s: a shape of this name exists already; choose another", name);
     if (!outline) bt_errors_add(err, "shape %s: it has no function", name);
     if (n_added == BT_MAX_ADDED_SHAPES)
         bt_errors_add(err, "shape %s: there are %d of them; raise BT_MAX_ADDED_SHAPES", name, n_added);
@@ -44,7 +44,7 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
     const int n = outline(2, 1, v);
     const char *fault = bt_shape_fault(n, v);
     if (fault)
-        return bt_fail(err, BT_ERR_USAGE, "shape %s: of 2 m by 1 m it is no outline: %s", name, fault);
+        return bt_fail(err, BT_ERR_USAGE, "shape %s: at 2 m by 1 m it is not an outline: %s", name, fault);
     added[n_added] = outline;
     bt_body_shapes[BT_OWN_SHAPES + n_added++] = name;
     return BT_OK;

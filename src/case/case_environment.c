@@ -35,10 +35,12 @@ static void check_table(const bt_check *check, const char *key, const bt_table *
         return;
     const double first = table->row[0], end = table->row[3 * (table->n - 1)],
                  need = bt_max(duration, ((double)bt_case_steps(check->c) - 0.5) * dt);
-    if (first > 0) bt_check_fault(check, key, "the table begins at %g s and the run at 0 s; add a row for 0 s", first);
+    if (first > 0) bt_check_fault(check, key, "the table begins at %g s, but the run begins at 0 s; add a row for 0 "
+                                              "s", first);
     if (end < need * (1 - 1e-12))
         bt_check_fault(check, key,
-                       "the table ends at %g s and the run needs it until %g s; add rows, or shorten run.duration", end,
+                       "the table ends at %g s, but the run needs it until %g s; add rows, or shorten "
+                       "run.duration", end,
                        need);
 }
 
@@ -67,8 +69,8 @@ static void warn_of_table(const bt_case *input, const char *key, const bt_table 
             first = i;
     if (n > 0)
         bt_warn(warnings, BT_WARN_TABLE_ROWS,
-                      "%s: rows that change the velocity within less than a time step of %g s: %lld, the first at %g "
-                      "s: a step takes the velocity at its middle, and misses changes in between; lower run.dt, or "
+                      "%s: some rows change the velocity within less than a time step of %g s (%lld rows, the first at "
+                      "%g s): a step uses the velocity at its middle, and misses changes in between; lower run.dt, or "
                       "give means over a step or longer",
                       key, input->run.dt, (long long)n, table->row[3 * first]);
 }
@@ -88,13 +90,14 @@ void bt_case_warn_lead(const bt_case *input, double x, double y, bt_errors *warn
                  cut = bt_case_tow_cut(input);
     if (cut > 0.5 * input->lead.width)
         bt_warn(warnings, BT_WARN_LEAD_CORNERS,
-                      "lead.width: on its line the body cuts the corners of the way by up to %.3g m, more than half "
-                      "the width of the lead, %g m, which follows the way-points: it leaves the lead there; take a "
-                      "wider lead, a shorter line, or move the corner",
+                      "lead.width: on its line the body cuts the corners of its path by up to %.3g m, more than half "
+                      "the width of the lead, %g m. The lead follows the way-points, so the body leaves it there; use "
+                      "a wider lead, a shorter line, or move the corner",
                       cut, input->lead.width);
     if (!(aside > 0.5 * input->lead.width)) return;
     bt_warn(warnings, BT_WARN_LEAD_DRIFT,
                   "lead.width: the ice drifts by %.3g m %s the planned path during the run, more than half the width "
-                  "of the lead, %g m, which goes with the ice: the body leaves it; take a wider lead or a shorter run",
+                  "of the lead, %g m. The lead drifts with the ice, so the body leaves it; use a wider lead or a "
+                  "shorter run",
                   aside, input->tow.n_waypoints > 0 ? "against" : "across", input->lead.width);
 }

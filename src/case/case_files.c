@@ -108,8 +108,8 @@ bt_status bt_case_itself_same(const char *path, const char *text, const char *di
     const char *line = comment_in(text, ITSELF);
     if (line && is_itself(text, line)) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,
-                   "%s: has changed since the run in %s began; restore it, or begin another run with it "
-                   "(bergtow run)", path, dir);
+                   "%s: has changed since the run in %s began; restore it, or start a new run with it (bergtow "
+                   "run)", path, dir);
 }
 
 bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err)
@@ -121,7 +121,7 @@ bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *e
                    *before = comment_in(input->text, bt_case_keys[k].name);
         if (now && (!before || strncmp(before, now, strlen(now))))
             status = bt_fail(err, BT_ERR_CASE,
-                             "%s: has changed since the run in %s began; restore it, or begin another run with it "
+                             "%s: has changed since the run in %s began; restore it, or start a new run with it "
                              "(bergtow run)", file, dir);
         free(now);
     }

@@ -51,7 +51,7 @@ static void colon_missing(reader *in, int line, const char *section, const char 
     while (own && text[own - 1] != '.') own--;
     const int n = word - own > 60 ? 60 : (int)(word - own);
     bt_errors_add(in->err, "%s:%d: %s%.64s: a colon%s is missing after the key; write %.*s: and then the value",
-                  in->path, line, section, text, text[word] == ':' ? " with a blank" : "", n, text + own);
+                  in->path, line, section, text, text[word] == ':' ? " with a space" : "", n, text + own);
 }
 
 static void unknown_key(reader *in, const bt_key *keys, int n, int line, const char *where, const char *name)
@@ -184,7 +184,7 @@ static bool read_value(const bt_key *key, void *base, const bt_node *value, cons
 {
     if (key->type == BT_KEY_POINTS) return read_points(key, base, value, where, err);
     if (value->kind != BT_NODE_SCALAR) {
-        bt_errors_add(err, "%s: is a %s and needs a single value; write key: value", where,
+        bt_errors_add(err, "%s: is a %s, but needs a single value; write key: value", where,
                       value->kind == BT_NODE_MAP ? "section" : "list");
         return false;
     }
@@ -254,8 +254,8 @@ static void read_floes(reader *in)
     }
     if (list->n > BT_MAX_FLOES_BY_HAND) {
         bt_errors_add(in->err,
-                      "%s:%d: floes: has %d entries, at most %d are read; put large fields into an HDF5 file and name "
-                      "it in ice.field",
+                      "%s:%d: floes: has %d entries, more than the limit of %d; put large fields into an HDF5 file and "
+                      "name it in ice.field",
                       in->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
         return;
     }
@@ -300,7 +300,7 @@ static void read_override(reader *in, const char *set, const char *place)
     if (k < 0) {
         const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
         if (!strcmp(name, "base"))
-            bt_errors_add(in->err, "%s: what a case is based on cannot be set here; edit the case file", where);
+            bt_errors_add(in->err, "%s: the base of a case cannot be set here; edit the case file", where);
         else if (!strcmp(name, "floes"))
             bt_errors_add(in->err, "%s: the list of floes cannot be set here; edit the case file", where);
         else if (bt_schema_is_section(name))

@@ -315,7 +315,8 @@ static void warn_of_jerks(const bt_case *input, bt_errors *warnings)
         if (p[2 * i + 3] != p[2 * i + 1] && p[2 * i + 2] - p[2 * i] < input->run.dt)
             bt_warn(warnings, BT_WARN_SPEED_JUMP,
                           "tow.programme: from %g to %g m/s in less than a step: the tow force is then mass times that "
-                          "change over run.dt, and its peak depends on run.dt alone; let the change take several steps",
+                          "change over run.dt, and its peak depends on run.dt alone; spread the change over several "
+                          "steps",
                           p[2 * i + 1], p[2 * i + 3]);
     bt_path path = {0};
     char why[200];
@@ -323,7 +324,7 @@ static void warn_of_jerks(const bt_case *input, bt_errors *warnings)
     for (int k = 0; k < path.n_marks; k++)
         if (bt_case_tow_turn(input, k) > BT_TURN && path.mark[k] < bt_case_tow_distance(input, input->run.duration)) {
             bt_warn(warnings, BT_WARN_TURN_JUMP,
-                          "tow.turn_radius: 0 m, and the body turns at way-point %d within one step: the tow force is "
+                          "tow.turn_radius: 0 m makes the body turn at way-point %d within one step: the tow force is "
                           "then mass times the change of velocity over run.dt, and its peak depends on run.dt alone; "
                           "give a radius",
                           k + 1);
@@ -355,9 +356,9 @@ static void warn_of_overtaking(const bt_case *input, bt_errors *warnings)
     const double along = has_line(input) ? following(input) : 0;
     if (along > input->tow.speed && input->tow.speed > 0)
         bt_warn(warnings, BT_WARN_CURRENT_OVERTAKES,
-                      "water.%s: up to %.3g m/s along the tow, which is to make %.3g m/s: the current carries the body "
-                      "past its towing end, and nothing in the model fends it off; tow faster than the current, or "
-                      "against it",
+                      "water.%s: up to %.3g m/s along the tow, whose speed is to be %.3g m/s: the current carries the "
+                      "body past its towing end, and nothing in the model keeps them apart; tow faster than the "
+                      "current, or against it",
                       input->water.table.n ? "current_table" : input->water.tide.major > 0 ? "tide" : "current_x",
                       along, input->tow.speed);
 }
@@ -369,7 +370,7 @@ static void warn_of_short_run(const bt_case *input, bt_errors *warnings)
     if (input->tow.mode == BT_TOW_NONE || input->tow.n_programme > 0 || !(input->tow.speed > 0)) return;
     if (!(input->tow.ramp >= input->run.duration)) return;
     bt_warn(warnings, BT_WARN_SHORT_RUN,
-            "tow.ramp: the speed rises for %.4g s and the run ends after %.4g s: it never reaches tow.speed; lengthen "
+            "tow.ramp: the speed rises for %.4g s, but the run ends after %.4g s: it never reaches tow.speed; lengthen "
             "run.duration, or give a shorter ramp",
             input->tow.ramp, input->run.duration);
 }
@@ -384,12 +385,13 @@ void bt_case_warn_start(const bt_case *input, bt_errors *warnings)
     if (input->tow.n_programme > 0)
         bt_warn(warnings, BT_WARN_STEEP_PROGRAMME,
                       "tow.programme: a rise as steep as from 0 to %.4g m/s in %.4g s is short for a body that swings "
-                      "on its line in %.3g s: it jerks the line, which swings on; take at least %.3g s for that",
+                      "on its line in %.3g s: it jerks the line, and the body keeps swinging; use at least %.3g s for "
+                      "that",
                       input->tow.speed, ramp, period, BT_RAMP_PERIODS * period);
     else
         bt_warn(warnings, BT_WARN_SHORT_RAMP,
                       "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the "
-                      "line, and it swings on; leave tow.ramp out, or take at least %.3g s",
+                      "line, and the body keeps swinging; leave tow.ramp out, or use at least %.3g s",
                       ramp, period, BT_RAMP_PERIODS * period);
 }
 
@@ -441,7 +443,7 @@ static void check_programme(const bt_check *check)
     for (int i = 0; i + 1 < input->tow.n_programme; i++)
         if (!(p[2 * i + 2] > p[2 * i])) {
             bt_check_fault(check, "tow.programme",
-                           "point %d is at %g s, not after the one before, %g s; put the times in order", i + 2,
+                           "point %d is at %g s, not later than the point before, %g s; put the times in order", i + 2,
                            p[2 * i + 2], p[2 * i]);
             return;
         }
@@ -487,7 +489,8 @@ static void check_fastening(const bt_check *check)
         if (off > BESIDE_HULL * 2 * bt_shape_extent(n, v).radius && bt_check_sound(check, keys[b]))
             bt_check_fault(check, key[b],
                            "the line is fastened at (%g, %g) m from the centroid of the waterline, %.3g m outside the "
-                           "hull; give a point of the hull in the body's own axes, or leave it out for its outermost",
+                           "hull; give a point of the hull in the body's own axes, or leave it out to use the "
+                           "outermost point",
                            at[b][0], at[b][1], off);
     }
 }
@@ -541,7 +544,7 @@ static void check_waypoints(const bt_check *check)
     if (!((input->tow.waypoints[0] - start[0]) * bt_cos(course) +
           (input->tow.waypoints[1] - start[1]) * bt_sin(course) > 0)) {
         bt_check_fault(check, "tow.waypoints",
-                       "the first, (%g, %g) m, is not ahead of where the towing end starts, (%g, %g) m; move it ahead "
+                       "the first, (%g, %g) m, is not ahead of the start of the towing end, (%g, %g) m; move it ahead "
                        "or shorten the line",
                        input->tow.waypoints[0], input->tow.waypoints[1], start[0], start[1]);
         return;
@@ -560,7 +563,7 @@ static void check_waypoints(const bt_check *check)
                      ly = input->tow.waypoints[2 * i + 3] - input->tow.waypoints[2 * i + 1];
         if (lx * bt_case_tow_sign(input) >= 0.5 * bt_hypot(lx, ly)) continue;
         bt_check_fault(check, "tow.waypoints",
-                       "the leg from way-point %d leads %g deg from x, and a moving window goes along x; keep within "
+                       "the leg from way-point %d leads %g deg from x, but a moving window moves along x; keep within "
                        "60 deg of that, or set domain.ends: periodic or open",
                        i + 1, bt_atan2(ly, lx) * 180 / BT_PI);
         break;

@@ -55,21 +55,21 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
         return "domain.ahead";
     }
     if (input->body.shape == BT_BODY_ABSENT || input->tow.mode == BT_TOW_NONE) {
-        snprintf(why, 256, "moving follows a body that is towed, and here is none (body.shape, tow.mode); "
-                           "set domain.ends: periodic or open, or tow a body");
+        snprintf(why, 256, "moving follows a towed body, but there is none (body.shape, tow.mode); set domain.ends: "
+                           "periodic or open, or tow a body");
         return "domain.ends";
     }
     if (fabs(bt_cos(input->tow.direction)) < 0.5) {
         snprintf(
             why, 256,
-            "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
+            "%g deg: a moving window moves along x; tow within 60 deg of that, or set domain.ends: periodic or open",
             input->tow.direction * 180 / BT_PI);
         return "tow.direction";
     }
     if (sign * input->water.current_x > 0 &&
         sign * input->water.current_x >= input->tow.speed * fabs(bt_cos(input->tow.direction))) {
         snprintf(why, 256,
-                 "%g m/s carries the ice along as fast as the tow, and a moving window takes in new ice only ahead; "
+                 "%g m/s carries the ice along as fast as the tow, but a moving window takes in new ice only ahead; "
                  "set domain.ends: periodic or open",
                  input->water.current_x);
         return "water.current_x";
@@ -77,8 +77,8 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
     const double there = sign > 0 ? input->domain.x0 + length - input->body.x : input->body.x - input->domain.x0;
     if (fabs(ahead - there) > 1e-9 * length && input->lead.mode != BT_LEAD_NONE) {
         snprintf(why, 256,
-                 "%g m, and by domain.x0 and body.x it is %g m from the body to the front end of the domain, where the "
-                 "lead is cut; leave domain.ahead out, or give domain.x0: %g m",
+                 "%g m, but by domain.x0 and body.x the front end of the domain, where the lead is cut, is %g m from "
+                 "the body; leave domain.ahead out, or give domain.x0: %g m",
                  ahead, there, sign > 0 ? input->body.x + ahead - length : input->body.x - ahead);
         return "domain.ahead";
     }
@@ -86,7 +86,7 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
     if (ahead < front + room * floe || length - ahead < stern + room * floe) {
         snprintf(why, 256,
                  "%g m of the %g m of domain.length: %g floe sizes, %g m, are needed ahead of the body and behind it; "
-                 "move the body or take a longer domain",
+                 "move the body or use a longer domain",
                  ahead, length, room, room * floe);
         return "domain.ahead";
     }
@@ -100,7 +100,7 @@ static const char *find_fault(const bt_case *input, bool ahead_given, double x_m
     for (bt_idx i = 0; i < input->n_floes; i++) {
         if (!input->floes[i].fixed) continue;
         snprintf(why, 256,
-                 "moving cannot take floes[%d] along, which is fixed; remove it, or set domain.ends: periodic or open",
+                 "moving cannot take the fixed floes[%d] along; remove it, or set domain.ends: periodic or open",
                  (int)i);
         return "domain.ends";
     }

@@ -145,12 +145,13 @@ void bt_case_list_keys(void *stream)
     FILE *out = stream;
     fprintf(out, "%-24s %-8s %-10s %-36s %s\n", "key", "unit", "default", "range", "meaning");
     list_keys(out, bt_case_keys, bt_n_case_keys);
-    fputs("\nUnit is that of a number written without one. A default that follows from other keys is given in the "
+    fputs("\n"
+          "The unit is that of a number written without one. A default that follows from other keys is given in the "
           "meaning.\n"
-          "floes: is a list of floes given by hand, each a map with the keys\n\n",
+          "floes: is a list of floes given by hand; each is a map with these keys\n\n",
           out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
-    fputs("\nA case file may begin with another one, and keep or replace its keys\n\n", out);
+    fputs("\nA case file may build on another one, and keep or replace its keys\n\n", out);
     list_keys(out, &bt_base_key, 1);
     fputs("\nA study file, for bergtow ensemble, has these keys in place of sections; maps are shown in "
           "cases/studies/*.yml\n\n",

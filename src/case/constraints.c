@@ -57,9 +57,9 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          source, "on ice that is read from a file"},
         {read && !sized, TOGETHER, "ice.size", source, "on ice that is read from a file"},
         {input->ice.field, TOGETHER, "ice.thickness_law ice.thickness_spread", "ice.field",
-         "on the floes of a field file, which have thicknesses of their own"},
+         "on the floes of a field file, which have their own thicknesses"},
         {input->ice.field && input->n_floes == 0, TOGETHER, "ice.thickness", "ice.field",
-         "on the floes of a field file, which have thicknesses of their own"},
+         "on the floes of a field file, which have their own thicknesses"},
         {input->ice.field, TOGETHER, "ice.x_min ice.x_max ice.y_min ice.y_max", "ice.field",
          "on a field file, which has its own ice region"},
         {!input->ice.field && input->ice.thickness_law == BT_THICK_CONSTANT, TOGETHER, "ice.thickness_spread",
@@ -74,7 +74,7 @@ static void list_idle(const bt_case *input, idle out[IDLE])
                                                       : "ice.sides ice.aspect",
          "ice.shape", "on floes of this ice.shape"},
         {!(input->ice.crushing_pressure > 0), TOGETHER, "ice.crushing.least_length", "ice.crushing.pressure",
-         "on ice that is not crushed (ice.crushing.pressure)"},
+         "on ice that does not crush (ice.crushing.pressure)"},
         {!(input->ice.splitting.toughness > 0), TOGETHER,
          "ice.splitting.strength ice.splitting.least_size ice.splitting.generations ice.splitting.aspect "
          "ice.splitting.reserve ice.splitting.scatter",
@@ -88,22 +88,22 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          "body.shape", "without a towed body (body.shape: none)"},
         {input->body.shape == BT_BODY_ABSENT, TOGETHER, "tow.ramp tow.direction impact.panels output.panels",
          "body.shape",
-         "without a body that is towed (body.shape: none)"},
+         "without a towed body (body.shape: none)"},
         {input->body.shape != BT_BODY_ABSENT && input->tow.mode == BT_TOW_NONE, TOGETHER, "tow.ramp", "tow.mode",
          "on a body that is not towed (tow.mode: none)"},
         {!line, TOGETHER, "tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y tow.line.type "
                 "tow.line.diameter tow.line.branches tow.line.breaking_load tow.line.weight " BRANCH2,
-         "tow.mode", "without a line, which tow.mode: line and thrust have"},
+         "tow.mode", "without a line (tow.mode: line or thrust)"},
         {line && input->tow.line.branches < 2, TOGETHER, BRANCH2, "tow.line.branches",
          "on a single line (tow.line.branches)"},
         {input->tow.mode != BT_TOW_THRUST, TOGETHER, "tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull "
                                            "tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag "
                                            "tow.vessel.lookahead",
-         "tow.mode", "without a vessel, which tow.mode: thrust has"},
+         "tow.mode", "without a vessel (tow.mode: thrust)"},
         {input->lead.mode == BT_LEAD_NONE, TOGETHER, "lead.width lead.length lead.floe_size", "lead.mode",
          "without a lead (lead.mode)"},
         {input->lead.mode == BT_LEAD_CHANNEL, TOGETHER, "lead.floe_size", "lead.mode",
-         "on a channel, in which no pieces are left"},
+         "on a channel, where no pieces are left"},
         {!(input->water.tide.major > 0), TOGETHER, "water.tide.inclination water.tide.period water.tide.phase",
          "water.tide.major", "without a tide (water.tide.major)"},
         {!walls, TOGETHER, "domain.wall_friction domain.wall_restitution", "domain.ends domain.sides",
@@ -113,7 +113,7 @@ static void list_idle(const bt_case *input, idle out[IDLE])
         {input->impact.conversion != BT_IMPACT_CRUSHING, TOGETHER, "impact.pressure impact.corner impact.corner_angle",
          "impact.conversion", "without impact.conversion: crushing"},
         {input->impact.conversion == BT_IMPACT_NONE, TOGETHER, "impact.least_speed", "impact.conversion",
-         "where collisions are not told apart (impact.conversion)"},
+         "where collisions are not identified (impact.conversion)"},
         {input->domain.ends != BT_BOUND_MOVING, NEVER, "domain.ahead", "domain.ends", "without a moving window"},
         {input->body.shape == BT_BODY_ABSENT || input->tow.mode == BT_TOW_NONE, NEVER, "tow.speed", "tow.mode",
          "without a tow"},
@@ -127,11 +127,12 @@ static void list_idle(const bt_case *input, idle out[IDLE])
         {input->water.tilt != BT_TILT_SLOPE, ALWAYS, "water.slope_x water.slope_y", "water.tilt",
          "without water.tilt: slope"},
         {input->water.current_table, ALWAYS, "water.current_x water.current_y water.tide.major water.tide.minor",
-         "water.current_table", "with water.current_table, which gives all of it"},
+         "water.current_table", "with water.current_table, which gives the whole current"},
         {input->air.wind_table, ALWAYS, "air.wind_x air.wind_y", "air.wind_table",
-         "with air.wind_table, which gives all of it"},
+         "with air.wind_table, which gives the whole wind"},
         {!input->ice.outlines, ALWAYS, "ice.outlines_crs", "ice.outlines", "without ice.outlines"},
-        {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that is made, whose floes are convex"},
+        {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that the program makes, whose floes are "
+                                                                   "convex"},
     };
     _Static_assert(sizeof all == IDLE * sizeof *all, "count the rows");
     memcpy(out, all, sizeof all);
@@ -315,7 +316,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
                       *const unit = "; check the unit", *const one = "; change one of them",
                       *const swap = "; swap them and turn the inclination by 90 deg",
                       *const cut = ", and the field is cut from its extent; move it, or leave the key out",
-                      *const large = "; take smaller floes or a larger region",
+                      *const large = "; use smaller floes or a larger region",
                       *const prescribed = "has no effect with tow.mode: speed, which prescribes the velocity; remove "
                                           "it or set another mode",
                       *const alone = "is given without the other coordinate of the origin; give both, or none for the "
@@ -363,10 +364,10 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
         // otherwise it depends on the seed whether a run is refused
         {roomy && input->ice.size_law != BT_SIZE_SINGLE && size_max <= room, BELOW, "ice.size_max",
          "half the period of the domain", 0.5 * period, MADE EXTENT,
-         ": two such floes have no room side by side as they turn; take smaller floes or a larger domain"},
+         ": two such floes have no room to turn side by side; use smaller floes or a larger domain"},
         {splits && input->domain.ends == BT_BOUND_MOVING, REFUSED, "ice.splitting.toughness", NULL, 0, "domain.ends",
-         "floes that split are not supported with domain.ends: moving, where a floe that is left behind comes back "
-         "ahead; set 0, or take another boundary and a domain as long as the tow"},
+         "floes that split are not supported with domain.ends: moving, where floes left behind come back ahead; set 0, "
+         "or use another boundary and a domain as long as the tow"},
         {splits && input->ice.splitting.scatter > 0, AT_LEAST, "ice.splitting.scatter", NULL, 2,
          "ice.splitting.toughness",
          ": such a Weibull modulus leaves floes without strength; give at least 2, as in 10, or 0 for the same "
@@ -397,7 +398,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
          "is given but the shape is not polygon; set body.shape: polygon, or remove the corners"},
         {input->body.shape == BT_BODY_SQUARE && input->body.width != input->body.length, REFUSED, "body.width", NULL, 0,
          "body.shape body.length",
-         "differs from body.length, and the shape is square; remove the key or set body.shape: rectangle"},
+         "differs from body.length, but the shape is square; remove the key or set body.shape: rectangle"},
         {driven && input->body.vx != 0, REFUSED, "body.vx", NULL, 0, BODY, prescribed},
         {driven && input->body.vy != 0, REFUSED, "body.vy", NULL, 0, BODY, prescribed},
         {driven && input->body.yaw_rate != 0, REFUSED, "body.yaw_rate", NULL, 0, BODY, prescribed},
@@ -422,7 +423,7 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
          "run.dt", ": they cannot follow it; tidal periods are hours, as in 12.42 h"},
 
         {lead && !towed, REFUSED, "lead.mode", NULL, 0, BODY,
-         "a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode"},
+         "a lead lies along the tow, but nothing is towed; set it to none, or set tow.mode"},
         {lead && towed, NEEDED, "lead.width", "a lead needs it", 0, BODY, "20 m"},
         {lead && towed, NEEDED, "lead.length", "a lead needs it", 0, BODY, "500 m"},
         {input->lead.mode == BT_LEAD_MANAGED && towed, NEEDED, "lead.floe_size",

@@ -173,13 +173,13 @@ void bt_case_check_cost(const bt_check *check)
                  result = bt_cost_disk_of(input, n, bt_cost_corners(input, NULL, n), 2).result;
     if (work > BT_MOST_CORE_SECONDS)
         bt_check_fault(check, "run.duration",
-                       "about %.2g floes for %.2g steps need some %.2g s of one core, at most %g are allowed; shorten "
-                       "the run, lengthen run.dt, or take larger floes or a smaller region",
+                       "about %.2g floes for %.2g steps need about %.2g s on one core, more than the limit of %g s; "
+                       "shorten the run, lengthen run.dt, or use larger floes or a smaller region",
                        n, (double)bt_case_steps(input), work, BT_MOST_CORE_SECONDS);
     if (result > BT_MOST_RESULT_BYTES)
         bt_check_fault(check, "output.frame_interval",
-                       "frames and series of about %.2g bytes, at most %g are written; lengthen output.frame_interval, "
-                       "or raise output.sample_every",
+                       "frames and series take about %.2g bytes, more than the limit of %g bytes; lengthen "
+                       "output.frame_interval, or raise output.sample_every",
                        result, BT_MOST_RESULT_BYTES);
 }
 
@@ -204,14 +204,13 @@ bt_status bt_cost_fits(const bt_case *input, double n_floes, const bt_comm *comm
                  result = bt_cost_disk_of(input, n_floes, bt_cost_corners(input, NULL, n_floes), 2).result;
     if (result > BT_MOST_RESULT_BYTES) { // a field that was read; with other ice the case is refused
         return bt_fail(err, BT_ERR_CASE,
-                       "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g "
-                       "are written; lengthen it, or raise output.sample_every",
+                       "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, more than "
+                       "the limit of %g bytes; lengthen it, or raise output.sample_every",
                        bt_case_name(input), n_floes, result, BT_MOST_RESULT_BYTES);
     }
     if (need <= machine) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,
-        "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take "
-        "larger floes (ice.size), a smaller region, fewer steps (run.duration), "
-        "or more machines (mpirun)",
+        "%s: about %.3g floes and %.3g steps need about %.3g GB of memory, but this machine has %.3g GB; use larger "
+        "floes (ice.size), a smaller region, fewer steps (run.duration), or more machines (mpirun)",
         bt_case_name(input), n_floes, (double)bt_case_steps(input), need / 1e9, machine / 1e9);
 }

@@ -55,7 +55,7 @@ static void refuse_range(const bt_case *input, const bt_key *key, double value, 
     double one = 1; // in the unit of the range
     bt_units_parse("1", key->unit, &one, why);
     const char *unit = bt_units_bare(key->unit);
-    bt_errors_add(err, "%s: %s: becomes %g in the twin of scale %g, out of its range %s%s%s; take a scale nearer to 1",
+    bt_errors_add(err, "%s: %s: becomes %g in the twin of scale %g, out of its range %s%s%s; use a scale nearer to 1",
                   bt_case_name(input), key->name, value / one, ratio, key->range,
                   strcmp(unit, "-") ? " " : "", strcmp(unit, "-") ? unit : "");
 }

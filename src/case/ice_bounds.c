@@ -69,7 +69,7 @@ const char *bt_ice_floe_fault(const bt_ice_floe *floe, char why[BT_ICE_WHY], bt_
     // The range of ice.size holds for the mean alone: a single floe of a law, or a piece, may be larger or smaller.
     if (!(moments.area > 0) || !(2 * moments.radius <= bounds->length.hi)) {
         snprintf(why, BT_ICE_WHY,
-                 "its size, %g m across and %g m2, is beyond 0 to %g m; check the unit of its vertices",
+                 "its size, %g m across and %g m2, is not between 0 and %g m; check the unit of its vertices",
                  2 * moments.radius, moments.area, bounds->length.hi);
         return why;
     }
@@ -96,7 +96,8 @@ const char *bt_ice_field_fault(bool kept, int64_t n, double sum_size, double sum
     const double most = bounds->length.hi * bounds->length.hi, mean = n > 0 ? sum_size / (double)n : 0;
     const double concentration = sum_area / ice_area;
     if (!(ice_area > 0) || !(ice_area <= most))
-        snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %g m2, is beyond 0 to %g m2", ice_area,
+        snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %g m2, is not between 0 and %g "
+                                  "m2", ice_area,
                  most);
     else if (n == 0) return NULL;
     else if (!kept && !(mean >= BT_LEAST_SIZE && mean <= bounds->size.hi))
@@ -157,9 +158,9 @@ void bt_ice_warn_closed(const bt_case *input, double area, bt_errors *warnings)
     const double closed = bt_ice_closed(input, area);
     if (!(closed >= input->estimate.phi_j)) return;
     bt_warn(warnings, BT_WARN_CLOSED_ICE,
-                  "domain.%s_closing: the walls bring the ice to a concentration of %.3g by the end of the run, packed "
-                  "from %g on (estimate.phi_j): rigid floes then bear any load; end the run before, or set "
-                  "ice.crushing.pressure or ice.rafting.kappa",
+                  "domain.%s_closing: the walls bring the ice to a concentration of %.3g by the end of the run, but "
+                  "the ice is packed from %g on (estimate.phi_j): rigid floes then bear any load; end the run earlier, "
+                  "or set ice.crushing.pressure or ice.rafting.kappa",
                   input->domain.ends_closing > 0 ? "ends" : "sides", closed, input->estimate.phi_j);
 }
 
@@ -173,9 +174,9 @@ void bt_ice_warn_slow(const bt_case *input, double size, bt_errors *warnings)
         const double share = 2 * closing / (across + 1);
         if (!(closing > 0 && size > 0 && share < 2 * accepted)) continue;
         bt_warn(warnings, BT_WARN_SLOW_CLOSING,
-                      "domain.%s_closing: %g m/s, shared out among the contacts of some %.0f floes from wall to wall, "
-                      "is %.2g m/s each, and the solver takes %.2g m/s for rest: ice that is locked between the walls "
-                      "may bear no load, without a warning; set solver.tolerance: %.1g",
+                      "domain.%s_closing: %g m/s, divided among the contacts of about %.0f floes from wall to wall, is "
+                      "%.2g m/s each, but the solver treats speeds below %.2g m/s as rest: ice locked between the "
+                      "walls may bear no load, without a warning; set solver.tolerance: %.1g",
                       k ? "sides" : "ends", closing, across, share, accepted,
                       input->solver.tolerance * 0.1 * share / accepted);
     }
@@ -209,13 +210,13 @@ void bt_ice_warn(const bt_case *input, double size, double thickness, bt_errors 
     if (splits) warn_strength(input, warnings);
     if (splits && thickness < THIN)
         bt_warn(warnings, BT_WARN_THIN_SPLITS,
-                "ice.splitting.toughness: the ice is %.3g m thick in the mean, and floes of less than 0.1 m raft or "
+                "ice.splitting.toughness: the ice is %.3g m thick on average, but floes of less than 0.1 m raft or "
                 "bend before they split; set ice.rafting.kappa, or 0 here",
                 thickness);
     const bool deep = input->body.shape != BT_BODY_ABSENT && thickness > input->body.draft;
     if (!(thickness > THICK) && !(thickness > STOUT * size) && !deep) return;
     bt_warn(warnings, BT_WARN_THICK_ICE,
-                  "the ice is %.3g m thick in the mean, %s; check that it is in metres (ice.thickness, or thickness in "
+                  "the ice is %.3g m thick on average, %s; check that it is in metres (ice.thickness, or thickness in "
                   "the file)",
                   thickness,
                   thickness > THICK          ? "more than 10 m"

@@ -41,7 +41,7 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
         char *name = bt_alloc(length, 1); // kept by the table of keys
         snprintf(name, length, "%s.%s", section, own->name);
         if (unit < 0)
-            bt_errors_add(err, "%s: unit %s is none of those of a case; take an SI symbol of bt_law_key, or \"\"",
+            bt_errors_add(err, "%s: unit %s is not a unit of a case; use an SI symbol of bt_law_key, or \"\"",
                           name, own->unit);
         const bt_key key = {.name = name,
                             .unit = (bt_unit)bt_max(unit, 0),

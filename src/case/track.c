@@ -126,13 +126,13 @@ void bt_track_warn(const bt_case *input, const bt_track *track, bt_errors *warni
     const int64_t wake = first_in_wake(track, period, size), last = last_in_ice(input, track, size, &gap);
     if (wake < track->n)
         bt_warn(warnings, BT_WARN_OWN_WAKE,
-                      "from %.4g s on the body meets ice that it has opened before, a period of the domain on: take a "
-                      "larger domain, set domain.ends: moving, or end the run before",
+                      "from %.4g s on the body meets ice that it has already opened, one period of the domain earlier: "
+                      "use a larger domain, set domain.ends: moving, or end the run earlier",
                       track->time[wake]);
     if (last < track->n)
         bt_warn(warnings, BT_WARN_LEAVES_ICE,
-                      "the body leaves the ice at %.4g s, %s, or end the run before", track->time[last],
-                      gap ? "and comes into open water, for it does not fill the domain: leave ice.x_min, ice.x_max, "
-                            "ice.y_min and ice.y_max out"
-                          : "and is in open water from then on: take a longer domain, set domain.ends: moving");
+                      "the body leaves the ice at %.4g s, %s, or end the run earlier", track->time[last],
+                      gap ? "and enters open water, because the ice does not fill the domain: leave ice.x_min, "
+                            "ice.x_max, ice.y_min and ice.y_max out"
+                          : "and is in open water from then on: use a longer domain, set domain.ends: moving");
 }

@@ -352,7 +352,7 @@ static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 
 const bt_law bt_crush_law = {.name = "crushing",
                              .keys = "ice.crushing",
-                             .what = "ice bears a pressure, and what cannot be borne is crushed",
+                             .what = "ice bears a limited pressure, and crushes beyond it",
                              .setup = setup,
                              .on = on,
                              .rises = true,

@@ -19,7 +19,7 @@
 enum { PAIRS, AREA, LARGEST, ENERGY, EDGE_WORK, FRICTION_WORK };
 static const bt_law_number numbers[] = {
     [PAIRS] = {"rafting", "1", "pairs of floes that lie over each other", BT_KEEP_LAST, .key = "rafting_pairs"},
-    [AREA] = {"rafted_area", "m2", "area in which floes lie over each other, pair by pair, at the start of the step",
+    [AREA] = {"rafted_area", "m2", "area where floes lie over each other, pair by pair, at the start of the step",
               BT_KEEP_LAST, .key = "rafted_area_m2"},
     [LARGEST] = {"rafted_largest", "m2", "the largest such area of one pair", BT_KEEP_MAX, .largest = true,
                  .key = "largest_rafted_pair_m2"},
@@ -39,7 +39,7 @@ static const bt_law_total totals[] = {
     [ALL_PAIRS] = {PAIRS, BT_TOTAL_LAST, "rafting", "rafting_pairs", "1",
                    "pairs of floes that lie over each other, at the end"},
     [ALL_AREA] = {AREA, BT_TOTAL_LAST, "rafted_area", "rafted_area_m2", "m2",
-                  "area in which they do, pair by pair, at the end"},
+                  "area where they do, pair by pair, at the end"},
     [MOST_AREA] = {AREA, BT_TOTAL_MAX, "max_rafted_area", "max_rafted_area_m2", "m2",
                    "the largest such area of a step"},
     [LARGEST_PAIR] = {LARGEST, BT_TOTAL_MAX, "rafted_largest", "largest_rafted_pair_m2", "m2",
@@ -309,7 +309,7 @@ static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
 const bt_law bt_raft_law = {.name = "rafting",
                             .keys = "ice.rafting",
                             .what =
-                            "edges bear a line load, and floes that are pressed together harder slide over each other",
+                            "edges bear a limited line load, and floes pressed together harder slide over each other",
                             .setup = setup,
                             .on = on,
                             .numbers = numbers,

@@ -90,7 +90,7 @@ static bt_estimate ships(const bt_estimate_input *in)
                          .high = bt_max(blunt, slender),
                          .valid = in->ship,
                          .note = in->ship ? "a ship; ice and speeds of the regression are not known here"
-                                          : "extrapolated: a regression of ships, and this is none"};
+                                          : "extrapolated: a regression of ships, but this is not a ship"};
 }
 
 bt_estimate bt_estimate_ship(double beam, double thickness, double concentration, double speed, double ice_density)
@@ -168,10 +168,11 @@ bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
     const size_t before = err->n;
     const char *name = def->name ? def->name : "";
     if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // taken by the summary for all curves
-        bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
+        bt_errors_add(err, "estimate \"%s\": the name must have only lower-case letters, digits and _, at most "
+                           "40", name);
     for (int k = 0; k < n_estimates; k++)
         if (!strcmp(estimates[k].name, name))
-            bt_errors_add(err, "estimate %s: there is one of this name; choose another", name);
+            bt_errors_add(err, "estimate %s: an estimate of this name exists already; choose another", name);
     if (!def->label || !def->formula || !def->source)
         bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
     if (!def->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);

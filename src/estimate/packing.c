@@ -62,15 +62,14 @@ void bt_packing_warn(const bt_packing *packing, double end, bt_errors *warnings)
     if (packing->time == 0)
         bt_warn(warnings, BT_WARN_PACKED_AT_START,
                 "domain.length: ice as dense as this (estimate.phi_j %g) is packed up to the wall ahead from the "
-                "start: the resistance is also a property of "
-                "the domain's length; take domain.ends: open, periodic or moving where no wall is meant",
+                "start: the resistance also depends on the length of the domain; set domain.ends: open, periodic or "
+                "moving if no wall is intended",
                 packing->packed);
     else
         bt_warn(warnings, BT_WARN_PACKED,
                 "domain.length: the packed ice ahead reaches the wall at about %.3g s, %.3g s at the earliest "
-                "(estimate: the ice of the body's track, packed to "
-                "%g over the width of the domain), and the end is at %g s: from then on the resistance is also a "
-                "property of the domain's length; end the run before, "
-                "or take a longer domain",
+                "(estimate: the ice of the body's track, packed to %g over the width of the domain), and the run ends "
+                "at %g s: from then on the resistance also depends on the length of the domain; end the run earlier, "
+                "or use a longer domain",
                 packing->time, BT_PACKING_EARLY * packing->time, packing->packed, end);
 }

@@ -69,7 +69,7 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
     if (!many && bt_outline_convex(*n, v)) return NULL;
     if (!many && smooth(n, v, counts)) return bt_shape_fault(*n, v);
     switch (nonconvex) {
-    case BT_NONCONVEX_REFUSE: return "it is not convex; set ice.nonconvex to hull or split, or mend it";
+    case BT_NONCONVEX_REFUSE: return "it is not convex; set ice.nonconvex to hull or split, or correct it";
     case BT_NONCONVEX_HULL: {
         const double before = 0.5 * bt_outline_area2(*n, v);
         *n = bt_shape_hull(*n, v);
@@ -148,7 +148,7 @@ static void visit(void *context, bt_idx i, bt_idx j, double dx, double dy)
     where->deepest = bt_max(where->deepest, deepest);
     bt_refuse(where->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s",
               where->noun, (int)(i < j ? i : j), where->noun, (int)(i < j ? j : i), deepest, where->allowed,
-              where->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
+              where->f->outlines.hulled ? ", or set ice.nonconvex: split if only their hulls overlap" : "");
 }
 
 static void check_bounds(const bt_case *input, const place *where, bt_idx i)
@@ -166,12 +166,12 @@ static void check_bounds(const bt_case *input, const place *where, bt_idx i)
         }
     if (low[0] < input->domain.x0 - slack || high[0] > x1 + slack)
         bt_refuse(where->r,
-                  "%s %d, x %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge "
+                  "%s %d, x %g to %g m, is outside the domain, %g to %g m; remove it, move the outlines, or enlarge "
                   "the domain",
                   where->noun, (int)i, low[0], high[0], input->domain.x0, x1);
     else if (low[1] < input->domain.y0 - slack || high[1] > y1 + slack)
         bt_refuse(where->r,
-                  "%s %d, y %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge "
+                  "%s %d, y %g to %g m, is outside the domain, %g to %g m; remove it, move the outlines, or enlarge "
                   "the domain",
                   where->noun, (int)i, low[1], high[1], input->domain.y0, y1);
 }
@@ -218,8 +218,8 @@ static void check_obstacles(const place *where, const bt_region *region)
             const double depth = depth_in(where, i, rel.n, rel.v, obstacle->x - x, obstacle->y - z);
             if (depth > where->allowed)
                 bt_refuse(where->r,
-                          "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); take it "
-                          "out, or move the body",
+                          "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); remove "
+                          "it, or move the body",
                           where->noun, (int)i, depth, where->allowed);
         }
     }

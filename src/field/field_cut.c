@@ -202,7 +202,7 @@ bt_status bt_field_cut(const bt_case *input, const bt_region *whole, const bt_re
     field->strip = strip;
     if (fabs(area - wanted) <= TOLERANCE * wanted) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,
-        "%s: ice.extent: the field cut to the ice region has a concentration of %.4g, %g wanted, with floes "
-        "scaled within %.3g m of the cut; take another ice.seed, smaller floes, or a larger ice region",
+        "%s: ice.extent: the field cut to the ice region has a concentration of %.4g instead of %g, with floes scaled "
+        "within %.3g m of the cut; use another ice.seed, smaller floes, or a larger ice region",
         bt_case_name(input), area / region->ice_area, input->ice.concentration, strip);
 }

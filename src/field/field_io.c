@@ -118,7 +118,7 @@ static void *read_dataset(reader *in, const char *name, bool integers, hsize_t w
         data = bt_alloc((size_t)(dims[0] * (width ? width : 1)) + 1, 8);
         if (dims[0] > 0 &&
             H5Dread(d, integers ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
-            bt_refuse(&in->r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
+            bt_refuse(&in->r, "dataset %s: cannot be read: the file is truncated or damaged; write it again", name);
     }
     H5Tclose(type);
     H5Sclose(space);
@@ -316,7 +316,7 @@ bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconve
     bt_errors found = {0};
     reader in = {.nonconvex = nonconvex, .bare = bare, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
     in.file = bt_h5_open_file(path, &errnum);
-    if (in.file < 0) bt_errors_add(&found, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
+    if (in.file < 0) bt_errors_add(&found, "%s: is truncated or damaged: HDF5 cannot open it; write it again", path);
     else if ((in.r.status = bt_h5_whole(in.file, path, &found)) == BT_OK) read_floes(&in, field);
     if (in.file >= 0) H5Fclose(in.file);
     if (errnum) in.r.status = bt_file_fail(path, "read the file", errnum, err);

@@ -33,7 +33,7 @@ bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
     note_region(input, field);
     if (*field->frame && strcmp(field->frame, bt_field_frame(input)))
         bt_refuse(&refusals,
-                  "was made for domain.frame: %s, whose x and y would lie mirrored in this case's, %s; set "
+                  "was made for domain.frame: %s, whose x and y would be mirrored in the frame of this case, %s; set "
                   "domain.frame: %s, or make the field for this frame",
                   field->frame, bt_field_frame(input), field->frame);
     else if (bt_ice_domain_fault(input, field, why)) bt_refuse(&refusals, "%s", why);
@@ -52,12 +52,12 @@ static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
     if (counts->outside)
         bt_warn(warnings, BT_WARN_ICE_OUTSIDE,
                 "%lld of %lld floes lie outside the ice region (ice.x_min and so on): they take part, but the "
-                "concentration refers to that region, and leaves out %.4g m2 of ice outside it",
+                "concentration refers to that region and omits %.4g m2 of ice outside it",
                 (long long)counts->outside, (long long)counts->read, counts->outside_area);
     if (counts->own_area > 0 && counts->region_area > 0 && fabs(counts->own_area / counts->region_area - 1) > 0.01)
         bt_warn(warnings, BT_WARN_OTHER_REGION,
-                "ice.field: the concentration of the file refers to an ice region of %.6g m2, and the domain "
-                "less the body has %.6g m2: it is not that of the domain",
+                "ice.field: the concentration of the file refers to an ice region of %.6g m2, but the domain without "
+                "the body has %.6g m2: it is not that of the domain",
                 counts->own_area, counts->region_area);
 }
 
@@ -68,18 +68,18 @@ static void warn_of_latitude(const bt_outline_counts *counts, const bt_case *inp
     const double place = counts->lat * 180 / BT_PI, lon = counts->lon * 180 / BT_PI;
     if (isnan(input->ice.origin_lon) && place < 0 && lon >= 37 && lon <= 90)
         bt_warn(warnings, BT_WARN_LATITUDE_FIRST,
-                "the outlines lie at latitude %.4g deg, longitude %.4g deg, in the south; if they are to lie in "
-                "the north, latitude comes first in the file: write [longitude, latitude]",
+                "the outlines lie at latitude %.4g deg, longitude %.4g deg, in the south; if they should lie in the "
+                "north, latitude comes first in the file: write [longitude, latitude]",
                 place, lon);
     const double given = input->water.latitude * 180 / BT_PI;
     if (given == 0 && fabs(place) > 1)
         bt_warn(warnings, BT_WARN_NO_LATITUDE,
-                "the outlines lie at latitude %.4g deg, and without water.latitude there is no Coriolis force; "
-                "set it to %.4g deg",
+                "the outlines lie at latitude %.4g deg, but without water.latitude there is no Coriolis force; set it "
+                "to %.4g deg",
                 place, place);
     else if (fabs(place - given) > 1)
         bt_warn(warnings, BT_WARN_OTHER_LATITUDE,
-                "the outlines lie at latitude %.4g deg, and water.latitude is %.4g deg; correct one",
+                "the outlines lie at latitude %.4g deg, but water.latitude is %.4g deg; correct one",
                 place, given);
 }
 
@@ -92,9 +92,9 @@ static void warn_of_plane(const bt_outline_counts *counts, const bt_case *input,
     bt_map_crs_scale(&crs, counts->east, counts->north, &along, &across);
     const bool turned = crs.any_north && input->domain.frame == BT_FRAME_GEOGRAPHIC;
     bt_warn(warnings, BT_WARN_GRID_PLANE,
-            "the outlines are metres of %s, used as plane coordinates: its scale factor, at x = y = 0 %.4g along the "
-            "meridian and %.4g across (areas %+.2g %%), and the angle of its north to the true one (convergence%s) are "
-            "not corrected, as `bergtow outlines` does%s",
+            "the outlines are in metres of %s, used as plane coordinates. Its scale factor (at x = y = 0 %.4g along "
+            "the meridian and %.4g across, areas %+.2g %%) and the angle of its north to true north (convergence%s) "
+            "are not corrected; `bergtow outlines` corrects them%s",
             crs.name, along, across, 100 * (along * across - 1),
             crs.any_north ? ", any angle in a polar projection" : "",
             turned ? "; x is the grid's north here: give wind, current and tow in that frame" : "");
@@ -104,17 +104,17 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
 {
     if (counts->unnamed)
         bt_warn(warnings, BT_WARN_NO_THICKNESS,
-                "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the "
-                "thickness of the case, %g m in the mean; rename the property if it is the thickness in metres",
+                "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the thickness "
+                "of the case, %g m on average; rename the property if it is the thickness in metres",
                 (long long)counts->unnamed, (long long)counts->read, counts->nearly, input->ice.thickness);
     if (counts->split && input->ice.rafting_kappa > 0)
         bt_warn(warnings, BT_WARN_STAYS_RIGID,
-                "ice.rafting: %lld floes are not convex and made of convex parts: they stay rigid; "
-                "ice.nonconvex: hull lets them raft, with their hulls' outlines",
+                "ice.rafting: %lld floes are not convex and consist of convex parts: they stay rigid; ice.nonconvex: "
+                "hull lets them raft, with their hulls' outlines",
                 (long long)counts->split);
     if (counts->read && !counts->bare && input->n_floes == 0 && bt_case_changed(input, "ice.thickness"))
         bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
-                "ice.thickness: no effect, for all outlines have a thickness of their own");
+                "ice.thickness: no effect, because all outlines have their own thickness");
     warn_of_region(counts, warnings);
     warn_of_latitude(counts, input, warnings);
     warn_of_plane(counts, input, warnings);

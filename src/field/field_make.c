@@ -78,24 +78,22 @@ void bt_field_size_warn(const bt_case *input, const bt_field_sizes *found, bt_er
         const double scatter = sqrt(bt_max(second - mean * mean, 0) / n), off = found->mean - mean;
         if (fabs(off) > SIZE_OFF * mean && fabs(off) > 2 * scatter)
             bt_warn(warnings, BT_WARN_MEAN_SIZE,
-                    "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a "
-                    "wide spread small floes are drawn again, or find no place; %s, or "
-                    "count on the diameter that was made",
+                    "the %d floes have a mean diameter of %.3g m, %.0f %% %s than that of ice.size_law: at a wide "
+                    "spread small floes are drawn again, or find no room; %s, or use the diameter obtained",
                     (int)n, found->mean, 100 * fabs(off) / mean, off > 0 ? "more" : "less",
                     sizes.law == BT_SIZE_POWER ? "narrow ice.size_min to size_max" : "lower ice.size_spread");
         const double spread = sqrt(bt_max(second - mean * mean, 0)) / mean;
         if (sizes.law != BT_SIZE_POWER && spread < (1 - SPREAD_OFF) * sizes.spread)
             bt_warn(warnings, BT_WARN_SPREAD,
-                    "%s the sizes a spread of %.2g, where ice.size_spread asks for %.2g: all that is drawn "
-                    "beyond is drawn again; %slower ice.size_spread",
+                    "%s the sizes a spread of %.2g, where ice.size_spread asks for %.2g: sizes drawn beyond them are "
+                    "drawn again; %slower ice.size_spread",
                     sizes.law == BT_SIZE_LOGNORMAL ? "ice.size_min and ice.size_max leave"
                                                    : "a least size of a tenth of the mean leaves",
                     spread, sizes.spread, sizes.law == BT_SIZE_LOGNORMAL ? "move them apart, or " : "");
         if (found->below > BELOW_OFF * n)
             bt_warn(warnings, BT_WARN_SMALL_FLOES,
-                    "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes "
-                    "get the room that larger ones leave them; narrow the range of sizes, or lower the "
-                    "concentration",
+                    "%d of the %d floes, %.2g %%, are smaller than ice.size_min, down to %.3g m: small floes fill the "
+                    "room that larger ones leave; narrow the range of sizes, or lower the concentration",
                     (int)found->below, (int)n, 100.0 * found->below / n, found->least);
     }
     bt_errors_free(&refused);
@@ -146,8 +144,8 @@ static bt_status draw_targets(const bt_case *input, const bt_sizes *sizes, doubl
     if (sum > 2 * wanted) {
         bt_errors_add(
             err,
-            "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
-            "a larger region, or ice.concentration: 0",
+            "%s: ice.size: one floe of %g m is larger than all the requested ice (%g m²); ask for smaller floes, a "
+            "larger region, or ice.concentration: 0",
             bt_case_name(input), bt_sizes_mean(sizes), wanted);
         free(*target);
         return BT_ERR_CASE;
@@ -296,7 +294,7 @@ static bool settled(const bt_region *region, bt_field *field, double wanted, cha
     }
     const double reached = good ? bt_field_fit(field, clearance, NULL, wanted) : wanted;
     if (reached < 0.995 * wanted) {
-        snprintf(why, 160, "concentration %g after the shake, %g wanted", reached / region->ice_area,
+        snprintf(why, 160, "concentration %g after the shake instead of %g", reached / region->ice_area,
                  wanted / region->ice_area);
         good = false;
     }

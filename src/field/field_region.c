@@ -183,8 +183,8 @@ bt_status bt_region_init(bt_region *region, const bt_case *input, double clearan
     }
     if (!wide)
         return bt_fail(err, BT_ERR_CASE,
-            "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m "
-            "between it and the ice; take a wider one, or smaller floes (ice.size)",
+            "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m between it "
+            "and the ice; use a wider one, or smaller floes (ice.size)",
             bt_case_name(input), clearance);
     if (!(region->ice_area > 0))
         return bt_fail(err, BT_ERR_CASE,

@@ -148,7 +148,7 @@ static bt_status take_poses(const bt_world *world, const bt_case *input, const b
         const bt_pose *pose = &world->bodies.pose[bt_world_index(world, i)];
         if (!isfinite(pose->x) || !isfinite(pose->y) || !isfinite(pose->yaw))
             return bt_fail(err, BT_ERR_NUMERIC,
-                "%s: ice field: floe %lld has no finite place after the field was shaken; report this case with its "
+                "%s: ice field: floe %lld has no finite position after the field was shaken; report this case with its "
                 "seed, and use ice.shake: 0 meanwhile",
                 bt_case_name(input), (long long)i);
         field->pose[3 * i] = pose->x;

@@ -95,11 +95,11 @@ static const json_t *ring_of(const json_t *feature, const char **why)
         }
         polygon = json_array_get(polygon, 0);
     } else if (!type || strcmp(type, "Polygon")) {
-        *why = "its geometry is not a Polygon; take it out";
+        *why = "its geometry is not a Polygon; remove it";
         return NULL;
     }
     if (json_array_size(polygon) > 1) {
-        *why = "it has holes, and a floe has none here; take out all rings but the first, as `bergtow outlines` does";
+        *why = "it has holes, but a floe has none here; remove all rings except the first, as `bergtow outlines` does";
         return NULL;
     }
     const json_t *ring = json_array_get(polygon, 0);
@@ -124,7 +124,7 @@ static int coordinates_of(const json_t *feature, double *v, const char **why)
     for (size_t k = 0; k < n; k++) {
         const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
         if (!json_is_number(x) || !json_is_number(y)) {
-            *why = "a vertex is no pair of numbers; write [east, north]";
+            *why = "a vertex is not a pair of numbers; write [east, north]";
             return 0;
         }
         v[2 * k] = json_number_value(x);
@@ -174,7 +174,7 @@ static void begin_degrees(reader *in, const json_t *mark)
                swapped = bt_outline_in_degrees(bt_max(fabs(seen.low[1]), fabs(seen.high[1])),
                                            bt_max(fabs(seen.low[0]), fabs(seen.high[0])), false);
     if (!isnan(input->ice.origin_east))
-        bt_refuse(&in->r, "its coordinates are degrees, and ice.origin_east and ice.origin_north are metres; give "
+        bt_refuse(&in->r, "its coordinates are degrees, but ice.origin_east and ice.origin_north are metres; give "
                           "ice.origin_lon and ice.origin_lat, or none");
     if (seen.feature != SIZE_MAX) {
         bt_refuse(
@@ -211,7 +211,7 @@ static void begin_plane(reader *in, const json_t *mark)
     const survey seen = look_over(in, true);
     const bool given = !isnan(input->ice.origin_east), projected = in->crs.kind == BT_MAP_PLANE;
     if (!isnan(input->ice.origin_lon) && in->kind == PLANE)
-        bt_refuse(&in->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "
+        bt_refuse(&in->r, "its coordinates are metres, but ice.origin_lon and ice.origin_lat are degrees; give "
                           "ice.origin_east and ice.origin_north, or none");
     if (given && in->kind == FRAME)
         bt_refuse(&in->r, "its coordinates are metres of the case's frame, whose origin they have; remove "
@@ -266,11 +266,11 @@ static const char *place(const reader *in, int n, double *v)
                 return "it is more than 100 km from the origin, and near it with latitude and longitude swapped; write "
                        "[longitude, latitude]";
             return in->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "
-                                 "longer holds; set ice.origin_lon and ice.origin_lat, or take it out; "
-                                 "if its coordinates are metres, east and north, give the file its crs or set "
+                                 "longer holds; set ice.origin_lon and ice.origin_lat, or remove it; if its "
+                                 "coordinates are metres, east and north, give the file its crs or set "
                                  "ice.outlines_crs: plane"
                                : "it is more than 100 km from the origin, where the projection of a small area no "
-                                 "longer holds; set ice.origin_lon and ice.origin_lat, or take it out";
+                                 "longer holds; set ice.origin_lon and ice.origin_lat, or remove it";
         }
         to_frame(in->c, east, north, v + 2 * i);
     }
@@ -415,7 +415,8 @@ static void choose_coordinates(reader *in, const json_t *root)
     in->crs.kind = BT_MAP_LOCAL;
     if (crs && (!type || strcmp(type, "name") || !name) && key == BT_CRS_FILE) {
         bt_refuse(&in->r, "its crs is not given by a name ({\"type\": \"name\", \"properties\": {\"name\": "
-                          "\"EPSG:32633\"}}); give it so, or take it out and set ice.outlines_crs: lonlat or plane");
+                          "\"EPSG:32633\"}}); give it in this form, or remove it and set ice.outlines_crs: lonlat or "
+                          "plane");
         return;
     }
     if (crs && name) in->crs = bt_map_crs_of(name);
@@ -435,19 +436,19 @@ static void choose_coordinates(reader *in, const json_t *root)
     } else if (said && in->crs.kind == BT_MAP_WARPED) {
         bt_refuse(&in->r,
                   "its crs is %s, Mercator, whose metres are not those on the ground: shorter by the cosine of the "
-                  "latitude; make degrees of them: bergtow outlines %s -o floes.geojson",
+                  "latitude; convert them to degrees: bergtow outlines %s -o floes.geojson",
                   in->crs.name, in->r.path);
     } else if (said) {
         in->kind = in->crs.kind == BT_MAP_DEGREES ? DEGREES : PLANE;
         if (in->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME)
             bt_refuse(
                 &in->r,
-                "its crs is %s, in %s, and ice.outlines_crs says otherwise; remove the key, or correct the crs of the "
+                "its crs is %s, in %s, but ice.outlines_crs says otherwise; remove the key, or correct the crs of the "
                 "file",
                 in->crs.name, in->kind == DEGREES ? "degrees" : "metres east and north");
     } else if (crs && key == BT_CRS_FILE) {
         bt_refuse(&in->r,
-                  "its crs, %.100s, is not known here as degrees or as metres east and north; make degrees of it: "
+                  "its crs, %.100s, is not known here as degrees or as metres east and north; convert it to degrees: "
                   "bergtow outlines %s -o floes.geojson, or set ice.outlines_crs: plane if its coordinates are metres "
                   "east and north",
                   name, in->r.path);
@@ -503,8 +504,8 @@ static void check_thickness(reader *in, size_t features)
     const bt_outline_counts *counts = &in->f->outlines;
     if (!isnan(in->c->ice.thickness) || !counts->bare) return;
     bt_refuse(&in->r,
-              "%lld of %zu outlines have no property `thickness`%s%s%s, and the case has no ice.thickness, for which "
-              "domain.frame: geographic has no default; give it, as in 1 m",
+              "%lld of %zu outlines have no property `thickness`%s%s%s, and the case has no ice.thickness (there is no "
+              "default in domain.frame: geographic); give it, as in 1 m",
               (long long)counts->bare, features, *counts->nearly ? " (but " : "", counts->nearly,
               *counts->nearly ? ")" : "");
 }
@@ -523,8 +524,8 @@ static void check_whole(reader *in)
                               : "");
     else if (in->kind != DEGREES && size < 0.1 * thickness)
         bt_refuse(&in->r,
-                  "its floes are %.3g m in size and %.3g m thick in the mean, as floes whose coordinates are degrees "
-                  "look in metres; if they are degrees, take out its crs and ice.outlines_crs",
+                  "its floes are %.3g m in size and %.3g m thick on average, as if degrees were read as metres; if "
+                  "they are degrees, remove its crs and ice.outlines_crs",
                   size / in->f->n, thickness / in->f->n);
 }
 

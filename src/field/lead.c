@@ -223,8 +223,8 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
     bt_status status = BT_OK;
     if (most > BT_MOST_FLOES)
         status = bt_fail(err, BT_ERR_CASE,
-            "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, "
-            "or a narrower or shorter lead",
+            "%s: lead.floe_size: %g m makes up to %.3g pieces, more than the limit of %d; use larger pieces, or a "
+            "narrower or shorter lead",
             lead->name, lead->floe_size, most, BT_MOST_FLOES);
     if (status == BT_OK) {
         bt_field out;
@@ -319,7 +319,7 @@ bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *sta
     if (input->lead.mode == BT_LEAD_NONE) return BT_OK;
     if (field->outlines.split > 0)
         return bt_fail(err, BT_ERR_CASE,
-                       "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set "
+                       "%s: lead.mode: %lld floes of the field are not convex, but a lead cuts only convex floes; set "
                        "ice.nonconvex to hull, or draw the lead in the file",
                        bt_case_name(input), (long long)field->outlines.split);
     int n;
@@ -372,7 +372,7 @@ void bt_lead_stats_print(const bt_lead_stats *stats)
     if (stats->mode == BT_LEAD_CHANNEL) printf("removed");
     else printf("cut into %lld pieces of %.3g m", (long long)stats->pieces, stats->mean_piece);
     if (isnan(stats->concentration_after))
-        printf("; concentration of the field's ice region, which its file does not name");
+        printf("; concentration of the field's ice region, unknown from its file");
     else printf("; concentration %.4g", stats->concentration_after);
     printf(", was %.4g\n", stats->concentration_before);
 }

@@ -109,8 +109,8 @@ static bt_status refuse_text(const char *path, const char *text, size_t size, bt
     const char *other = other_format(text, size);
     if (other)
         return bt_fail(err, BT_ERR_CASE,
-                       "%s: is %s, not GeoJSON; make GeoJSON of it: bergtow outlines %s -o floes.geojson (a field of "
-                       "bergtow belongs to ice.field)",
+                       "%s: is %s, not GeoJSON; convert it to GeoJSON: bergtow outlines %s -o floes.geojson (a field "
+                       "of bergtow belongs to ice.field)",
                        path, other, path);
     // Limit the tree of a hostile file before parsing it: a tree takes far more room than the text.
     int64_t lists = 0;
@@ -118,7 +118,8 @@ static bt_status refuse_text(const char *path, const char *text, size_t size, bt
     while ((c = memchr(c, '[', (size_t)(end - c)))) c++, lists++;
     if (lists <= BT_MOST_LISTS) return BT_OK;
     return bt_fail(err, BT_ERR_CASE, "%s: holds %" PRId64
-                   " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files",
+                   " lists (vertices), more than the limit of %d; simplify the outlines, or cut them into several "
+                   "files",
                    path, lists, BT_MOST_LISTS);
 }
 

@@ -103,7 +103,7 @@ static const char *begin(const bt_world *world, double *own, void *context)
         .air = {world->par.air_u, world->par.air_v},
         .towed = world->towed,
     };
-    const char *fault = arrays->force(&applied, arrays->user) != 0 ? "its function has failed"
+    const char *fault = arrays->force(&applied, arrays->user) != 0 ? "its function failed"
                                                                    : fault_of(arrays, applied.n, &own[ACTS]);
     bt_domain_maxima(world, &own[ACTS], 1); // so the same bodies rest, and are left out, on any ranks
     if (!fault) arrays->of = &world->bodies;

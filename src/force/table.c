@@ -60,7 +60,7 @@ static void check_series(const bt_force_law *law, const char *name, bt_errors *e
 {
     const char *of = law->part_of ? law->part_of : law->turns_only ? NULL : name;
     if (law->part_of && !bt_is_name(law->part_of, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "force law %s: part_of \"%s\" is no name of lower-case letters, digits and _, at most 40",
+        bt_errors_add(err, "force law %s: part_of \"%s\" is not a name of lower-case letters, digits and _, at most 40",
                       name, law->part_of);
     if (!of || bt_force_series_find(of) >= 0 || !bt_series_may_be) return;
     char series[BT_MOST_LAW_NAME + sizeof "_force"];
@@ -73,16 +73,17 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
     if (!bt_is_name(name, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "force law \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
+        bt_errors_add(err, "force law \"%s\": the name must have only lower-case letters, digits and _, at most "
+                           "40", name);
     else if (bt_force_series_find(name) >= 0)
-        bt_errors_add(err, "force law %s: there is a force of this name; choose another", name);
+        bt_errors_add(err, "force law %s: a force of this name exists already; choose another", name);
     if (!law->add) bt_errors_add(err, "force law %s: it has no function `add`", name);
-    if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "force law %s: say in a line what it is (`doc`)", name);
+    if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "force law %s: describe it in one line (`doc`)", name);
     if (law->n_keys < 0 || law->n_keys > BT_MAX_FORCE_OWN)
         bt_errors_add(err, "force law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_FORCE_OWN);
     if (bt_n_force_laws == BT_MAX_FORCE_LAWS)
-        bt_errors_add(err, "force law %s: a program can have at most %d, and this one has them all; give an applied "
-                      "force the name of one whose simulation has ended", name, BT_MAX_FORCE_LAWS);
+        bt_errors_add(err, "force law %s: a program can have at most %d, and all are in use; give an applied force the "
+                      "name of a force whose simulation has ended", name, BT_MAX_FORCE_LAWS);
     if (err->n == before) check_series(law, name, err);
     if (err->n > before || !add_keys(law, err)) return BT_ERR_USAGE;
     bt_force_laws[bt_n_force_laws++] = law;

@@ -22,7 +22,8 @@ bool bt_path_make(bt_path *path, double x, double y, int n, const double *points
     for (int k = 0; k < n; k++) {
         const double px = points[2 * k], py = points[2 * k + 1], far = bt_hypot(px - x, py - y);
         if (!(far > 0)) {
-            snprintf(why, 200, "way-point %d is where the one before it (or the start) is; remove one of them", k + 1);
+            snprintf(why, 200, "way-point %d is at the place of the previous one (or of the start); remove one of "
+                               "them", k + 1);
             bt_path_free(path);
             return false;
         }

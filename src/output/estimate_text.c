@@ -66,7 +66,7 @@ const bt_json_key bt_estimate_keys[] = {
     OF_ESTIMATE("simulated_over_estimate", ratio, "1",
                 "mean ice resistance of the run / force; it tells something where `compares`"),
     OF_ESTIMATE("valid", e.valid, "1", "the formula is meant for these conditions"),
-    OF_ESTIMATE("compares", e.compares, "1", "valid, and it knows the concentration: a run is held against it"),
+    OF_ESTIMATE("compares", e.compares, "1", "valid, and it depends on the concentration: a run is compared with it"),
     OF_ESTIMATE("note", e.note, "", "regime, or why it is not valid"),
     OF_ESTIMATE("formula", formula, "", "the formula"),
     OF_ESTIMATE("source", source, "", "where it is from"),
@@ -86,7 +86,7 @@ const bt_json_key bt_condition_keys[] = {
     OF_CONDITIONS("ordered_speed_m_s", in.ordered, "m/s",
                   "the part along the tow as the case orders it: the mean of the window, before a run the largest"),
     OF_CONDITIONS("water_speed_m_s", in.water_speed, "m/s", "speed of the body through the water, by the same rule"),
-    OF_CONDITIONS("length_scale", in.length_scale, "1", "by which P* was divided, and P_s by its square"),
+    OF_CONDITIONS("length_scale", in.length_scale, "1", "P* was divided by it, and P_s by its square"),
     OF_CONDITIONS("strength_n_m", strength, "N/m", "strength of the ice P"),
     OF_CONDITIONS("capture_strength_n_m", in.p_s, "N/m", "strength P_s from which the ice captures the body"),
 };

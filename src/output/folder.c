@@ -108,8 +108,8 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
         char *path = bt_file_join(dir, files[k].name);
         if (is_foreign(dir, k, path))
             status = bt_fail(err, BT_ERR_IO,
-                "%s: is not a file that this program has written, and a run would replace it; move it away, "
-                "or give another folder with -o",
+                "%s: was not written by this program, but a run would replace it; move it away, or give another folder "
+                "with -o",
                 path);
         free(path);
     }
@@ -240,6 +240,6 @@ bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt
     const bt_status foreign = bt_folder_check(dir, err);
     if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
     if (finished || !begun) return bt_fail(err, BT_ERR_IO, "%s: holds a result; %s", dir, remedy);
-    return bt_fail(err, BT_ERR_IO, "%s: holds an unfinished run; go on with it by `bergtow resume %s`, %s", dir, dir,
+    return bt_fail(err, BT_ERR_IO, "%s: holds an unfinished run; continue it with `bergtow resume %s`, %s", dir, dir,
                    remedy);
 }

@@ -28,7 +28,7 @@ static const struct {
     ROW("approach", approach, false, "m/s", "normal speed of approach at the start of the first step"),
     ROW("effective_mass", mass, false, "kg", "m_e = 1 / n.(1/M_a + 1/M_b).n with rotation and added mass"),
     ROW("thickness", thickness, false, "m", "thickness of the floe"),
-    ROW("corner", corner, false, "rad", "angle of the crushed corner; used by conversion crushing alone"),
+    ROW("corner", corner, false, "rad", "angle of the crushed corner; used only by conversion crushing"),
     ROW("mean", mean, false, "N", "mean force by the conversion"),
     ROW("peak", peak, false, "N", "peak force by the conversion"),
     ROW("duration", duration, false, "s", "conversion duration: of the collision; crushing: time from touch to peak"),

@@ -32,7 +32,7 @@ const char *const bt_applies_names[BT_APPLIES_KINDS] = {
     [BT_APPLIES_LINE] = "with a tow line",
     [BT_APPLIES_BRIDLE] = "with a tow line of two branches",
     [BT_APPLIES_VESSEL] = "with a vessel",
-    [BT_APPLIES_IMPACTS] = "where collisions are told apart",
+    [BT_APPLIES_IMPACTS] = "where collisions are identified",
     [BT_APPLIES_WINDOW] = "with a moving window",
 };
 
@@ -77,13 +77,14 @@ static char *in_words(const char *name)
 static void registry_check(const char *name, int more, bt_errors *err)
 {
     if (!bt_is_name(name, MOST_NAME))
-        bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name,
+        bt_errors_add(err, "quantity \"%s\": the name must have only lower-case letters, digits and _, at most "
+                           "%d", name,
                       MOST_NAME);
     else if (is_taken(name))
-        bt_errors_add(err, "quantity %s: there is a series of this name; choose another", name);
+        bt_errors_add(err, "quantity %s: a series of this name exists already; choose another", name);
     if (n_added + more > BT_MAX_ADDED)
-        bt_errors_add(err, "quantity %s: a program can add %d of them, and they are all there; take the name of a "
-                      "force whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
+        bt_errors_add(err, "quantity %s: a program can add at most %d, and all are in use; use the name of a force "
+                      "whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
 }
 
 bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
@@ -92,9 +93,9 @@ bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
     const char *name = quantity->name ? quantity->name : "";
     registry_check(name, 1, err);
     if (!quantity->units || !*quantity->units)
-        bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
+        bt_errors_add(err, "quantity %s: it has no units; give \"1\" for a plain number", name);
     if (!quantity->description || strlen(quantity->description) < 8)
-        bt_errors_add(err, "quantity %s: say in a sentence what it is (`description`)", name);
+        bt_errors_add(err, "quantity %s: describe it in one sentence (`description`)", name);
     if (!quantity->of_world == !quantity->of_floe)
         bt_errors_add(err, "quantity %s: give it one of `of_world` and `of_floe`", name);
     if ((unsigned)quantity->keep >= BT_KEEP_KINDS || (unsigned)quantity->applies >= BT_APPLIES_KINDS ||

@@ -61,8 +61,8 @@ static void refuse(bt_h5_reader *old, const bt_snapshot *snap, const char *why)
 {
     if (old->status != BT_OK) return;
     old->status = bt_fail(old->err, BT_ERR_CASE,
-        "%s: belongs to another run than %s: %s; restore the result of that run, or go on from a checkpoint "
-        "of this one",
+        "%s: does not belong to the run of %s: %s; restore the result of that run, or continue from a checkpoint of "
+        "this one",
         old->path, snap->path, why);
 }
 
@@ -123,8 +123,7 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
     if (!read || strcmp(text, wanted) != 0) {
         if (!read || !same_values(record->c, text)) // otherwise only its comments have been edited
             bt_errors_add(&warnings,
-                          "warning: %s: was not the case that the run began with; it is written anew, by the "
-                          "checkpoint",
+                          "warning: %s: was not the case that the run began with; it is rewritten from the checkpoint",
                           path);
         status = bt_record_write_text(record, CASE_FILE, wanted, err);
     }
@@ -232,12 +231,13 @@ static void check_added(bt_snapshot *snap)
     }
     if (missing && !snap->faulty)
         bt_errors_add(snap->err,
-                      "%s: the run had no %s, which this program has added; go on in one that adds no other quantities",
+                      "%s: the run had no %s, which this program has added; continue in a program that adds no other "
+                      "quantities",
                       snap->path, missing);
     else if (left_over && !snap->faulty)
         bt_errors_add(
             snap->err,
-            "%s: the run had %s, which a program had added (a force or a quantity); go on in one that adds it",
+            "%s: the run had %s, which a program had added (a force or a quantity); continue in a program that adds it",
             snap->path, left_over);
     snap->faulty |= missing || left_over;
 }
@@ -256,7 +256,7 @@ static void load_history(bt_history *history, bt_snapshot *snap, int64_t n)
         const bool there = k < BT_N_COLUMNS || bt_snapshot_find(snap, name);
         history->column[k] = there ? bt_snapshot_copy(snap, name, BT_ITEM_F64, 1, &n)
                                    : bt_alloc((size_t)n, sizeof *history->column[k]);
-        bt_snapshot_want(snap, n == history->n, name, -1, "has not a value for each step");
+        bt_snapshot_want(snap, n == history->n, name, -1, "does not have a value for each step");
     }
     if (snap->faulty) history->n = 0;
 }
@@ -336,8 +336,8 @@ static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int
                   width = bt_h5_size(old, "/frames/pose", 1);
     if (old->status != BT_OK || (there >= entries && pictures >= frames && width == floes)) return;
     old->status = bt_fail(old->err, BT_ERR_CASE,
-        "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint expects %lld, %lld and "
-        "%lld: it is of another run, or older; restore it",
+        "%s: holds %lld entries and %lld frames of %lld floes, but the checkpoint expects %lld, %lld and %lld: it "
+        "belongs to another run, or is older; restore it",
         old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries,
         (long long)frames, (long long)floes);
 }

@@ -28,8 +28,8 @@
 #define WORLD(type, member, units, check, meaning) BT_STATE_ONE(bt_world, #member, type, member, units, check, meaning)
 static const bt_state_row world_rows[] = {
     WORLD(I64, step, "1", COUNT, "steps done"),
-    WORLD(F64, drift_x, "m", FINITE, "way that the water has gone, x"),
-    WORLD(F64, drift_y, "m", FINITE, "way that the water has gone, y"),
+    WORLD(F64, drift_x, "m", FINITE, "distance that the water has moved, x"),
+    WORLD(F64, drift_y, "m", FINITE, "distance that the water has moved, y"),
 };
 
 #define PAR(member, units, check, meaning) BT_STATE_ONE(bt_params, #member, F64, member, units, check, meaning)
@@ -41,7 +41,7 @@ static const bt_state_row par_rows[] = {
     PAR(period_x, "m", FINITE, "length of the domain where x is periodic, 0 = it is not"),
     PAR(period_y, "m", FINITE, "length of the domain where y is periodic, 0 = it is not"),
     PAR(tolerance, "m/s", FINITE, "residual at which the solver stops"),
-    PAR(slop, "m", FINITE, "overlap that is left alone"),
+    PAR(slop, "m", FINITE, "overlap that is tolerated"),
     PAR(size, "m", FINITE, "mean floe diameter"),
     PAR(water_u, "m/s", FINITE, "velocity of the water in the last step, x"),
     PAR(water_v, "m/s", FINITE, "velocity of the water in the last step, y"),
@@ -60,7 +60,7 @@ static const bt_state_row cells_rows[] = {
     CELLS(F64, y0, "m", FINITE, "low corner of the grid of cells, y"),
     CELLS(F64, side_x, "m", FINITE, "side of a cell, x"),
     CELLS(F64, side_y, "m", FINITE, "side of a cell, y"),
-    CELLS(F64, allowance, "m", ANY, "how far a centroid may stand outside its cell"),
+    CELLS(F64, allowance, "m", ANY, "how far a centroid may be outside its cell"),
     CELLS(F64, reach, "m", NOT_NEGATIVE, "largest radius of a floe"),
     CELLS(F64, heaviest, "kg", NOT_NEGATIVE, "mass of the heaviest floe"),
     CELLS(U8, rebounds, "1", ANY, "1 = some body has a restitution"),
@@ -71,7 +71,7 @@ static const bt_state_row cells_rows[] = {
     CELLS(I32, n_y, "1", ANY, "cells, y"),
     CELLS(I32, wrap_x, "1", ANY, "cells of a period, x; 0 = not periodic"),
     CELLS(I32, wrap_y, "1", ANY, "cells of a period, y; 0 = not periodic"),
-    CELLS(U8, relabel, "1", ANY, "1 = the cells are to be labelled anew"),
+    CELLS(U8, relabel, "1", ANY, "1 = the cells are to be labelled again"),
     CELLS(I64, n_labellings, "1", COUNT, "times that the cells were labelled"),
 };
 
@@ -84,9 +84,9 @@ static const bt_state_row tow_rows[] = {
     TOW(F64, time, "s", ANY, "time of the tow"),
     TOW(F64, carriage_x, "m", FINITE, "towing end of the line, x"),
     TOW(F64, carriage_y, "m", FINITE, "towing end of the line, y"),
-    TOW(F64, travel_x, "m", FINITE, "place of the towed body, not wrapped, x"),
-    TOW(F64, travel_y, "m", FINITE, "place of the towed body, not wrapped, y"),
-    TOW(F64, way, "m", FINITE, "length of path along which the towing end, or the towed body, has been led"),
+    TOW(F64, travel_x, "m", FINITE, "position of the towed body, not wrapped, x"),
+    TOW(F64, travel_y, "m", FINITE, "position of the towed body, not wrapped, y"),
+    TOW(F64, way, "m", FINITE, "distance of the towing end, or of the towed body, along its path"),
     TOW(I32, mark, "1", ANY, "way-points passed"),
     TOW(F64, ux, "1", FINITE, "direction of the tow, x"),
     TOW(F64, uy, "1", FINITE, "direction of the tow, y"),
@@ -98,7 +98,7 @@ static const bt_state_row tow_rows[] = {
     BRANCH("broken_2", U8, 1, broken, "1", ANY, "1 = the second branch has parted"),
     VESSEL(vx, "m/s", FINITE, "velocity of the vessel, x"),
     VESSEL(vy, "m/s", FINITE, "velocity of the vessel, y"),
-    VESSEL(way, "m", FINITE, "way of the vessel along the path"),
+    VESSEL(way, "m", FINITE, "distance of the vessel along the path"),
 };
 
 #define WINDOW(type, width, member, units, axes, check, meaning) \
@@ -114,7 +114,7 @@ static const bt_state_row window_rows[] = {
         "momentum x, y and kinetic energy of the floes taken out, in all"),
     WINDOW(F64, 3, brought, "kg m/s, kg m/s, J", "one momentum_energy", FINITE,
         "momentum x, y and kinetic energy of the floes brought in, in all"),
-    WINDOW(F64, 1, most, "m", "one", FINITE, "largest way of the body through undisturbed ice, along the tow"),
+    WINDOW(F64, 1, most, "m", "one", FINITE, "largest distance of the body through undisturbed ice, along the tow"),
     WINDOW(F64, 1, overtaken, "m", "one", FINITE, "by how much it fell behind that, at most"),
     BT_STATE_ONE(bt_window, "rear_in_ice", F64, rear, "m", FINITE,
         "place of the rear end now, along the tow, in a frame that drifts with undisturbed ice"),
@@ -123,8 +123,8 @@ static const bt_state_row window_rows[] = {
 #define UNDISTURBED(width, member, units, axes, check, meaning) \
     BT_STATE_MEMBER(bt_undisturbed, #member, F64, width, member, units, axes, check, meaning)
 static const bt_state_row undisturbed_rows[] = {
-    UNDISTURBED(1, drift_x, "m", "one", FINITE, "way of the undisturbed ice, x"),
-    UNDISTURBED(1, drift_y, "m", "one", FINITE, "way of the undisturbed ice, y"),
+    UNDISTURBED(1, drift_x, "m", "one", FINITE, "distance that the undisturbed ice has moved, x"),
+    UNDISTURBED(1, drift_y, "m", "one", FINITE, "distance that the undisturbed ice has moved, y"),
     UNDISTURBED(4, vel, "m/s, m/s, rad/s, 1", "one motion", FINITE,
         "velocity of the undisturbed ice, x, y, turning; the last is unused"),
 };
@@ -407,8 +407,8 @@ static void check_added_laws(const bt_world *world, bt_snapshot *snap)
     char *now = added_laws(world);
     if (strcmp(now, then) && snap->err)
         bt_errors_add(snap->err,
-                      "%s: the run had the added contact laws %s, in this order, and this program has %s; go on in one "
-                      "that registers the same laws in the same order",
+                      "%s: the run had the added contact laws %s, in this order, but this program has %s; continue in "
+                      "a program that registers the same laws in the same order",
                       snap->path, then, *now ? now : "none");
     snap->faulty |= strcmp(now, then) != 0;
     free(now);
@@ -444,8 +444,8 @@ static void load_added_forces(bt_forces *forces, bt_snapshot *snap)
     if (!*next) return;
     if (snap->err)
         bt_errors_add(snap->err,
-                      "%s: the run had %s, which a program had added (force laws, in this order); go on in one that "
-                      "adds the same in the same order, before any other: in a new process",
+                      "%s: the run had %s, which a program had added (force laws, in this order); continue in a new "
+                      "process that adds the same laws in the same order, before any other",
                       snap->path, then);
     snap->faulty = true;
 }
@@ -605,7 +605,7 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
     bt_cells_restore(world, memory, n);
     if (bt_world_hash(world) == hash) return BT_OK;
     return bt_fail(err, BT_ERR_NUMERIC,
-                   "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
-                   "; go on with the program that wrote it",
+                   "%s: the state read from it does not have the hash that it was saved with, %016" PRIx64
+                   "; use the program that wrote it",
                    snap->path, hash);
 }

@@ -14,14 +14,14 @@
 static const bt_state_row stall_rows[] = {
     STALL(I64, windows, "1", COUNT, "windows of time in which the body stood still"),
     STALL(F64, time, "s", FINITE, "time of these"),
-    STALL(F64, asked, "m", FINITE, "way asked for in the window under way"),
+    STALL(F64, asked, "m", FINITE, "distance asked for in the current window"),
     STALL(F64, spent, "s", FINITE, "time spent in it"),
     STALL(F64, from_x, "m", FINITE, "where the body was at its beginning, x"),
     STALL(F64, from_y, "m", FINITE, "where the body was at its beginning, y"),
-    STALL(U8, begun, "1", ANY, "1 = such a window is under way"),
+    STALL(U8, begun, "1", ANY, "1 = such a window has begun"),
     STALL(F64, ice, "N s", FINITE, "impulse of the ice against the tow in it"),
     STALL(F64, pull, "N s", FINITE, "impulse of the tow in it"),
-    STALL(F64, inside, "s", ANY, "time for which the towing end was within the hull, after it had been outside"),
+    STALL(F64, inside, "s", ANY, "time for which the towing end was inside the hull, after it had been outside"),
     STALL(F64, inside_from, "s", ANY, "when it first was"),
     STALL(U8, outside, "1", ANY, "1 = the towing end has been outside the hull"),
 };
@@ -190,7 +190,7 @@ void bt_state_load_field(bt_field *field, bt_snapshot *snap)
     for (int k = 0; k < 3; k++) {
         int64_t rows = 0;
         *arrays[k] = bt_snapshot_copy(snap, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
-        bt_snapshot_want(snap, rows == n - 1, names[k], -1, "has not a row for each floe");
+        bt_snapshot_want(snap, rows == n - 1, names[k], -1, "does not have a row for each floe");
     }
     if (!snap->faulty) field->n = field->cap = (bt_idx)(n - 1);
     field->cap_vertices = n_vertices;

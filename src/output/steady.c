@@ -147,7 +147,7 @@ static int64_t find_start(bt_steady *steady, const bt_history *history, const bt
     }
     if (settles >= 0) {
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_SETTLING,
-                "the %s still settles where the search for a start ends, halfway from %g s to the end of the run, and "
+                "the %s is still settling where the search for a start ends, halfway from %g s to the end of the run; "
                 "the window begins there (%g s): run longer",
                 reported[settles].name, steady->earliest, history->column[BT_COL_TIME][first]);
         bt_warn_name(&steady->reasons, "series", reported[settles].key);
@@ -218,18 +218,18 @@ static void judge_solver(bt_steady *steady, const bt_case *input, const bt_run_t
     const double speed = totals->tolerance / input->solver.tolerance;
     if (steady->at_least)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NO_LOAD,
-                "%.3g %% of the steps in the window have no solution, so the loads of the body are at least those "
+                "%.3g %% of the steps in the window have no solution, so the loads on the body are at least those "
                 "given: let ice give way (ice.rafting.kappa, ice.crushing.pressure), or do not use them",
                 100 * steady->no_load);
     if (steady->unconverged > BT_STEADY_UNCONVERGED)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_UNCONVERGED_SHARE,
-                "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise "
+                "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean tolerates: raise "
                 "solver.max_sweeps or lower run.dt",
                 100 * steady->unconverged, 100 * BT_STEADY_UNCONVERGED);
     if (steady->residual > BT_STEADY_RESIDUAL * speed)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_RESIDUAL,
-                "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of "
-                "%.3g m/s: raise solver.max_sweeps or lower run.dt",
+                "a step in the window ended with a residual of %.2g m/s, more than %g of the reference speed of %.3g "
+                "m/s: raise solver.max_sweeps or lower run.dt",
                 steady->residual, BT_STEADY_RESIDUAL, speed);
 }
 
@@ -297,10 +297,10 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
         if (!(turn > BT_TURN) || mark - arc >= steady->led[1] - slack ||
             mark + arc + followed_in(input, turn) <= steady->led[0] + slack)
             continue;
-        char when[60] = "that it begins to turn to";
+        char when[60] = "to which it begins to turn";
         if (isfinite(passed)) snprintf(when, sizeof when, "passed at %g s", passed);
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_COURSE_CHANGES,
-                "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run before, begin "
+                "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run earlier, begin "
                 "the window later, or read the series",
                 turn * 180 / BT_PI, k + 1, when,
                 mark + arc > steady->led[0] + slack ? "" : " for the body, which follows its line");
@@ -322,8 +322,8 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
     for (int i = 0; i + 1 < input->tow.n_programme; i++) {
         if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= steady->start || p[2 * i] >= steady->end) continue;
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PROGRAMME,
-                "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read "
-                "the series",
+                "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run earlier, or "
+                "read the series",
                 p[2 * i + 1], p[2 * i + 3], steady->start, steady->end);
     }
     for (int64_t i = 0; totals->events && i < totals->events->n; i++) {
@@ -333,7 +333,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
                     "the last line parted at %g s, and nothing has towed the body since", event->time);
         else if (event->kind == BT_EVENT_LINE_BROKEN && event->time > steady->start)
             bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PARTED_IN_WINDOW,
-                    "a line parted at %g s, within the window, whose means mix before and after",
+                    "a line parted at %g s, within the window: the means mix the time before and after",
                     event->time);
     }
     if (!totals->window) return;
@@ -341,7 +341,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
     if (places > 0 && (double)totals->window->missed > BT_STEADY_MISSED * places)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PLACES_MISSED,
                 "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or "
-                "carries it along: take a longer domain",
+                "carries it along: use a longer domain",
                 100 * (double)totals->window->missed / places);
 }
 
@@ -378,7 +378,7 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
     const double way = come_on(steady, history, input, totals);
     if (totals->stall.inside > 0)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_END_INSIDE,
-                "the towing end was within the hull for %.3g s, from %.4g s on: the body has overtaken it, and its "
+                "the towing end was inside the hull for %.3g s, from %.4g s on: the body has overtaken it, and its "
                 "line pulls from behind",
                 totals->stall.inside, totals->stall.inside_from);
     if (totals->stall.time > BT_STEADY_STALLED * steady->end)
@@ -388,7 +388,7 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
                 totals->stall.time, steady->end);
     else if (way < BT_STALL_SHARE * asked && !steady->turns) { // with turns the body may be on the previous leg
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NO_HEADWAY,
-                "the tow asked for %.4g m within the window, %g to %g s, and the body has %s %.3g m over ground: it "
+                "the tow asked for %.4g m within the window, %g to %g s, but the body has %s %.3g m over ground: it "
                 "makes no headway",
                 asked, steady->start, steady->end, way < 0 ? "gone astern by" : "moved ahead by", fabs(way));
         bt_warn_number(&steady->reasons, "way_m", way);
@@ -478,7 +478,7 @@ void bt_steady_find(bt_steady *steady, const bt_history *history, const bt_case 
     steady->n = history->n - steady->first;
     if (steady->n == 0) {
         bt_warn(because(steady, BT_TOO_SHORT), BT_WARN_NO_WINDOW,
-                "no window: it would begin at %g s and the run ends at %g s: run longer, or %s",
+                "no window: it would begin at %g s, but the run ends at %g s: run longer, or %s",
                 steady->earliest, history->n ? time[history->n - 1] : 0,
                 steady->given                  ? "lower output.window_start"
                 : input->tow.n_programme > 0 ? "let tow.programme reach its largest speed earlier"

@@ -47,7 +47,7 @@ void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
     bt_warn(warnings, BT_WARN_WINDOW_LAPS,
             "the moving window travels %.2f times its length through the ice: after each length the body meets the "
             "same field again, with the hole where it stood at time zero; samples a length apart are not independent, "
-            "and the standard error may be too small; take a longer domain, or several values of ice.seed",
+            "and the standard error may be too small; use a longer domain, or several values of ice.seed",
             laps);
 }
 
@@ -66,12 +66,12 @@ static void summary_window_warn(bt_errors *warnings, const bt_window *window)
     if (places > 0 && (double)window->missed > SHARE_LIMIT * places)
         bt_warn(warnings, BT_WARN_PLACES_MISSED,
                 "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
-                "along, or pushes them far ahead; it meets that much less ice; take a longer domain",
+                "along, or pushes them far ahead, and so meets that much less ice; use a longer domain",
                 100 * (double)window->missed / places);
     if (floes > 0 && (double)window->kept > SHARE_LIMIT * floes)
         bt_warn(warnings, BT_WARN_FLOES_KEPT,
                 "%.1f %% of the floes behind the moving window came back ahead unchanged, since their places were not "
-                "free: disturbed ice enters; take a longer domain, and more of it behind the body",
+                "free: disturbed ice enters; use a longer domain, and more of it behind the body",
                 100 * (double)window->kept / floes);
 }
 
@@ -158,8 +158,8 @@ static void reduce_window(bt_summary *summary, const bt_history *history)
                 bt_balance_words(), fabs(summary->closure_relative));
     if (fabs(summary->budget_closure_relative) > CLOSURE_LIMIT)
         bt_warn(&summary->warnings, BT_WARN_ICE_BALANCE,
-                "the mean ice resistance differs by %.2g from the one by momentum, without the contacts of the "
-                "body; that balance does not close",
+                "the mean ice resistance differs by %.2g from that by momentum, without the contacts of the body; that "
+                "balance does not close",
                 fabs(summary->budget_closure_relative));
 }
 
@@ -201,20 +201,20 @@ static void warn_of_solver(bt_summary *summary, const bt_history *history, const
 {
     if (history->unconverged)
         bt_warn(&summary->warnings, BT_WARN_UNCONVERGED,
-                "%lld of %lld steps met the limit of work before the tolerance (largest residual %.2g m/s, "
-                "tolerance %.2g m/s); %s",
+                "%lld of %lld steps reached the work limit before the tolerance (largest residual %.2g m/s, tolerance "
+                "%.2g m/s); %s",
                 (long long)history->unconverged, (long long)history->n, history->max_residual, totals->tolerance,
                 history->locked_steps >= (double)history->unconverged ? "more work would not help"
                                                                       : "raise solver.max_sweeps or lower run.dt");
     if (history->locked_steps > 0)
         bt_warn(&summary->warnings, BT_WARN_LOCKED,
-                "in %.0f of %lld steps bodies were locked between others that give way to nothing (walls, a body "
-                "at a given speed), so that no bounded load keeps them apart and their forces are no numbers: "
+                "in %.0f of %lld steps bodies were locked between others that cannot give way (walls, a body at a "
+                "given speed), so no bounded load keeps them apart and their forces are undefined: "
                 BT_LOCKED_REMEDY,
                 history->locked_steps, (long long)history->n);
     if (history->unprojected > 0)
         bt_warn(&summary->warnings, BT_WARN_UNPROJECTED,
-                "in %lld of %lld steps the position projection met its limit of work and left overlap: raise "
+                "in %lld of %lld steps the position projection reached its work limit and left overlap: raise "
                 "solver.position_sweeps, or, where bodies are pressed together more slowly than the tolerance "
                 "resolves, lower solver.tolerance",
                 (long long)history->unprojected, (long long)history->n);
@@ -243,11 +243,11 @@ static void warn_of_splits(bt_summary *summary, const bt_run_totals *totals)
                 (long long)p->deferred, BT_SPLIT_ROUNDS);
     if (p->no_id > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_RESERVE,
-                "%lld floes could not split after %lld splits, for which there were ids; raise ice.splitting.reserve",
+                "%lld floes could not split after %lld splits, which used up all ids; raise ice.splitting.reserve",
                 (long long)p->no_id, (long long)totals->splitting->reserve / 2);
     if (p->unconverged > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_UNCONVERGED,
-                "%lld of %lld steps did not converge, and no floe split in them; raise solver.max_sweeps or lower "
+                "%lld of %lld steps did not converge, so no floe split in them; raise solver.max_sweeps or lower "
                 "run.dt",
                 (long long)p->unconverged, (long long)totals->n_steps);
 }
@@ -267,9 +267,9 @@ static void warn_of_bodies(bt_summary *summary, const bt_history *history, const
     if (totals->splitting) warn_of_splits(summary, totals);
     if (totals->stall.inside > 0)
         bt_warn(&summary->warnings, BT_WARN_END_INSIDE,
-                "the towing end was within the hull for %.3g s, from %.4g s on: a following current, a tow that "
-                "slows down or a sharp turn let the body overtake it; nothing in the model keeps them apart, and "
-                "the line pulls from behind afterwards",
+                "the towing end was inside the hull for %.3g s, from %.4g s on: a following current, a tow that slows "
+                "down or a sharp turn let the body overtake it; nothing in the model keeps them apart, and the line "
+                "pulls from behind afterwards",
                 totals->stall.inside, totals->stall.inside_from);
     if (totals->stall.windows)
         bt_warn(&summary->warnings, BT_WARN_STALLED,

@@ -113,7 +113,7 @@ static void print_forces(const bt_summary *summary, const bt_case *input)
     else if (steady->met_no_ice) printf("    ice resistance    none: the body met no ice\n");
     else print_mean("  ice resistance", &summary->ice, steady->at_least);
     if (bt_case_reads_field(input) || bt_case_ice_is_random(input))
-        printf("    one field         the interval knows this field alone: take several %s for a number to use\n",
+        printf("    one field         the interval covers only this field: use several %s for a usable number\n",
                bt_case_reads_field(input) ? "maps, or make fields like this one," : "values of ice.seed");
     const double *quarter = steady->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s%s,", steady->at_least ? "at least: " : "", bt_force_text(a, quarter[0]));
@@ -186,9 +186,9 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
         const bt_estimate_input *in = &summary->estimate;
         printf("  estimates           at %.4g m/s through the ice", in->along);
         if (fabs(in->along - in->ordered) > 0.01 * fabs(in->ordered)) printf(" (%.4g ordered)", in->ordered);
-        printf(": force, ice resistance of this run / estimate where that knows the concentration%s and holds, "
-               "regime\n",
-               in->channel ? " (none knows the channel)" : "");
+        printf(": force, ice resistance of this run / estimate where the estimate depends on the concentration%s and "
+               "holds, regime\n",
+               in->channel ? " (none accounts for the channel)" : "");
         bt_estimates_print(in, bt_summary_held_against(summary), "    ", false);
     }
     if (history->n)
@@ -199,7 +199,7 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
     printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", history->max_overlap,
            totals->mean_size > 0 ? 100 * history->max_overlap / totals->mean_size : 0.0);
     printf("  momentum residual   %.2g; ", history->max_momentum_residual);
-    if (isnan(history->contact_work)) printf("contact work is no number, since some steps have no solution\n");
+    if (isnan(history->contact_work)) printf("contact work is undefined, since some steps have no solution\n");
     else printf("contact work %.4g J\n", history->contact_work);
     for (int law = 0; law < BT_LAWS; law++) {
         char *line =

@@ -62,7 +62,7 @@ static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status stat
     if (bt_member_record_failure(entry->folder, status, why, &unrecorded) != BT_OK &&
         ensemble->lost++ < BT_MOST_REPORTED)
         bt_errors_add(ensemble->err,
-                      "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again",
+                      "member %s failed (%d): %s; this could not be recorded, so the next call tries it again",
                       entry->m.name, (int)status, why->n ? why->text[0] : "no reason given");
     bt_errors_free(&unrecorded);
 }
@@ -271,7 +271,7 @@ static bool wait_for_others(bt_ensemble *ensemble, int looks)
     bt_comm_bcast(ensemble->world, &n, sizeof n);
     if (n == 0) return false;
     if (looks == 0 && !ensemble->o->quiet && ensemble->jobs == 1 && ensemble->world->rank == 0) {
-        printf("waiting for %" PRId64 " member%s at work in other processes (--no-wait does not)\n", n, bt_plural(n));
+        printf("waiting for %" PRId64 " member%s in other processes (--no-wait: do not wait)\n", n, bt_plural(n));
         fflush(stdout);
     }
     nanosleep(&(struct timespec){.tv_nsec = looks < 50 ? 10000000 : 500000000}, NULL);
@@ -316,8 +316,8 @@ static bt_status check_ice(const bt_study *study, bt_errors *err)
 static void warn_fixed(const bt_ensemble *ensemble)
 {
     if (ensemble->fixed == 0 || ensemble->s->repeats == 1) return;
-    bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions the ice does not depend on the seed, as it is "
-                   "read from a file, or there is none: the fields of each are one run",
+    bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions no ice depends on the seed (ice from a file, or "
+                   "none): the fields of each are one run",
                    ensemble->fixed, ensemble->s->n_conditions);
 }
 

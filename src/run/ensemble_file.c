@@ -298,7 +298,7 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
     if (status != BT_OK) {
         free(t->reason[m]);
         t->reason[m] =
-            bt_text_of("its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again",
+            bt_text_of("its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is run again",
                        why.n ? why.text[0] : "no reason given");
         put_text(&t->hole[m], status == BT_ERR_IO ? "unreadable" : "unsound");
     }
@@ -437,8 +437,8 @@ bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_r
     }
     if (status == BT_OK && t.unread)
         status = bt_fail(err, BT_ERR_IO,
-            "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
-            "correct that, and call again",
+            "%s: %" PRId64 " finished members are not in it, because their files could not be read; correct that, and "
+            "call again",
             path, t.unread);
     bt_member_notes_free(warnings);
     *warnings = t.warnings;

@@ -412,12 +412,12 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
         bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MOST_REPORTED,
                       bt_plural(n.unsound - BT_MOST_REPORTED));
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " remaining member%s",
+        bt_errors_add(err, "stopped by %s; the same call continues with the %" PRId64 " remaining member%s",
                       bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left,
                       bt_plural(n.left));
     else if (n.at_work)
         bt_errors_add(err,
-                      "%" PRId64 " member%s at work in other processes; the same call takes in what those finish",
+                      "%" PRId64 " member%s still running in other processes; the same call takes in those that finish",
                       n.at_work, bt_plural(n.at_work));
     else if (n.left && worst == BT_OK)
         bt_errors_add(err, "%" PRId64 " member%s left; the same call runs the rest", n.left, bt_plural(n.left));

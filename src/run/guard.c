@@ -211,15 +211,15 @@ void bt_guard_name(const bt_guard *guard, const bt_world *world, bt_errors *err)
         body_name(guard, world, (bt_gid)found[0], name);
         bt_errors_add(err,
                       "step %" PRId64 ": %s has a pose or velocity that is not a number, or a contact law stores one "
-                                      "for it; take a smaller run.dt, and check the law, and masses, stiffness and "
+                                      "for it; use a smaller run.dt, and check the law, and masses, stiffness and "
                                       "speeds of the case",
                       world->step, name);
     }
     if (found[1] >= 0) {
         body_name(guard, world, (bt_gid)found[1], name);
         bt_errors_add(err,
-                      "step %" PRId64 ": %s is beyond a wall (guard.escape); "
-                      "take a smaller run.dt, or more solver.max_sweeps",
+                      "step %" PRId64 ": %s is beyond a wall (guard.escape); use a smaller run.dt, or more "
+                      "solver.max_sweeps",
                       world->step, name);
     }
 }
@@ -231,8 +231,8 @@ static bool numbers_of_state(const bt_world *world, bt_errors *err)
     char buffer[64];
     const char *name = bt_state_not_finite(world, buffer);
     if (name) bt_errors_add(err,
-                            "step %" PRId64 ": %s of the state is not a number; "
-                            "take a smaller run.dt, and check masses, stiffness and speeds of the case",
+                            "step %" PRId64 ": %s of the state is not a number; use a smaller run.dt, and check "
+                            "masses, stiffness and speeds of the case",
                             world->step, name);
     return !name;
 }
@@ -243,8 +243,8 @@ static bool numbers_of_sample(const bt_world *world, const bt_sample *sample, bt
     if (!quantity) return true;
     const double x = bt_sample_value(sample, quantity);
     bt_errors_add(err,
-                  "step %" PRId64 ": %s (%s) is %s; "
-                  "take a smaller run.dt, and check masses, stiffness and speeds of the case",
+                  "step %" PRId64 ": %s (%s) is %s; use a smaller run.dt, and check masses, stiffness and speeds of "
+                  "the case",
                   world->step, quantity->name, quantity->description,
                   isnan(x)                   ? "not a number, or a sum of numbers too large to add"
                   : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure"
@@ -257,7 +257,7 @@ static bool overlap_within(const bt_guard *guard, const bt_world *world, double 
     if (!(guard->overlap > 0) || overlap <= guard->overlap) return true;
     bt_errors_add(err,
                   "step %" PRId64 ": two bodies overlap by %.4g m, %.3g of the mean floe size (guard.overlap %.3g); "
-                  "take a smaller run.dt, or more solver.max_sweeps and solver.position_sweeps",
+                  "use a smaller run.dt, or more solver.max_sweeps and solver.position_sweeps",
                   world->step, overlap, overlap / guard->size, guard->overlap / guard->size);
     return false;
 }
@@ -273,8 +273,8 @@ bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *samp
         sound = false;
         bt_errors_add(err,
                       "step %" PRId64
-                      ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
-                      "take a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
+                      ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; use "
+                      "a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
                       world->step, sample->kinetic_energy, guard->energy);
     }
     if (guard->unconverged > 0 && guard->in_a_row >= guard->unconverged) {
@@ -285,8 +285,8 @@ bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *samp
             "%s",
             world->step, guard->in_a_row,
             sample->locked != 0
-            ? "in the last, bodies are locked between others that give way to nothing: " BT_LOCKED_REMEDY
-                                : "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
+            ? "in the last, bodies are locked between others that cannot give way: " BT_LOCKED_REMEDY
+                                : "use a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure "
                                   "where ice jams");
     }
     guard->locked += sample->locked != 0;
@@ -294,7 +294,7 @@ bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *samp
         sound = false;
         bt_errors_add(err,
                       "step %" PRId64 ": %" PRId64 " steps have no solution, since bodies are locked between others "
-                      "that give way to nothing, and guard.no_solution allows %" PRId64 ": " BT_LOCKED_REMEDY,
+                      "that cannot give way; guard.no_solution allows %" PRId64 ": " BT_LOCKED_REMEDY,
                       world->step, guard->locked, guard->most_locked);
         bt_errors_code(err, "no_solution");
     }

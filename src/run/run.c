@@ -147,17 +147,18 @@ void bt_run_keep_failure(const bt_comm *comm, const bt_case *input, const bt_run
     snap.err = &unheard;
     const int64_t again = step - 1 - (from ? bt_snapshot_int(&snap, "world/step") : 0);
     if (again > 0 && options->aloud)
-        bt_errors_add(err, "the %" PRId64 " steps up to the state before that one are made again", again);
+        bt_errors_add(err, "the %" PRId64 " steps up to the state before that one are computed again", again);
     tell(comm, options, err);
     bt_run_manner manner = {.kept = from ? &snap : NULL, .start = start, .until = step - 1, .held = true};
     int64_t failed;
     const bt_status status = run_case(comm, input, &quiet, &manner, &failed, &unheard);
     if (status == BT_OK)
-        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again",
+        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` reaches it again",
                       options->dir, BT_FAILURE_FILE, options->dir, BT_FAILURE_FILE);
     else if (status == BT_ERR_SIGNAL)
         bt_errors_add(err,
-                      "the state before that step was not made again: stopped meanwhile; `bergtow resume %s` meets it",
+                      "the state before that step was not computed again: stopped meanwhile; `bergtow resume %s` "
+                      "reaches it",
                       options->dir);
     else
         for (size_t k = 0; k < unheard.n; k++)

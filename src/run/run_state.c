@@ -127,7 +127,8 @@ static void check_table(const bt_table *table, const char *name, bt_snapshot *sn
 {
     bt_snapshot_want(snap, table->n <= BT_MOST_ROWS, name, -1, "has more rows than a table can have");
     for (int64_t i = 0; i < table->n && !snap->faulty; i++)
-        bt_snapshot_want(snap, bt_table_row_sound(table, i), name, i, "is not after the one before, or no velocity");
+        bt_snapshot_want(snap, bt_table_row_sound(table, i), name, i,
+                         "is not later than the row before, or not a velocity");
 }
 
 bt_status bt_running_load_case(bt_case *input, bt_snapshot *snap, bt_errors *err)

@@ -496,7 +496,7 @@ static bt_status finish(run *running, bt_errors *err)
     status = bt_comm_agree(running->comm, status);
     if (status == BT_OK && *stopped)
         status = bt_fail(err, BT_ERR_SIGNAL,
-                         "stopped by %s; %s holds everything up to there, and `bergtow resume %s` goes on", stopped,
+                         "stopped by %s; %s holds everything up to there, and `bergtow resume %s` continues", stopped,
                          running->o->dir, running->o->dir);
     return status;
 }

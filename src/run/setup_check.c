@@ -176,8 +176,8 @@ static bool check_prescribed(const bt_case *input, const bt_world *world, const 
                 if (!meet(input, world, i, j, j >= first_wall)) continue;
                 bt_errors_add(
                     err,
-                    "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
-                    "fixed floe, or tow on a line",
+                    "%s: on its prescribed path %s meets %s, which cannot give way; shorten the run, move the fixed "
+                    "floe, or tow on a line",
                     bt_case_name(input), roster->names[j - roster->n_floes],
                     towed && j != bt_world_towed(world) ? "the towed body" : "a fixed floe of the list floes");
                 sound = false;
@@ -229,8 +229,8 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
         if (periods[k] > 0 && need >= periods[k]) {
             bt_errors_add(
                 err,
-                "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
-                "turn, %.4g m; enlarge it or take smaller bodies",
+                "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they turn, "
+                "%.4g m; enlarge it or use smaller bodies",
                 bt_case_name(input), k ? "width" : "length", periods[k], need);
             sound = false;
         }

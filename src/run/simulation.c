@@ -182,9 +182,9 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
     bt_simulation *sim = simulation_of(options);
     bt_resume resume = {.lock = -1};
     bt_status status = check_numbers(options, &err);
-    if (!options->dir) bt_errors_add(&err, "no folder to go on in; name that of the run in the options (dir)");
+    if (!options->dir) bt_errors_add(&err, "no folder to continue in; name the folder of the run in the options (dir)");
     else if (options->path || options->text || options->n_set > 0)
-        bt_errors_add(&err, "%s holds the case that goes on; path, text and set are for another simulation",
+        bt_errors_add(&err, "%s holds the case to continue; path, text and set are for another simulation",
                       options->dir);
     if (err.n > 0) status = BT_ERR_USAGE;
     else status = bt_resume_begin(&resume, bt_comm_world(), &sim->o, &err);

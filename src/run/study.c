@@ -324,8 +324,8 @@ void bt_study_check_ice(const bt_study *study, bt_errors *err)
     }
     if (v.fixed) {
         bt_errors_add(err,
-                      "%s: repeats: the ice does not depend on the seed, as it is read from a file, or there is none: "
-                      "the %" PRId64 " fields of a condition would be one run; set repeats: 1, and for other ice vary "
+                      "%s: repeats: no ice depends on the seed (ice from a file, or none): the "
+                      "%" PRId64 " fields of a condition would be one run; set repeats: 1, and for other ice vary "
                       "the place of the body (body.x, body.y), or the file",
                       study->path, study->repeats);
         bt_errors_code(err, "one_field");
@@ -435,7 +435,7 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         const char *before = bt_case_said_of(kept, file->path);
         if (before && strncmp(before, line, strlen(line))) {
             status = bt_fail(err, BT_ERR_CASE,
-                             "%s: has changed since members in %s were made with it, and is of another study now; "
+                             "%s: has changed since members in %s were made with it, and now belongs to another study; "
                              "restore it, or give another folder with -o", file->path, dir);
             bt_errors_code(err, "other_study");
         }
@@ -443,8 +443,8 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         fprintf(text.out, "%s: %s", file->path, line);
         added++;
         if (old)
-            bt_errors_add(warnings, "warning: %s: nothing in %s tells what it held when members were made with it; it "
-                                    "is taken as it is now", file->path, dir);
+            bt_errors_add(warnings, "warning: %s: nothing in %s records what it held when members were made with it; "
+                                    "it is used as it is now", file->path, dir);
     }
     char *now = bt_text_end(&text);
     if (status == BT_OK && added) status = bt_file_write(path, now, err);

@@ -106,7 +106,7 @@ static void read_report(const bt_study_reader *reader, const bt_node *map, int l
         const int key = find_key(reader, at, "", name);
         if (key < 0 || !bt_study_check_value(reader, at, name, key, map->item[i])) continue;
         if (find_set(reader->s, name) >= 0)
-            bt_study_complain(reader, at, "%s: stands in `set` too; remove it there", name);
+            bt_study_complain(reader, at, "%s: is also in `set`; remove it there", name);
         char *given = bt_text_of("%s=%s", name, map->item[i]->text), *place = place_of(reader->s, at);
         add_set(reader->s, given, place, false);
         free(given);
@@ -118,7 +118,7 @@ static bt_study_parameter *add_parameter(const bt_study_reader *reader, int line
 {
     bt_study *study = reader->s;
     if (find_set(study, name) >= 0)
-        bt_study_complain(reader, line, "%s: is varied and stands in `set` too; remove it there", name);
+        bt_study_complain(reader, line, "%s: is varied and is also in `set`; remove it there", name);
     if (study->n_parameters == BT_MAX_PARAMETERS) {
         bt_study_complain(reader, line, "more than %d parameters; make several studies", BT_MAX_PARAMETERS);
         return NULL;
@@ -184,21 +184,22 @@ static int axis_of(const bt_study_reader *reader, int line, const char *name)
         if (strncmp(name, parameter->name, n) || name[n] != '=') continue;
         if (parameter->key < 0) {
             bt_study_complain(reader, line,
-                              "with: %.120s: keys that go with a variant stand under its name in `variants`; "
-                                            "move them there", name);
+                              "with: %.120s: keys of a variant belong under its name in `variants`; move them "
+                                            "there", name);
             return -1;
         }
         if (parameter->continuous && study->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
             bt_study_complain(reader, line,
-                              "with: %.120s: %s is drawn from a range, and no condition has just this value; "
-                                            "give a list of its values, or remove what goes with this one", name,
+                              "with: %.120s: %s is drawn from a range, and no condition has exactly this value; give a "
+                                            "list of its values, or remove the keys of this one", name,
                                             parameter->name);
             return -1;
         }
         for (int v = 0; v < parameter->n; v++)
             if (!strcmp(name + n + 1, parameter->value[v])) return p;
     }
-    bt_study_complain(reader, line, "with: %.120s: is no value of a parameter; write key=value as in the list", name);
+    bt_study_complain(reader, line, "with: %.120s: is not a value of a parameter; write key=value as in the "
+                                    "list", name);
     return -1;
 }
 
@@ -233,7 +234,7 @@ static void count_conditions(const bt_study_reader *reader)
             study->n_conditions *= study->parameter[i].n;
     if (study->n_conditions > BT_MAX_MEMBERS || study->n_conditions * study->repeats > BT_MAX_MEMBERS)
         bt_errors_add(reader->err,
-                      "%s: more than %d members; take shorter lists, fewer repeats, or sampling: latin-hypercube",
+                      "%s: more than %d members; give shorter lists, fewer repeats, or sampling: latin-hypercube",
                       study->path, BT_MAX_MEMBERS);
     if (study->sampling == BT_SAMPLING_LATIN_HYPERCUBE && study->n_parameters == 0)
         bt_errors_add(reader->err, "%s: sampling: latin-hypercube: there is nothing to sample; give parameters",
@@ -370,7 +371,8 @@ static void take_override(bt_study *study, const char *text, bt_errors *err)
     if (key < 0 || !may_set(&reader, 0, name, key, &node)) return;
     const char *where = bt_study_varied(study, name); // which would override `set`
     if (where) {
-        bt_study_complain(&reader, 0, "%s: stands under `%s` of %s, which would win; change it there", name, where,
+        bt_study_complain(&reader, 0, "%s: is set under `%s` of %s, which takes precedence; change it "
+                                      "there", name, where,
                           study->path);
         return;
     }

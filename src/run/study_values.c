@@ -48,7 +48,7 @@ bool bt_study_check_value(const bt_study_reader *reader, int line, const char *n
 {
     const bt_key *k = &bt_case_keys[key];
     if (value->kind != BT_NODE_SCALAR || k->type == BT_KEY_POINTS) {
-        bt_study_complain(reader, line, "%s: a study takes single values; points can be set as a text, as in "
+        bt_study_complain(reader, line, "%s: a study needs single values; points can be set as a text, as in "
                           "tow.waypoints: \"[[0, 0], [90 m, 5 m]]\"", name);
         return false;
     }
@@ -97,7 +97,8 @@ void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int 
     if (list->n == 0)
         bt_study_complain(reader, line, "%s: the list is empty; give at least one value", parameter->name);
     if (list->n > BT_MOST_VALUES) { // each is compared with all previous ones
-        bt_study_complain(reader, line, "%s: %d values, at most %d are read; take fewer, or a range", parameter->name,
+        bt_study_complain(reader, line, "%s: %d values, more than the limit of %d; give fewer, or a "
+                                        "range", parameter->name,
                           list->n, BT_MOST_VALUES);
         return;
     }
@@ -110,7 +111,7 @@ void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int 
         int twin = 0;
         while (twin < parameter->n && !same(&value[twin], &value[parameter->n])) twin++;
         if (twin < parameter->n && !strcmp(parameter->value[twin], item->text))
-            bt_study_complain(reader, item->line, "%s: %s stands twice in the list; remove one", parameter->name,
+            bt_study_complain(reader, item->line, "%s: %s is twice in the list; remove one", parameter->name,
                               item->text);
         else if (twin < parameter->n)
             bt_study_complain(reader, item->line, "%s: %s and %s are the same value; remove one", parameter->name,

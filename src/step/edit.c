@@ -21,7 +21,7 @@ static bool may_change(const bt_world *world, bt_gid gid, const double x[3], bt_
     const bt_bodies *bodies = &world->bodies;
     const long long id = (long long)gid;
     if (gid < 0 || gid >= bodies->n_global) {
-        bt_errors_add(err, "body %lld: there is none; ids are 0 to %lld", id, (long long)bodies->n_global - 1);
+        bt_errors_add(err, "body %lld: does not exist; ids are 0 to %lld", id, (long long)bodies->n_global - 1);
         return false;
     }
     if (bodies->gone[gid]) {

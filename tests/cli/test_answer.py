@@ -116,7 +116,7 @@ def test_ranges_of_a_study(tmp_path):
     [r] = assumed.read(tmp_path / "s.yml")
     assert (r.key, r.low, r.high, r.distribution, r.source) == ("ice.friction", "0.1", "0.4", "uniform", "assumed")
     (tmp_path / "s.yml").write_text("parameters:\n  ice.friction: [0.1, 0.4]\n")
-    with pytest.raises(bergtow.BergtowError, match="ice.friction is no range; write it as {from"):
+    with pytest.raises(bergtow.BergtowError, match="ice.friction is not a range; write it as {from"):
         assumed.read(tmp_path / "s.yml")
     assert [r.key for r in assumed.applies(assumed.RANGES, lambda key, default: default, False)] == [
         "body.drag.water_form", "ice.friction"]  # no wind, and floes that do not raft
@@ -224,7 +224,7 @@ def test_a_force_without_a_unit_is_refused(text):
     ("bend", "90", math.pi / 2), ("bend", "-30 deg", -math.pi / 6), ("speeds", "1 m/s,0.5", [1.0, 0.5]),
     ("budget", "3 kn", "a time"), ("concentrations", "97 %", "95 %"), ("efficiency", "1.2", "100 %"),
     ("line-length", "3 kg", "length"), ("head-wind", "-1", "below zero"), ("bend", "400", "150 degrees"),
-    ("fields", "x", "whole number"), ("line-factor", "x", "is no number"),
+    ("fields", "x", "whole number"), ("line-factor", "x", "is not a number"),
     ("line-factor", "0.5", "below 1"), ("budget", "inf", "and finite"), ("speeds", "1 kn,", "a speed")])
 def test_options_take_units_and_say_what_is_wrong(option, text, value):
     """Red: a bare float() as the type, whose message names a function of the program."""
@@ -243,7 +243,7 @@ def test_tables_that_are_not_there_are_refused_whatever_is_asked():
         for text in (None, "60 t"):
             with pytest.raises(BergtowError, match="nothere.csv"):
                 find(text, {}, "nothere.csv")
-    with pytest.raises(BergtowError, match="60 kg: is no bollard pull.*tug-60.*--vessels"):
+    with pytest.raises(BergtowError, match="60 kg: is not a bollard pull.*tug-60.*--vessels"):
         gear.vessel("60 kg", {})
 
 

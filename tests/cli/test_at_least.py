@@ -87,11 +87,11 @@ def locked(tmp_path_factory):
 def test_the_console_says_at_least(locked):
     said = locked.result.stdout
     for words in ("ice resistance    at least ", "quarters          at least: ", "the quasi-static rest has no bound",
-                  "peaks, at least (", "largest quasi-static load at least ", "contact work is no number"):
+                  "peaks, at least (", "largest quasi-static load at least ", "contact work is undefined"):
         assert words in said, words
     assert "from balances" not in said
     (reason,) = [r for r in locked.summary["window"]["reasons"] if r["code"] == "no_load"]
-    assert "have no solution, so the loads of the body are at least those given" in reason["text"]
+    assert "have no solution, so the loads on the body are at least those given" in reason["text"]
     assert "." not in reason["text"].replace("ice.", "").replace("rafting.", "").replace("crushing.", "").replace(
         f"{reason['values']['share_percent']:.3g}", "")  # one sentence
 
@@ -166,7 +166,7 @@ def test_tows_that_ended_for_want_of_a_solution_bound_nothing(tmp_path):
     s = statistics(e)
     (c,) = s["conditions"]
     assert c["without_bound"]["ended"] == ["c001-r007"] and c["without_bound"]["some"] == []
-    assert "1 of 7 tows ended for want of a solution" in c["without_bound"]["words"]
+    assert "1 of 7 tows ended for lack of a solution" in c["without_bound"]["words"]
     assert isinstance(c["resistance"]["mean"], AtLeast) and np.isnan(c["resistance"]["t_95"]).all()
     text = ensemble_text.report(s)
     assert f"at least {text_table.number(float(c['resistance']['mean']))}" in text and "c001-r007" in text

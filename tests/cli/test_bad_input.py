@@ -73,13 +73,13 @@ TEXTS = {
                        "bad.yml:3: ice.density: 1000 kg/m3 is more than water.density, 900 kg/m3", "correct one"),
     "concentration above one": (GOOD.replace("0.3",
                                              "1.2"), "bad.yml:3: ice.concentration: 1.2 is out of range", "[0, 0.95]"),
-    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force and this is a speed",
-                   "m/s"),
+    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n",
+                   "bad.yml:5: tow.speed: kN is the unit of a force, but this is a speed", "m/s"),
     "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
     "trailing junk": (GOOD.replace("0.3", "0.8x"), 'bad.yml:3: ice.concentration: "x"'),
     "hexadecimal": (GOOD + "tow: {speed: 0x10}\n", 'bad.yml:5: tow.speed: "x10"'),
     "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", "bad.yml:5: tow.speed: 0,13 has a comma; write decimals "
-                      "with a point, as in 0.13, and no sign between thousands"),
+                      "with a point, as in 0.13, and thousands without a separator"),
     "decimal comma without braces": (GOOD + "tow:\n  speed: 0,13 m/s\n", "bad.yml:6: tow.speed: 0,13 m/s has a comma",
                                      "as in 0.13 m/s,"),
     "decimal comma in braces": (GOOD + "tow: {speed: 0,13 m/s, ramp: 1}\n",
@@ -87,7 +87,7 @@ TEXTS = {
     "decimal comma of a floe": (GOOD + "floes: [{x: 3, y: 1, length: 0,5}]\n",
                                 "bad.yml:5: floes[0].length: 0,5 has a comma", "as in 0.5"),
     "comma between thousands": (GOOD + "tow:\n  ramp: 1,000 s\n", "bad.yml:6: tow.ramp: 1,000 s has a comma; "
-                                "write decimals with a point, and no sign between thousands"),
+                                "write decimals with a point, and thousands without a separator"),
     "concentration in tenths": (GOOD.replace("0.3", "8"), "bad.yml:3: ice.concentration: 8 is out of range",
                                 "did you mean 0.8 (ice charts count tenths) or 8 %?"),
     "ten tenths": (GOOD.replace("0.3", "10"), "bad.yml:3: ice.concentration: 10 is out of range",
@@ -111,13 +111,13 @@ TEXTS = {
                                 "bad.yml:4: body.vertices: the waterline is refused"),
     "two points": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0]]"),
                    "bad.yml:4: body.vertices: has 2 points"),
-    "ice region outside": (GOOD.replace("size: 1", "x_max: 13"), 
+    "ice region outside": (GOOD.replace("size: 1", "x_max: 13"),
                            "bad.yml:3: ice.x_max: 13 m is more than the high end of the domain, 12 m; move it inside"),
     "empty ice region": (GOOD.replace("size: 1",
                                       "x_min: 5, x_max: 5"), "bad.yml:3: ice.x_min: 5 m is not below ice.x_max"),
     "floes larger than the basin": (GOOD.replace("size: 1", "size: 30"),
                                     "bad.yml:3: ice.size: 30 m is more than the short side of the ice region, 8 m"),
-    "too many floes": (GOOD.replace("size: 1", "size: 0.1 mm"), "bad.yml:3: ice.size:", "floes, at most"),
+    "too many floes": (GOOD.replace("size: 1", "size: 0.1 mm"), "bad.yml:3: ice.size:", "more than the limit of"),
     "too many steps": (GOOD.replace("dt: 0.1", "dt: 1e-12"), "bad.yml:1: run.dt:", "steps"),
     "step longer than the run": (GOOD.replace("dt: 0.1",
                                               "dt: 2"), "bad.yml:1: run.dt: 2 s is more than run.duration"),
@@ -128,7 +128,7 @@ TEXTS = {
     "anchor": (GOOD.replace("run: {", "run: &a {"), "bad.yml:1: anchors and aliases"),
     "two documents": (GOOD + "---\n" + GOOD, "bad.yml:5: a second document"),
     "not YAML": (GOOD + "tow: {speed: 1\n", "not valid YAML"),
-    "tab": ("run:\n\tdt: 1\n", "bad.yml:2: not valid YAML: the line begins with a tab", "write two blanks"),
+    "tab": ("run:\n\tdt: 1\n", "bad.yml:2: not valid YAML: the line begins with a tab", "write two spaces"),
     "tab behind blanks": ("run:\n  dt: 1\n  \tduration: 1\n", "bad.yml:3: not valid YAML: the line begins with a tab"),
     "no colon, first of its section": ("run:\n  dt 1 s\n\n  # one hour\n  duration: 1 h\n",
                                        "bad.yml:2: not valid YAML: a colon is missing", "write dt: 1 s"),
@@ -139,10 +139,10 @@ TEXTS = {
     "no colon, in braces": (GOOD + "tow: {speed 1 m/s, ramp: 2}\n", "bad.yml:5: tow.speed 1 m/s: a colon is missing"),
     "no colon after a section": ("run\n  dt: 1 s\n  duration: 1 h\n", "bad.yml:1: not valid YAML: a colon is missing",
                                  "write run:"),
-    "no blank after a colon": ("run:\n  dt:1 s\n  duration: 1 h\n", "bad.yml:2: not valid YAML: a blank is missing",
+    "no blank after a colon": ("run:\n  dt:1 s\n  duration: 1 h\n", "bad.yml:2: not valid YAML: a space is missing",
                                "write dt: 1 s"),
-    "no blank after a colon, in braces": (GOOD + "tow: {speed:1}\n", "bad.yml:5: tow.speed:1: a colon with a blank"),
-    "two keys in a line": ("run:\n  dt: 1 s duration: 1 h\n", "bad.yml:2: not valid YAML: two keys in one line"),
+    "no blank after a colon, in braces": (GOOD + "tow: {speed:1}\n", "bad.yml:5: tow.speed:1: a colon with a space"),
+    "two keys in a line": ("run:\n  dt: 1 s duration: 1 h\n", "bad.yml:2: not valid YAML: two keys on one line"),
     "indented below a value": ("run:\n  dt: 1 s\n    duration: 1 h\n",
                                "bad.yml:3: not valid YAML: indented deeper than line 2", "indent both lines alike"),
     "percent without its sign": (GOOD.replace("0.3", "80"), "bad.yml:3: ice.concentration: 80 is out of range",
@@ -372,7 +372,7 @@ def test_a_pipe_feeds_one_rank(folder):
     words = [*launcher(2), BERGTOW, "run", "/dev/stdin", "--quiet"]
     result = subprocess.run(words, cwd=folder, input=GOOD.encode(), capture_output=True, timeout=60,
                             env=environment())
-    refused(result, USAGE, "/dev/stdin: is not a file, and each of the 2 ranks would read it")
+    refused(result, USAGE, "/dev/stdin: is not a regular file, but each of the 2 ranks must read it")
 
 
 # ---- what must work ----

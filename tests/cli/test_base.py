@@ -110,9 +110,9 @@ REFUSED = {
     "missing": ({"near": "base: none.yml\ntow: {speed: 1}\n"}, IO, "near.yml:1: base: ", "none.yml: cannot"),
     "missing base of a base": ({"near": "tow: {speed: 1}\nbase: far.yml\n", "far": "\nbase: gone.yml\nrun: {dt: 1}\n"},
                                IO, "far.yml:2: base: ", "gone.yml: cannot"),
-    "itself": ({"near": "tow: {speed: 1}\nbase: ./near.yml\n"}, CASE, "near.yml:2: base: ", "is read already"),
+    "itself": ({"near": "tow: {speed: 1}\nbase: ./near.yml\n"}, CASE, "near.yml:2: base: ", "is being read already"),
     "circle": ({"near": "base: far.yml\ntow: {speed: 1}\n", "far": "run: {dt: 1}\nbase: near.yml\n"}, CASE,
-               "far.yml:2: base: ", "near.yml is read already"),
+               "far.yml:2: base: ", "near.yml is being read already"),
     "a folder": ({"near": "base: .\ntow: {speed: 1}\n"}, IO, "near.yml:1: base: "),
     "a list": ({"near": "base: [a.yml, b.yml]\ntow: {speed: 1}\n"}, CASE, "near.yml:1: base: needs the name of one"),
     "nothing": ({"near": "base:\ntow: {speed: 1}\n"}, CASE, "near.yml:1: base: needs the name of one"),
@@ -156,7 +156,7 @@ def test_a_long_chain_ends(folder):
 
 def test_not_from_the_command_line(folder):
     done = call("check", folder / "near.yml", "--set", "base=far.yml")
-    assert done.returncode != DONE and "what a case is based on cannot be set here" in done.stderr
+    assert done.returncode != DONE and "the base of a case cannot be set here" in done.stderr
 
 
 def test_a_case_is_no_study(folder):

@@ -205,7 +205,7 @@ def test_the_file_that_is_named_is_read(tmp_path):
     assert budget.read_converge(tmp_path / "converge-80.json", tmp_path)["title"] == "NAMED"
     assert budget.read_converge(tmp_path, tmp_path)["title"] == "OTHER"
     for wrong in ("no-such.json", "nowhere"):
-        with pytest.raises(RunError, match="is no converge.json"):
+        with pytest.raises(RunError, match="is not a converge.json"):
             budget.read_converge(tmp_path / wrong, tmp_path)
 
 
@@ -289,7 +289,7 @@ def test_numbers_are_those_of_the_loads_and_the_computation_that_of_the_ice_resi
     assert budget.of_ensemble(e, computed=known)["numerics"]["bias"] < -0.3
     other = budget.of_ensemble(e, "mean_tow_force_n", known)
     assert other["numerics"] is None
-    assert "knows what the computation adds to the mean ice resistance alone" in budget_text.notes(plain(other))
+    assert "knows only what the computation adds to the mean ice resistance" in budget_text.notes(plain(other))
 
 
 def test_what_comes_after_a_line_parted_is_in_no_budget(tmp_path):
@@ -319,7 +319,7 @@ def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):
     assert compared.stale(found, whole) == "of 30 members, while 40 have finished"
     assert compared.stale(compared.state(whole), cut) == "of 40 members, while 30 have finished"
     whole.study += "another"
-    assert compared.stale(found, whole) == "of another study than its folder holds"
+    assert compared.stale(found, whole) == "of a different study from that in its folder"
     assert found["values"] == {"ice.concentration": "0.5"}
     assert compared.common([{"a": "1", "b": "2"}, {"a": "1", "b": "3"}]) == {"a": "1"}
 
@@ -418,7 +418,7 @@ def test_a_study_end_to_end(small):
 
 
 @pytest.mark.parametrize("keys, words", [
-    ({"sampling": "grid"}, "is no Latin hypercube"), ({"fields": "common"}, "has common fields"),
+    ({"sampling": "grid"}, "is not a Latin hypercube"), ({"fields": "common"}, "has common fields"),
     ({"samples": 7}, "has 7 samples, too few for a budget; take 8 or more")])
 def test_a_study_without_a_budget_is_refused_before_its_members_run(tmp_path, keys, words):
     write_case(tmp_path, BASE, "base.yml")
@@ -449,7 +449,7 @@ def test_what_is_refused(small, tmp_path):
     assert "set sampling: latin-hypercube and samples" in said(grid, code=3)
     assert "no such file" in subprocess.run([BERGTOW, "budget", "none.yml"], env=environment(BERGTOW_HOME=ROOT),
                                             cwd=tmp_path, capture_output=True, text=True).stderr
-    assert "is no converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
+    assert "is not a converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
     assert "has no number mean_colour" in said(STUDY, "--of", "mean_colour", out=folder / "out", code=2)
     assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
     for wrong in ("tow_force:101", "tow_force:0"):
@@ -457,6 +457,6 @@ def test_what_is_refused(small, tmp_path):
     # the folder holds another study: its numbers are no answer to this one
     for study, more in ((STUDY | {"samples": 10}, ()), (STUDY, ("--set", "ice.size=0.8"))):
         assert "another study" in said(study, *more, out=folder / "out", code=3)
-    with pytest.raises(RunError, match="is no Latin hypercube"):
+    with pytest.raises(RunError, match="is not a Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Members(made_up.write(tmp_path / "g", [one])))

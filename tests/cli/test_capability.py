@@ -352,8 +352,8 @@ def test_what_is_refused(tmp_path):
                    ice__size=None)
     assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=3)
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
-    assert "4 is no whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
-    assert "each field has a seed of its own" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
+    assert "4 is not a whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
+    assert "each field has its own seed" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
 
 
 def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, monkeypatch):
@@ -384,7 +384,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
 
 def test_a_budget_that_reaches_for_no_run_is_an_error(tmp_path):
     said = found_in(tmp_path, THRUST, "--from", 0.3, "--to", 0.5, "--budget", 1e-6, code=6)
-    assert "the budget does not reach for a run" in said and not list(tmp_path.glob("**/capability.json"))
+    assert "the budget is not enough for a run" in said and not list(tmp_path.glob("**/capability.json"))
 
 
 def test_without_ice_there_is_one_run_and_no_interval(tmp_path):

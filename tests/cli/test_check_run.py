@@ -25,14 +25,14 @@ REFUSED = {
                                        floes=[PIER | {"x": 10, "length": 1.3, "fixed": False}]), CASE,
                                "no room for the two largest bodies"),
     "a pier on the path": (changed(WATER, tow__speed=0.3,
-                                   floes=[PIER]), CASE, "which cannot give way, on its prescribed path"),
+                                   floes=[PIER]), CASE, "which cannot give way; shorten the run"),
     "floes in each other": (changed(WATER, floes=[PIER | {"x": 9, "y": 2, "fixed": False},
                                                   PIER | {"x": 9.5, "y": 2}]), CASE, "overlap by"),
     "a floe on the body": (changed(WATER, floes=[PIER | {"x": 3, "y": 1, "fixed": False}]), CASE, "overlap by"),
     "a field that is not there": (reading(TOW, "none.h5"), IO, "none.h5"),
     "no field": (reading(TOW, "case.yml"), CASE, "case.yml"),
     "a table that is not there": (changed(TOW, water__current_table="none.csv"), IO, "none.csv"),
-    "too many floes": (changed(TOW, domain__length=1e5, domain__width=1e4), CASE, "at most 20000000 are simulated"),
+    "too many floes": (changed(TOW, domain__length=1e5, domain__width=1e4), CASE, "more than the limit of 20000000"),
 }
 
 
@@ -130,11 +130,11 @@ def test_memory_beyond_the_machine(tmp_path):
     # 18 million floes
     case = changed(TOW, domain__length=6000, domain__width=2000, ice__concentration=0.6, run__duration=0.1)
     checked, ran = both(tmp_path, case)
-    assert ran.returncode == CASE and "GB of memory, and this machine has" in ran.stderr
+    assert ran.returncode == CASE and "GB of memory, but this machine has" in ran.stderr
     assert (checked.returncode, checked.stderr) == (ran.returncode, ran.stderr)
     (tmp_path / "study.yml").write_text('{"base": "case.yml", "parameters": {"tow.speed": [0.1, 0.2]}}')
     studied = call("check", tmp_path / "study.yml")
-    assert studied.returncode == CASE and "GB of memory, and this machine has" in studied.stderr
+    assert studied.returncode == CASE and "GB of memory, but this machine has" in studied.stderr
 
 
 def test_a_field_of_another_domain(tmp_path):
@@ -155,7 +155,7 @@ def test_a_time_step_that_is_too_large_is_a_warning(tmp_path):
     assert checked.returncode == DONE and lines[0].endswith(
         "case.yml: valid, with 2 warnings") and lines[-1] == lines[0]
     assert lines[
-        -3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; take at most 0.1 s"
+        -3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; use at most 0.1 s"
     assert lines[-2].startswith("warning              run.dt: in 0.6 s floes move 0.111 of their size")
     run(tmp_path, case)
     good = call("check", write_case(tmp_path, LOOSE)).stdout
@@ -172,7 +172,7 @@ def test_a_start_that_jerks_the_line_is_a_warning(tmp_path):
 
 
 def test_a_run_that_ends_within_its_ramp_is_a_warning(tmp_path):
-    said = "tow.ramp: the speed rises for 40 s and the run ends after 30 s"
+    said = "tow.ramp: the speed rises for 40 s, but the run ends after 30 s"
     case = changed(LOOSE, tow__ramp=40)
     assert said in call("check", write_case(tmp_path, case)).stdout
     assert any(w.startswith(said) for w in run(tmp_path, case, "--steps", 3).warnings)
@@ -203,7 +203,7 @@ def test_thirty_lengths_of_a_disc_are_thirty_widths(tmp_path):
     found = json.loads(call("check", write_case(tmp_path, case), "--json").stdout)["domain"]
     assert found["body_widths"] == found["body_widths_needed"] == 30
     assert "arches of rigid floes not expected" in call("check", tmp_path / "case.yml").stdout
-    assert "take at least 30 body widths" in call("check", tmp_path / "case.yml", "--set", "domain.width=2390").stdout
+    assert "use at least 30 body widths" in call("check", tmp_path / "case.yml", "--set", "domain.width=2390").stdout
 
 
 def test_warnings_of_a_study(tmp_path):
@@ -303,7 +303,7 @@ def test_outlines_without_a_thickness(tmp_path):
         assert said.returncode == CASE and "2 of 3 outlines have no property `thickness` (but `" in said.stderr
     assert missing(tmp_path, case, "--set", "ice.thickness=1") == (DONE, [])
     assert missing(tmp_path, changed(case, domain__frame="basin", domain__x0=-1000)) == (DONE, [])
-    text = "--set ice.thickness=none: is none where a value is needed; give it (as in 1 m)"
+    text = "--set ice.thickness=none: is none, but a value is needed; give it (as in 1 m)"
     assert text in call("check", write_case(tmp_path, LOOSE), "--set", "ice.thickness=none").stderr
 
 
@@ -379,11 +379,11 @@ def test_rows_of_a_table_that_no_step_sees(tmp_path):
     rows = "t,u,v\n0,0,0\n5,0.01,0\n5.04,0.02,0\n5.08,0,0\n5.12,0,0\n5.22,0.01,0\n40,0.01,0\n40.01,0,0\n"
     (tmp_path / "current.csv").write_text(rows)
     case = write_case(tmp_path, changed(TOW, water__current_table="current.csv"))
-    said = ("water.current_table: rows that change the velocity within less than a time step of 0.1 s: 2, the first at "
-            "5.04 s")
+    said = ("water.current_table: some rows change the velocity within less than a time step of 0.1 s (2 rows, the "
+            "first at 5.04 s)")
     assert said in call("check", case).stdout
     assert [w for w in run(tmp_path, case, "--steps", 5).warnings if w.startswith(said)]
-    assert "rows that change" not in call("check", case, "--set", "run.dt=0.04").stdout
+    assert "some rows change" not in call("check", case, "--set", "run.dt=0.04").stdout
 
 
 # ---- splitting ----
@@ -422,8 +422,8 @@ def test_what_splits_the_mean_floe(tmp_path):
         for key, n, low, high in (("toughness", 0.15, 50, 250), ("strength", 0.3, 200, 500))]
     assert odd(("toughness", "150"), case=changed(MAP, domain={"length": 2000, "width": 1000})) == []
     text = call("check", write_case(tmp_path, MAP), "--set", "ice.splitting.toughness=150 kPa√m").stdout
-    assert "mean floe, as a square, splits under" in text and "without the time that splits" in text
+    assert "mean floe, as a square, splits under" in text and "without the time for splits" in text
     speed = float(re.search(r"reference speed +(\S+) m/s", text)[1])
-    assert f"moves {MAP['run']['dt'] * speed / 3:.3g} of the least width of a piece a step" in text
+    assert f"moves {MAP['run']['dt'] * speed / 3:.3g} of the least width of a piece per step" in text
     text = call("check", write_case(tmp_path, MAP)).stdout
-    assert "least width of a piece" not in text and "without the time that splits" not in text
+    assert "least width of a piece" not in text and "without the time for splits" not in text

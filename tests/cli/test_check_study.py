@@ -170,8 +170,8 @@ def test_what_a_condition_reads_is_looked_at(tmp_path):
 
 
 def test_options_of_a_case_are_refused(tmp_path):
-    assert "is a study, and --scale is for a case" in checked(tmp_path, STUDY, USAGE, "--scale", "30")[0]
-    assert "is a study, and --json is for a case" in checked(tmp_path, STUDY, USAGE, "--json")[0]
+    assert "is a study, but --scale is for a case" in checked(tmp_path, STUDY, USAGE, "--scale", "30")[0]
+    assert "is a study, but --json is for a case" in checked(tmp_path, STUDY, USAGE, "--json")[0]
 
 
 @pytest.mark.parametrize("command", ["run", "field", "estimate"])
@@ -235,8 +235,8 @@ def test_values_in_place_of_those_of_the_study(tmp_path):
     text = checked(tmp_path, STUDY, DONE, "--set", "ice.friction=0.3", "--set", "run.dt = 0.05")
     assert line(text, "set") == "output.frame_interval=-1 s, ice.friction=0.3, run.dt=0.05"
     assert rows(text)[1][0][4] == "400"
-    for given, words in (("tow.speed=0.2", "--set tow.speed=0.2: tow.speed: stands under `parameters` of study.yml"),
-                         ("run.duration=9", "run.duration: stands under `with` of study.yml"),
+    for given, words in (("tow.speed=0.2", "--set tow.speed=0.2: tow.speed: is set under `parameters` of study.yml"),
+                         ("run.duration=9", "run.duration: is set under `with` of study.yml"),
                          ("ice.sise=1", "--set ice.sise=1: ice.sise: unknown key; did you mean ice.size?"),
                          ("run.dt=fast", "--set run.dt=fast: run.dt: "), ("run.dt", "--set run.dt: is not key=value"),
                          ("ice.seed=4", "take their seeds from `seed`")):
@@ -248,7 +248,7 @@ def test_none_is_a_value_of_a_list(tmp_path):
     study = "base: base.yml\nparameters: {body.sail: [none, 0.1 m%s]}\n"
     assert [row[1] for row in rows(checked(tmp_path, study % ""))[1]] == ["none", "0.1 m"]
     twice = checked(tmp_path, study % ", none", CASE)
-    assert "none stands twice in the list" in twice[0]
+    assert "none is twice in the list" in twice[0]
 
 
 def test_a_key_that_another_value_of_an_axis_needs(tmp_path):

@@ -298,7 +298,7 @@ def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change,
         study = tmp_path / "out/converge/case.yml"
         study.write_text(study.read_text().replace("# bergtow", "# bergtow 0", 1))
     assert runs.make("case", [0], {"ice.friction": 0.3 if change == "values" else 0.1}) == [None] and runs.made == 1
-    told = "out/converge/case: its runs are of other settings, and are made anew" in capsys.readouterr().err
+    told = "out/converge/case: its runs have other settings, and are made again" in capsys.readouterr().err
     assert told == (change != "version")
     assert not runs.kept("case", 1)
 
@@ -376,7 +376,7 @@ def test_one_call_at_a_time_works_in_a_folder(tmp_path):
     try:
         second = script("converge", "case.yml", "-o", "out", cwd=tmp_path)
         assert second.returncode == 4, second.stderr
-        assert re.search(r"out/converge: another run is at work in this folder \(process \d+ on ", second.stderr)
+        assert re.search(r"out/converge: another run is using this folder \(process \d+ on ", second.stderr)
         assert [p.name for p in tmp_path.glob("out/*/*")] == ["lock"] and not (tmp_path / "out/converge.json").exists()
     finally:
         left.kill()
@@ -478,7 +478,7 @@ def test_the_length_grows_ahead_of_the_body():
     assert converge.longer(Towed(0, 20), 1) == ahead
     assert converge.longer(Towed(180), 1) == ahead | {"domain.x0": -150.0}
     for headings in ((90,), (0, 90), (0, 180)):
-        with pytest.raises(RunError, match="does not go along the domain"):
+        with pytest.raises(RunError, match="does not run along the domain"):
             converge.longer(Towed(*headings), 1)
 
 

@@ -254,7 +254,7 @@ def test_a_budget_that_does_not_reach(tmp_path, monkeypatch):
     long = changed(CASE, run__duration=2000, domain__length=280)
     write_case(tmp_path, long)
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
-    with pytest.raises(RunError, match="do not reach for one field.*raise --budget"):
+    with pytest.raises(RunError, match="are not enough for one field.*raise --budget"):
         cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "out", "--budget", "0.05", "--concentrations",
                     "0.5", "--quiet")
 
@@ -314,7 +314,7 @@ def test_the_title_block_of_a_study(tmp_path):
         assert result.returncode == 3 and re.search(words, result.stderr), result.stderr
     both = study | {"set": {"report.client": "Third"}}
     (tmp_path / "study.yml").write_text(yaml.safe_dump(both))
-    assert "stands in `set` too" in call("ensemble", "study.yml", "-o", "bad", cwd=tmp_path).stderr
+    assert "is also in `set`" in call("ensemble", "study.yml", "-o", "bad", cwd=tmp_path).stderr
 
 
 # ---- the page

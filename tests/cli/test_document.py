@@ -56,11 +56,11 @@ def test_the_vessel_draws_the_limit_by_the_upper_ends():
     """70 % has a value below the pull and an upper end above it."""
     said = "within 800 kN, {0}: 50 %; above 800 kN, {0}: 70 %; 90 %"
     assert rows([(None, SimpleNamespace(bollard_pull=8e5))])[1]["concentration of the ice"][1] == said.format(
-        "the bollard pull, of which less is left at speed")
+        "the bollard pull; at speed less of it is left")
     answer = {"speeds": [{"has_n": 9.5e5}, {"has_n": 8e5}, {"has_n": None}], "feasible": {"not_above_m_s": 0.6},
               "load_cases": [{"id": "case.head_sea", "n": 7.5e5, "values": {"wind_m_s": 15.0, "current_m_s": 0.25}}]}
     rule, found = rows([(None, UNKNOWN)], answer)
-    assert found["concentration of the ice"][1] == said.format("what the vessel pulls at the speed asked for")
+    assert found["concentration of the ice"][1] == said.format("pull of the vessel at the requested speed")
     assert "No vessel is named" not in rule
     assert found["speed of the tow"][1].startswith("not above 0.600 m/s")
     assert re.search(r"15\.0 m/s with 0\.250 m/s of current.* 750 kN", found["wind"][1])

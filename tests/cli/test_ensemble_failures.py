@@ -133,7 +133,7 @@ def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
     (tmp_path / "all/members/there").write_bytes(b"x" * 16384)
     result = ensemble(tmp_path)
     assert result.returncode == IO and re.search(
-        r"member c003-r001 failed \(4\): .*No space left.*; nor could that be recorded",
+        r"member c003-r001 failed \(4\): .*No space left.*; this could not be recorded",
         result.stderr) and "worked on by other" not in result.stdout
     assert {j["member"]
             for j in journal(tmp_path)
@@ -289,12 +289,12 @@ def test_a_member_that_another_run_is_at_stays_open(tmp_path):
     run_lock = open(member / "run.lock", "w")  # as src/base/fileio.c has it
     fcntl.flock(run_lock, fcntl.LOCK_EX)
     result = ensemble(tmp_path, "--no-wait")
-    assert result.returncode == SIGNAL and "1 member at work in other processes" in result.stderr, result
+    assert result.returncode == SIGNAL and "1 member still running in other processes" in result.stderr, result
     assert not (member / "failed.txt").exists() and statuses(tmp_path)["c002-r001"] == 0
     assert "2 members finished, 0 failed, 1 left" in result.stdout
     waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path,
                                env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
-    assert any("waiting for 1 member at work" in line for line in waiting.stdout)
+    assert any("waiting for 1 member in other processes" in line for line in waiting.stdout)
     run_lock.close()
     out = waiting.communicate(timeout=60)[0]
     assert waiting.returncode == DONE and "3 members finished, 0 failed, 0 left" in out

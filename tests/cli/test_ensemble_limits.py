@@ -93,7 +93,7 @@ def test_a_limit_of_wall_time(tmp_path):
     """The member at hand stops with a checkpoint, and goes on from there."""
     prepare(tmp_path, STUDY | {"repeats": 1}, LONG)
     result = ensemble(tmp_path, "all", "--max-wall", "1")
-    assert result.returncode == SIGNAL and "stopped by the limit of wall time; the same call goes on with the 4" in \
+    assert result.returncode == SIGNAL and "stopped by the limit of wall time; the same call continues with the 4" in \
         result.stderr
     steps = {p.parent.name: json.loads(p.read_text())["n_steps"] for p in tmp_path.glob("all/members/*/summary.json")}
     assert len(steps) == 1 and 0 < min(steps.values()) < 30000
@@ -144,7 +144,7 @@ def test_values_in_place_of_those_of_the_study(tmp_path):
     assert again.returncode == CASE and "holds the members of another study" in again.stderr
     assert ensemble(tmp_path, "all", *given).returncode == DONE
     refused = ensemble(tmp_path, "other", "--set", "tow.speed=0.3")
-    assert refused.returncode == CASE and "would win; change it there" in refused.stderr
+    assert refused.returncode == CASE and "takes precedence; change it there" in refused.stderr
 
 
 def test_the_keys_of_a_study_are_listed():

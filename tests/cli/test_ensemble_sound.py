@@ -192,7 +192,7 @@ def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
         import struct
         fcntl.fcntl(lock, 37, struct.pack("hhqqi4x", fcntl.F_WRLCK, 0, 0, 0, 0))
         result = ensemble(copy, "--no-wait")
-        assert (result.returncode == SIGNAL and "1 member at work in other processes" in result.stderr
+        assert (result.returncode == SIGNAL and "1 member still running in other processes" in result.stderr
                 and "3 members finished, 0 failed, 1 left" in result.stdout)
         waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=copy,
                                    env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
@@ -204,7 +204,7 @@ def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
         interrupted.send_signal(signal.SIGINT)
         assert "stopped by a signal" in interrupted.communicate(timeout=30)[1] and interrupted.returncode == SIGNAL
     out = waiting.communicate(timeout=60)[0]
-    assert (waiting.returncode == DONE and "waiting for 1 member at work" in out
+    assert (waiting.returncode == DONE and "waiting for 1 member in other processes" in out
             and "4 members finished, 0 failed, 0 left" in out)
 
 
@@ -257,7 +257,7 @@ def test_damage_while_a_call_is_at_work(tmp_path):
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert list(f["members/status"][()]) == [
             1, 0
-        ] and f.attrs["complete"] == 0 and "is not sound and is made again" in f["members/reason"].asstr()[1]
+        ] and f.attrs["complete"] == 0 and "is not sound and is run again" in f["members/reason"].asstr()[1]
     assert ensemble(tmp_path).returncode == DONE
 
 

@@ -192,19 +192,19 @@ def test_wind_table_drives_the_berg(tmp_path):
 
 TABLES = {
     "no header": ("0,1,2\n", "bad.csv:1: is not the header; begin the table with the line t,u,v"),
-    "no rows": ("t,u,v\n# nothing\n", "bad.csv: holds no row"),
-    "empty": ("", "bad.csv: holds no row"),
-    "two columns": ("t,u,v\n0,1\n99,1,1\n", "bad.csv:2: has not three columns"),
+    "no rows": ("t,u,v\n# nothing\n", "bad.csv: has no rows"),
+    "empty": ("", "bad.csv: has no rows"),
+    "two columns": ("t,u,v\n0,1\n99,1,1\n", "bad.csv:2: needs three columns"),
     "four columns": ("t,u,v\n0,1,1,1\n99,1,1\n", "bad.csv:2:"),
     "junk": ("t,u,v\n0,1,1\n# two lines\n\n99,1x,1\n", "bad.csv:5: \"x\" is not a unit of speed"),
     "not a number": ("t,u,v\n0,nan,1\n99,1,1\n", "bad.csv:2: \"nan\" is not a number"),
-    "wrong unit": ("t,u,v\n0 m,1,1\n99,1,1\n", "bad.csv:2: m is the unit of a length and this is a time"),
+    "wrong unit": ("t,u,v\n0 m,1,1\n99,1,1\n", "bad.csv:2: m is the unit of a length, but this is a time"),
     "out of range": ("t,u,v\n0,1,1\n99,1000,1\n", "bad.csv:3: a speed is out of range"),
-    "not sorted": ("t,u,v\n0,1,1\n50,1,1\n50,2,1\n99,0,0\n", "bad.csv:4: its time is not after"),
+    "not sorted": ("t,u,v\n0,1,1\n50,1,1\n50,2,1\n99,0,0\n", "bad.csv:4: its time is not later"),
     "late": ("t,u,v\n1,1,1\n99,1,1\n", "case.yml", "water.current_table: the table begins at 1 s"),
     "short": ("t,u,v\n0,1,1\n49,1,1\n", "case.yml",
-              "water.current_table: the table ends at 49 s and the run needs it until 50 s"),
-    "long line": ("t,u,v\n" + "0" * 300 + ",1,1\n", "bad.csv:2: is longer"),
+              "water.current_table: the table ends at 49 s, but the run needs it until 50 s"),
+    "long line": ("t,u,v\n" + "0" * 300 + ",1,1\n", "bad.csv:2: is too long"),
 }
 
 

@@ -270,7 +270,7 @@ def test_ice_around_the_iceberg_is_exported_from_a_periodic_domain(tmp_path):
     (("-o", "x.gpkg", "--time", "31"), USAGE, "outside the frames, 0 to 30 s"),
     (("-o", "x.kml"), USAGE, "unknown kind of file"), (("-o", "x.nc", "--layer", "floes"), USAGE, "trajectories"),
     (("-o", "x.csv", "--start", "2027-03-01"), USAGE, "no dates"),
-    (("-o", "x.nc", "--start", "soon"), USAGE, "no date"),
+    (("-o", "x.nc", "--start", "soon"), USAGE, "not a date"),
     (("-o", "theirs.geojson"), IO, "not made by bergtow"), (("-o", "x.geojson", "--time", "nan"), USAGE, "nan")])
 def test_wrong_use(towed_once, words, code, said):
     done = call("export", "out", *words, cwd=towed_once)

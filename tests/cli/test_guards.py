@@ -173,12 +173,12 @@ def test_an_overlap_of_the_last_state_is_held_against_its_guard(tmp_path):
 # ---- what applies ----
 
 @pytest.mark.parametrize("case, has", [
-    (changed(TOW, run__duration=2), {"always", "with a towed body", "where collisions are told apart"}),
+    (changed(TOW, run__duration=2), {"always", "with a towed body", "where collisions are identified"}),
     (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=2,
              impact={"conversion": "none"}), {"always", "with a towed body", "with a tow line"}),
     (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=3, tow__line={"branches": 2}), {
         "always", "with a towed body", "with a tow line", "with a tow line of two branches",
-        "where collisions are told apart"
+        "where collisions are identified"
     }),
     (changed(CLOSING, run__duration=0.6), {"always"}),
 ])

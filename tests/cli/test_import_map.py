@@ -311,7 +311,7 @@ def test_a_column_of_another_spelling_is_the_thickness_if_it_can_be(tmp_path, va
     found = map_read.read(map_, map_read.Reading())
     assert ([s.thickness for s in found.shapes] == values) == read and found.near == ([] if read else ["THICKNESS"])
     if not read:
-        with pytest.raises(RunError, match="is no thickness in metres"):
+        with pytest.raises(RunError, match="is not a thickness in metres"):
             map_read.read(map_, map_read.Reading(thickness="THICKNESS"))
 
 
@@ -611,7 +611,7 @@ UNSAID = {
 @pytest.mark.parametrize("kind", UNSAID)
 @pytest.mark.parametrize("crs", ["EPSG:32633", "local"])
 def test_the_system_is_said_where_the_file_does_not(tmp_path, capsys, kind, crs):
-    """Red: "is in EPSG:4326", which no file of these says of itself, "and --crs says ...": no way on."""
+    """Red: "is in EPSG:4326", which no file of these says of itself, "but --crs says ...": no way on."""
     rings = [r + (500e3, 8.9e6) for r in RINGS]
     map_ = UNSAID[kind](tmp_path, rings)
     said = outlines(map_, code=IO, name="no.geojson")
@@ -630,7 +630,7 @@ def test_what_contradicts_crs_is_refused_all_the_same(tmp_path):
     assert "degrees look in metres" in outlines(degrees, "--crs", "local", code=IO, name="no.geojson")
     shape = tmp_path / "map.gpkg"
     ogr2ogr("-f", "GPKG", shape, degrees)
-    assert "and --crs says" in outlines(shape, "--crs", "EPSG:3413", code=IO, name="no.geojson")
+    assert "but --crs says" in outlines(shape, "--crs", "EPSG:3413", code=IO, name="no.geojson")
 
 
 def test_a_field_in_metres_comes_back_through_another_program(tmp_path):
@@ -727,7 +727,7 @@ def test_negative_labels(tmp_path):
 @pytest.mark.parametrize("kind, first", [(np.uint32, 2 ** 31 + 5), (np.int64, 2 ** 40), (np.uint64, 2 ** 63 + 1),
                                          (np.float64, 2.0 ** 50)])
 def test_labels_of_any_size(tmp_path, kind, first):
-    """Red: "has values that are no labels (whole numbers)", which they are."""
+    """Red: "has values that are not labels (whole numbers)", which they are."""
     labels = np.where(GRID > 0, GRID.astype(kind) + kind(first), kind(0))
     map_ = labelled(tmp_path / "map.npy", labels)
     rings, record = outlines(map_, "--pixel", "2", "--thickness", f"{int(kind(first) + kind(1))}=0.5")
@@ -736,7 +736,7 @@ def test_labels_of_any_size(tmp_path, kind, first):
         "area_m2"]
     source = json.loads((tmp_path / "out.geojson").read_text())["features"][0]["properties"]["source"]
     assert str(GRID.max()) in source or str(GRID[GRID > 0].min()) in source
-    assert "no labels" in outlines(labelled(tmp_path / "half.npy", GRID / 2.0), "--pixel", "2", code=IO,
+    assert "not labels" in outlines(labelled(tmp_path / "half.npy", GRID / 2.0), "--pixel", "2", code=IO,
                                    name="no.geojson")
 
 
@@ -876,10 +876,10 @@ BAD = {
     "no such file": (lambda p: p / "none.shp", (), "no such file"),
     "nothing in it": (lambda p: write(p / "map.geojson", []), (), "holds no features"),
     "points": (lambda p: write(p / "map.geojson", [POINT, POINT]), (), "holds no polygons (2 of its features"),
-    "no map": (lambda p: text(p / "map.gpkg", "hello"), (), "no map that GDAL can read"),
+    "no map": (lambda p: text(p / "map.gpkg", "hello"), (), "not a map that GDAL can read"),
     "a word for a number": (lambda p: text(p / "map.geojson", json.dumps({"type": "FeatureCollection", "features": [
         {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [
-            [[-50, 60], ["a", 60], [-50, 61], [-50, 60]]]}}]})), (), "; mend the file"),
+            [[-50, 60], ["a", 60], [-50, 61], [-50, 60]]]}}]})), (), "; correct the file"),
     "degrees as metres": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS], "EPSG:32633"), (),
                           "as degrees do"),
     "degrees as local": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS],
@@ -889,15 +889,15 @@ BAD = {
                        "latitude seems to come first"),
     "the equator": (lambda p: write(p / "map.geojson", [places(r, 80.0, 14.0) for r in RINGS]), (), "no sea ice"),
     "unknown crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:99999"), (), "unknown to PROJ"),
-    "two crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:32633"), ("--crs", "EPSG:3413"), "and --crs says"),
+    "two crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:32633"), ("--crs", "EPSG:3413"), "but --crs says"),
     "far": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--centre", "20,80"), "100 km"),
     "nothing left": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--least", "1e9"),
                      "leaves no floe"),
     "column": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--thickness", "hi"), "no column hi"),
     "where": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--where", "none = 2"), "--where"),
-    "not finite": (lambda p: not_finite(p / "map.gpkg"), ("--crs", "local"), "no finite number"),
+    "not finite": (lambda p: not_finite(p / "map.gpkg"), ("--crs", "local"), "not a finite number"),
     "a grid by GDAL's name": (lambda p: p / "NETCDF:map.nc:labels", (), "no such file"),
-    "float labels": (lambda p: array(p / "map.npy", np.full((3, 3), 0.5)), ("--pixel", "1"), "no labels"),
+    "float labels": (lambda p: array(p / "map.npy", np.full((3, 3), 0.5)), ("--pixel", "1"), "not labels"),
     "only water": (lambda p: array(p / "map.npy", np.zeros((3, 3))), ("--pixel", "1"), "no label of ice"),
     "cube": (lambda p: array(p / "map.npy", np.ones((3, 3, 3))), ("--pixel", "1"), "one label a pixel"),
     "not for it": (lambda p: array(p / "map.npy", np.ones((3, 3))), ("--layer", "a"), "there is no --layer"),
@@ -940,7 +940,7 @@ def test_bad_maps(tmp_path, name):
     (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "above zero"),
     (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--unseen", "x"), "whole numbers"),
     (("--footprint", "1,2,3,4"), "at least three"), (("--record", "a.txt"), ".json"),
-    (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "names of their own")])
+    (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "different names")])
 def test_usage(tmp_path, words, says, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "map.geojson", [places(RINGS[0])])

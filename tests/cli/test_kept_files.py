@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""No command of the Python package replaces a file that none of them made, unless it is told to, or what is no regular
-file, and none loses a file where its reader leaves: every command, every kind of file."""
+"""No command of the Python package replaces a file that none of them made, unless it is told to, or what is not a
+regular file, and none loses a file where its reader leaves: every command, every kind of file."""
 import os
 import re
 import shutil
@@ -22,7 +22,7 @@ from bergtow.reporting import run as report_run
 from bergtow.study import analysis, converge
 
 DEAR = b"dear to somebody"
-REFUSED = ": is there already, and was not made by bergtow; .*--force"
+REFUSED = ": already exists and was not made by bergtow; .*--force"
 
 
 def long(*call):
@@ -139,7 +139,7 @@ def test_what_is_no_regular_file_is_kept(quick, tmp_path, command, words, files)
     for name in files:
         os.mkfifo(tmp_path / name)
         for force in ([], ["--force"]):
-            with pytest.raises(RunError, match=f"{name}: is there already, and is no file"):
+            with pytest.raises(RunError, match=f"{name}: already exists and is not a file"):
                 cli.perform(command, *words, *force)
         assert stat.S_ISFIFO((tmp_path / name).stat().st_mode)
         (tmp_path / name).unlink()
@@ -176,7 +176,7 @@ def test_pictures_carry_the_mark_where_it_can_be_read(tmp_path):
 def test_what_is_no_file(tmp_path):
     """A folder in its place, a place that cannot be; the exit code of the program. An empty file, as a crash leaves
     one, is nobody's loss."""
-    with pytest.raises(RunError, match="is there already, and is no file"):
+    with pytest.raises(RunError, match="already exists and is not a file"):
         writing.may_write(tmp_path, True)
     (tmp_path / "empty.md").write_bytes(b"")
     writing.write_markdown("x", tmp_path / "empty.md", False)

@@ -16,7 +16,7 @@ def case(tmp_path):
 def test_processes_that_would_all_do_the_same_are_refused(case, tmp_path, rank):
     result = call("run", case, "-o", tmp_path / "out", env=environment(**MPICH, PMI_RANK=rank))
     assert result.returncode == USAGE
-    assert ("2 processes were started, but each is alone" in result.stderr) == (rank == 0)
+    assert ("2 processes were started, but each runs alone" in result.stderr) == (rank == 0)
     assert "BERGTOW_MPI=no" in result.stderr or rank
     assert not (tmp_path / "out").exists()
 

@@ -27,23 +27,25 @@ def refusal(folder, case, *fragments, code=CASE, command="run"):
 
 
 GREEDY = {
-    "floes": ({"ice__size": 1e-4}, "ice.size:", "floes, at most 20000000", "take larger floes"),
+    "floes": ({"ice__size": 1e-4}, "ice.size:", "floes, more than the limit of 20000000", "use larger floes"),
     "floes of a power law": ({"ice": {"size_law": "power", "size_min": 1e-5,
-                                      "size_max": 1}}, "ice.size_min:", "floes, at most 20000000"),
+                                      "size_max": 1}}, "ice.size_min:", "floes, more than the limit of 20000000"),
     "steps": ({"run": {"dt": 1e-6, "duration": 1000},
-               "tow__speed": 0}, "run.dt:", "steps of run.duration, at most 100000000", "lengthen"),
-    "frames": ({"output__frame_interval": 1e-7}, "output.frame_interval:", "frames, at most 1000000", "lengthen it"),
+               "tow__speed": 0}, "run.dt:", "steps of run.duration, more than the limit of 100000000", "lengthen"),
+    "frames": ({"output__frame_interval": 1e-7}, "output.frame_interval:",
+               "frames, more than the limit of 1000000", "lengthen it"),
     "work": ({
         "run": {"dt": 0.1, "duration": 9e6}, "domain": {"length": 4000, "width": 4000, "ends": "periodic"},
         "ice": {"concentration": 0.95, "size": 1}
-    }, "run.duration:", "s of one core, at most 3e+09", "shorten the run"),
+    }, "run.duration:", "s on one core, more than the limit of 3e+09", "shorten the run"),
     "disk": ({
         "run": {"dt": 1, "duration": 1e5}, "domain": {"length": 2000, "width": 2000, "ends": "periodic"},
         "output__frame_interval": 0.1
-    }, "output.frame_interval:", "bytes, at most 2e+13", "lengthen output.frame_interval"),
+    }, "output.frame_interval:", "bytes, more than the limit of 2e+13", "lengthen output.frame_interval"),
     "pieces of a lead": ({"lead": {"mode": "managed",
-                                   "floe_size": 1e-6}}, "lead.floe_size:", "pieces, at most 20000000"),
-    "floes by hand": ({"floes": [{"x": 9, "y": 0, "length": 1}] * 10001}, "floes: has 10001 entries, at most 10000"),
+                                   "floe_size": 1e-6}}, "lead.floe_size:", "pieces, more than the limit of 20000000"),
+    "floes by hand": ({"floes": [{"x": 9, "y": 0, "length": 1}] * 10001},
+                      "floes: has 10001 entries, more than the limit of 10000"),
     "way-points": ({"tow__waypoints": [[4, 0]] * 10001}, "tow.waypoints:", "10001 points", "1 to 10000"),
     "text": ({"run__title": "x" * 5000}, "run.title:", "5000 bytes; give at most 4096"),
     "keys": ({f"k{i}": 1
@@ -93,8 +95,8 @@ TABLES = {
     "bytes": ("t,u,v\n" + "#" * (64 << 20), "t.csv", "larger than 64 MiB"),
     "rows": ("t,u,v\n" +"".join(f"{i},1,1\n" for i in range(2000002)), "t.csv",
              "t.csv:2000002: more than 2000000 rows"),
-    "a long row": ("t,u,v\n0,1," + "1" * 300 + "\n", "t.csv", "t.csv:2: is longer than a row"),
-    "NUL": ("t,u,v\n0,1\0,1\n", "t.csv", "t.csv:2: holds a NUL character"),
+    "a long row": ("t,u,v\n0,1," + "1" * 300 + "\n", "t.csv", "t.csv:2: is too long for a row"),
+    "NUL": ("t,u,v\n0,1\0,1\n", "t.csv", "t.csv:2: contains a NUL character"),
 }
 
 
@@ -119,7 +121,8 @@ def test_values_of_a_study(tmp_path):
     write_case(tmp_path, SMALL)
     (tmp_path / "study.yml").write_text("base: case.yml\nparameters: {ice.friction: [" +
                                         ", ".join(f"0.{i:06}" for i in range(10001)) + "]}\n")
-    refusal(tmp_path, "study.yml", "study.yml:2: ice.friction: 10001 values, at most 10000", command="ensemble")
+    refusal(tmp_path, "study.yml", "study.yml:2: ice.friction: 10001 values, more than the limit of 10000",
+            command="ensemble")
     (tmp_path / "study.yml").write_text("base: case.yml\nrepeats: 100000\nparameters: {ice.friction: [0.1, 0.2]}\n")
     refusal(tmp_path, "study.yml", "more than 100000 members", "fewer repeats", command="ensemble")
 
@@ -129,7 +132,7 @@ def test_every_limit_is_listed():
     for line in ("floes, made or read                          20000000 floes",
                  "steps                                       100000000 steps"):
         assert line in listed
-    assert "refused as too large" in listed
+    assert "refuses anything beyond these limits" in listed
 
 
 # ---- output stays where it was asked for ----

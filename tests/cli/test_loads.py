@@ -238,7 +238,7 @@ def test_warnings_name_the_reason_of_the_verdict(tmp_path):
         words = dict(made_up.CODES)[code]
         assert f"Members whose window is not steady, since {words}: concentration 50 % ({n} of 5 members)." in warned
     assert [w for w in warned if "concentration 90 %" in w] == [
-        "Nothing is known of a condition without a member that is in the numbers: concentration 90 % (2 failed)."]
+        "Nothing is known of a condition without a member in the numbers: concentration 90 % (2 failed)."]
 
 
 def test_where_fields_cannot_be_compared_nothing_is_said():
@@ -535,7 +535,7 @@ def test_options_of_the_design_value(statement, tmp_path):
     for option in ("--time-scale", "--tow-hours", "--probability"):
         assert script("statistics", folder, option, "0").returncode == 2
     step = script("statistics", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
-    assert "a step mean is no peak (1 s)" in step.stdout
+    assert "a step mean is not a peak (1 s)" in step.stdout
 
 
 def options(**changes):
@@ -554,7 +554,8 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     above = "above the breaking load of the line"
     assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
     # in the start
-    assert f"step, by which a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 MN)" in found
+    assert f"step, which decides when a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 " \
+           "MN)" in found
 
 
 def test_too_little_is_reported_and_not_guessed(tmp_path):
@@ -621,10 +622,10 @@ def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
     c, = s["conditions"]
     x = c["loads"]["tow_force"]
     assert x["fields"] == 7 and x["members"] == 10
-    assert ("members without a tow force, or without a window of 5 time scales in which it is known throughout, are in "
-            "no number of it", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
+    assert ("members without a tow force, or without a window of 5 time scales where it is known throughout, are left "
+            "out of its numbers", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
     assert "Members without tow force and ice resistance and vessel thrust, or without a window of 5 time scales in " \
-        "which they are known throughout, are in no number of these: concentration 10 % (3 of 10)." in text
+        "which they are known throughout, enter none of these numbers: concentration 10 % (3 of 10)." in text
     # a moving mean leaves 2e-10 N of a constant
     assert "Line tension is left out: constant, 1230 N, in all 7 fields: concentration 10 %." in text
     assert c["loads_left_out"]["line_tension_1"]["label"] == "line tension"
@@ -722,7 +723,7 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
     e, (c,) = Members(folder), s["conditions"]
     assert s["without_mean"] == ["c001-r005"] and c["members"]["used"] == 9 and "1 of 10 members" in s["holes"]
     told = script("statistics", folder, "--resamples", 1, "--force").stderr
-    assert "take what there is with --partial" in told and "again" not in told  # which would change nothing
+    assert "use the members that exist with --partial" in told and "again" not in told  # which would change nothing
     towed = e.series(0)[1][300:900].mean()
     assert s["members"][0]["mean"] == towed == pytest.approx(1e6, rel=0.02)
     assert c["resistance"]["mean"] == np.mean([e.mean[m] for m in e.used]) and c["resistance"]["min"] > 0.98e6
@@ -771,8 +772,8 @@ def test_each_branch_has_its_own_breaking_load(tmp_path):
     assert s["conditions"][0]["design"]["breaking_load"] == BREAKING / 2
     assert two["design"] < BREAKING / 2 < two["largest_step"] and one["largest_step"] < BREAKING
     said, = [w for w in warnings_of(s) if "above the breaking load" in w]
-    assert said.startswith("the largest mean tension over one step, by which a line parts, is above the breaking load "
-                           "of the line (750 kN of the tension of the second branch, which reaches ")
+    assert said.startswith("the largest mean tension over one step, which decides when a line parts, is above the "
+                           "breaking load of the line (750 kN of the tension of the second branch, which reaches ")
     assert "snap loads, which are shorter, are not in it" in text and "breaking load 1500 kN" in text
 
 

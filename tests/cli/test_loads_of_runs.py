@@ -128,7 +128,7 @@ def test_samples_of_several_steps(tmp_path):
     assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
     e = Members(tmp_path / "out")
     c, = ensemble.statistics(e, argparse.Namespace(**report_ensemble.OPTIONS | {"resamples": 1}))["conditions"]
-    assert "of every 7 steps the largest alone was kept" in c["loads_left_out"]["floe_force"]["why"]
+    assert "of every 7 steps only the largest was kept" in c["loads_left_out"]["floe_force"]["why"]
     assert "floe_force" not in c["loads"] and "tow_force" in c["loads"]
     texts = [json.loads((e.folder(m) / "summary.json").read_text())["window"] for m in range(2)]
     for row, name in zip(c["design"]["branches"], ("line_tension_1", "line_tension_2")):

@@ -64,12 +64,12 @@ def test_a_lock_below_the_tolerance_is_not_silent(tmp_path):
     case = changed(TOWED, run__duration=120, domain__width=18, domain__sides_closing=4e-4, body={"shape": "none"},
                    tow={"mode": "none"}, output=None, floes=column(), solver={"reference_speed": 0.5})
     r = run(tmp_path, case, name="a")
-    said = warned(r, "domain.sides_closing: 0.0004 m/s, shared out among the contacts of some 16 floes")
-    assert said and warned(r, "the position projection met its limit of work") and r.summary["unprojected_steps"] > 0
+    said = warned(r, "domain.sides_closing: 0.0004 m/s, divided among the contacts of about 16 floes")
+    assert said and warned(r, "the position projection reached its work limit") and r.summary["unprojected_steps"] > 0
     assert r.summary["locked_steps"] == 0
     case["solver"]["tolerance"] = float(said[0].rsplit(" ", 1)[1])
     locked = run(tmp_path, changed(case, run__duration=1), name="b")
-    assert locked.summary["locked_steps"] > 5 and not warned(locked, "takes .* for rest")
+    assert locked.summary["locked_steps"] > 5 and not warned(locked, "treats speeds .* as rest")
 
 
 def column():

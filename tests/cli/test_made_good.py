@@ -39,14 +39,14 @@ def test_a_body_that_overtakes_its_towing_end_is_reported(tmp_path):
     whole = run(tmp_path, case)
     time = whole.series("time")[np.abs(whole.series("carriage_x") - whole.series("body_x")) < 29.9]
     assert len(time) > 50
-    assert warned(whole, "within the hull for") and "the body has overtaken it" in whole.reason
-    found = re.search(r"within the hull for ([\d.e+]+) s, from ([\d.e+]+) s on", whole.reason)
+    assert warned(whole, "inside the hull for") and "the body has overtaken it" in whole.reason
+    found = re.search(r"inside the hull for ([\d.e+]+) s, from ([\d.e+]+) s on", whole.reason)
     assert abs(float(found[1]) - 2 * len(time)) < 10 and abs(float(found[2]) - time[0]) < 6
     part = run(tmp_path, case, "--steps", str(int(time[10] / 2)), name="part")
     assert call("resume", part.dir).returncode == DONE
     assert reasons(json.loads((part.dir / "summary.json").read_text())) == whole.reason
     held = run(tmp_path, changed(case, water__current_x=0), name="held")
-    assert not warned(held, "within the hull") and "overtaken" not in held.reason
+    assert not warned(held, "inside the hull") and "overtaken" not in held.reason
 
 
 def test_a_body_adrift_overtakes_nothing(tmp_path):
@@ -56,14 +56,14 @@ def test_a_body_adrift_overtakes_nothing(tmp_path):
                    tow=tow | {"programme": [[0, 2], [60, 2], [70, 0.2]], "line": {"breaking_load": 1}})
     r = run(tmp_path, case)
     assert any(e["kind"] == "adrift" for e in r.summary["events"]), r.summary["events"]
-    assert not warned(r, "within the hull") and "overtaken" not in r.reason
+    assert not warned(r, "inside the hull") and "overtaken" not in r.reason
     assert (np.abs(r.series("carriage_x") - r.series("body_x")) < 25).any()
 
 
 def test_an_end_that_begins_within_the_hull_is_no_overtaking(tmp_path):
     """A short line to the middle of a model, as from a carriage above it."""
     r = run(tmp_path, changed(BERG, tow=LINE | {"line_length": 5, "hull_x": 0, "hull_y": 0}, run__duration=200))
-    assert not warned(r, "within the hull")
+    assert not warned(r, "inside the hull")
 
 
 @pytest.mark.parametrize("start, end, turns", [(1400, 2000, True), (300, 1300, True), (2100, 2800, False),
@@ -137,7 +137,7 @@ def test_a_lead_is_left_where_the_body_cuts_its_corner(tmp_path):
                    lead={"mode": "channel", "width": 120, "length": 1500},
                    tow=LINE | {"line_length": 400, "waypoints": [[600, 0], [600, 800]]})
     text = call("check", write_case(tmp_path, case)).stdout
-    said = re.search(r"cuts the corners of the way by up to ([\d.]+) m", text)
+    said = re.search(r"cuts the corners of its path by up to ([\d.]+) m", text)
     assert float(said[1]) == pytest.approx(0.4806 * 430, rel=0.02)
     assert "cuts the corners" not in call("check", write_case(tmp_path, changed(case, tow__line_length=60))).stdout
 

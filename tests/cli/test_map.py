@@ -293,7 +293,7 @@ def test_degrees_read_as_metres(tmp_path, frame, size):
         case = changed(FRAMES[frame], ice__outlines_crs=key, domain__length=10, domain__width=10,
                        domain__x0=(LON if key == "frame" else x0) - 5, domain__y0=(LAT if key == "frame" else y0) - 5)
         said = field(tmp_path, case, code=CASE)
-        assert re.search("mean size of the floes|concentration.*below 1e-06|as floes whose coordinates", said)
+        assert re.search("mean size of the floes|concentration.*below 1e-06|as if degrees were read", said)
 
 
 def test_latitude_before_longitude(tmp_path):
@@ -439,7 +439,7 @@ def test_absurd_values_of_a_case(tmp_path, key, value):
 
 
 @pytest.mark.parametrize("latitude, says", [(0, "without water.latitude there is no Coriolis force; set it to 7"),
-                                            (-60, "and water.latitude is -60 deg; correct one"), (LAT, None)])
+                                            (-60, "but water.latitude is -60 deg; correct one"), (LAT, None)])
 def test_the_latitude_of_the_map_and_of_the_case(tmp_path, latitude, says):
     write(tmp_path, lonlat(ARROW))
     r = call("check", write_case(tmp_path, changed(FRAMES["geographic"], water__latitude=latitude)))
@@ -456,7 +456,7 @@ def test_latitude_first_of_western_places(tmp_path):
     assert "latitude seems to come first" in field(tmp_path, FRAMES["geographic"], code=CASE)
     write(tmp_path, swapped(-65, 70))
     said = call("check", write_case(tmp_path, FRAMES["geographic"])).stdout
-    assert "in the south; if they are to lie in the north, latitude comes first" in said
+    assert "in the south; if they should lie in the north, latitude comes first" in said
     for lon, lat in ((120, 40), (-65, 70), (50, 75), (0, -70), (-40, -54)):  # in order
         write(tmp_path, lonlat(ARROW, lon, lat))
         r = call("check", write_case(tmp_path, FRAMES["geographic"]))

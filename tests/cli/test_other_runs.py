@@ -41,7 +41,7 @@ def two(request, tmp_path):
 @pytest.mark.parametrize("two", OTHERS, indirect=True)
 def test_a_checkpoint_of_another_run_is_refused(two):
     before = {p.name: p.read_bytes() for p in (two / "one").iterdir()}
-    said = "one/result.h5: belongs to another run than one/kept.h5: it began with another case or other ice"
+    said = "one/result.h5: does not belong to the run of one/kept.h5: it began with another case or other ice"
     assert said in resumed(two, "one/kept.h5", CASE)
     assert {p.name: p.read_bytes() for p in (two / "one").iterdir()} == before
     assert resumed(two, "one") == ""
@@ -65,7 +65,7 @@ except bergtow.CaseError as error:
 """)
     result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    assert re.search(r"one/result.h5: belongs to another run than \S*other/checkpoint.h5: /series/", result.stdout)
+    assert re.search(r"one/result.h5: does not belong to the run of \S*other/checkpoint.h5: /series/", result.stdout)
 
 
 @pytest.mark.parametrize("damage", ["edited", "cut", "emptied", "gone"])

@@ -408,13 +408,13 @@ def test_the_concentration_is_that_of_the_ice_region(tmp_path):
     warned, concentration = warnings_of(tmp_path, case)
     ground = 10 * 10 - math.pi
     assert concentration == pytest.approx((1 + 0.75 + 1.5) / ground, rel=2e-3)
-    assert any("1 of 4 floes lie outside the ice region" in w and "leaves out 2.25 m2" in w for w in warned)
+    assert any("1 of 4 floes lie outside the ice region" in w and "omits 2.25 m2" in w for w in warned)
     assert not any("outside" in w for w in warnings_of(tmp_path, changed(case, ice__x_max=None))[0])
     field(tmp_path, case)
     again = changed(BASE, ice={"field": "out.h5", "nonconvex": "split"})
     warned, read_again = warnings_of(tmp_path, again)
     assert read_again == pytest.approx(concentration, rel=1e-12)
-    assert any("refers to an ice region of 96.8" in w and "the domain less the body has 196.8" in w for w in warned)
+    assert any("refers to an ice region of 96.8" in w and "the domain without the body has 196.8" in w for w in warned)
 
 
 def test_more_ice_outside_the_region_than_would_fit_into_it(tmp_path):
@@ -475,7 +475,7 @@ def test_a_thickness_that_may_be_in_centimetres(tmp_path, changes, says):
 
 def test_a_thickness_of_the_case_that_no_floe_has(tmp_path):
     write(tmp_path, feature(at(SQUARE, 8, 0), properties={"thickness": 0.1}))
-    says = "ice.thickness: no effect, for all outlines have a thickness of their own"
+    says = "ice.thickness: no effect, because all outlines have their own thickness"
     assert says in warnings_of(tmp_path, BASE)[0]
     write(tmp_path, feature(at(SQUARE, 8, 0), properties={"thickness": 0.1}), feature(at(SQUARE, 12, 0)))
     assert says not in warnings_of(tmp_path, BASE)[0]

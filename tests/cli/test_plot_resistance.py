@@ -176,7 +176,7 @@ def test_another_case_is_no_other_seed(runs, tmp_path, capsys):
     points = [plot_resistance.read(run) for run in runs]
     for p, friction in zip(points, (0.35, 0.05, 0.35, 0.35)):
         p.case = p.case | {"ice.friction": f"{friction}"}
-    with pytest.raises(RunError, match="b: has another case than .*a: ice.friction is 0.35 there and 0.05 here"):
+    with pytest.raises(RunError, match="b: has a different case from .*a: ice.friction is 0.35 there and 0.05 here"):
         plot_resistance.check_alike(points)
     twice = [plot_resistance.read(run) for run in runs[:3]]
     for p, state in zip(twice, ("x", "y", "y")):

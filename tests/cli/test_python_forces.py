@@ -188,7 +188,7 @@ def test_what_goes_wrong_in_a_force_is_reported():
         stepped(SHORT, forces={"wrong": drives})
     with pytest.raises(bergtow.BergtowError, match="lower-case letters"):
         stepped(SHORT, forces={"Not a name": raises})
-    with pytest.raises(bergtow.BergtowError, match="there is a force of this name"):
+    with pytest.raises(bergtow.BergtowError, match="a force of this name exists"):
         stepped(SHORT, forces={"drag": raises})
     with bergtow.Simulation(SHORT, forces={"mine": drives}):
         with pytest.raises(bergtow.BergtowError, match="belongs to a simulation that has not ended"):
@@ -198,7 +198,7 @@ def test_what_goes_wrong_in_a_force_is_reported():
 def test_a_force_whose_series_is_taken_is_refused():
     """Red: it acted, had no series, and sim["tow_force"] was that of the line. Its name stays free."""
     for name in ("tow", "inertia"):
-        with pytest.raises(bergtow.BergtowError, match=f"{name}_force: there is a series of this name"):
+        with pytest.raises(bergtow.BergtowError, match=f"{name}_force: a series of this name exists"):
             stepped(SHORT, forces={name: lambda bodies: None})
 
 
@@ -401,7 +401,7 @@ parent.step(1000)
 assert set(states) == {{parent.state_hash}}
 """, OMP_NUM_THREADS="2")
     assert done.returncode == 0, done.stderr
-    assert "that this one is a fork of" in done.stdout and "spawn" in done.stdout
+    assert "belongs to the parent of this forked process" in done.stdout and "spawn" in done.stdout
 
 
 def test_floes_at_rest_wake_when_a_force_begins():

@@ -54,15 +54,16 @@ def test_a_case_is_read_checked_and_changed(tmp_path):
 
 def test_a_text_that_would_end_at_a_nul_is_refused(tmp_path):
     text = json.dumps(SHORT, indent=1)
-    with pytest.raises(bergtow.CaseError, match=r"^run.title: the value holds the character NUL; take it out$"):
+    with pytest.raises(bergtow.CaseError, match=r"^run.title: the value contains the character NUL; remove it$"):
         bergtow.Case(SHORT, {"run.title": "a\0b"})
-    with pytest.raises(bergtow.CaseError, match=rf"^case:{text.count(chr(10)) + 2}: the line holds the character NUL"):
+    with pytest.raises(bergtow.CaseError,
+                       match=rf"^case:{text.count(chr(10)) + 2}: the line contains the character NUL"):
         bergtow.Case.from_text(text + "\n\0\nbogus: 1")
-    with pytest.raises(bergtow.BergtowError, match="^the name of the result folder holds the character NUL"):
+    with pytest.raises(bergtow.BergtowError, match="^the name of the result folder contains the character NUL"):
         bergtow.Simulation(SHORT, str(tmp_path / "a\0b"))
-    with pytest.raises(bergtow.BergtowError, match="^force 'a.*b': its name or docstring holds the character NUL"):
+    with pytest.raises(bergtow.BergtowError, match="^force 'a.*b': its name or docstring contains the character NUL"):
         bergtow.Simulation(SHORT, forces={"a\0b": lambda bodies: None})
-    with bergtow.Simulation(SHORT, threads=1) as sim, pytest.raises(KeyError, match="holds the character NUL"):
+    with bergtow.Simulation(SHORT, threads=1) as sim, pytest.raises(KeyError, match="contains the character NUL"):
         sim["time\0"]
     assert not list(tmp_path.iterdir())
 
@@ -256,7 +257,7 @@ def test_an_ensemble_with_a_hole(tmp_path, monkeypatch, capfd):
     with pytest.raises(bergtow.BergtowError, match="no member"):
         e.result("c009-r001")
     monkeypatch.setenv("BERGTOW", "build/none/bergtow")
-    with pytest.raises(bergtow.BergtowError, match="build/none/bergtow: is no program"):
+    with pytest.raises(bergtow.BergtowError, match="build/none/bergtow: is not a program"):
         bergtow.Ensemble.run(path, tmp_path / "other")
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     with pytest.raises(bergtow.BergtowError, match="none.yml"):

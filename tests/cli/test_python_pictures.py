@@ -62,7 +62,7 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path):
     shutil.rmtree(tmp_path / "out")
     assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(bergtow.BergtowError, match="pipe.png: is no regular file"):
+    with pytest.raises(bergtow.BergtowError, match="pipe.png: is not a regular file"):
         picture.save(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="out: no such"):
         picture.save(tmp_path / "kept.pdf")
@@ -176,7 +176,7 @@ def test_reports(towed, speeds, tmp_path):
     path = bergtow.Ensemble(speeds).report(tmp_path / "ensemble.html")
     assert "design" in path.read_text().lower()
     (tmp_path / "mine.html").write_text("a page of my own")
-    with pytest.raises(bergtow.BergtowError, match="is there already"):
+    with pytest.raises(bergtow.BergtowError, match="already exists"):
         bergtow.report(towed, tmp_path / "mine.html")
     assert bergtow.report(towed, tmp_path / "mine.html", replace=True).stat().st_size > 1e5
 

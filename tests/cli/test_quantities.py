@@ -41,7 +41,7 @@ EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
 SPEED = changed(TOW, run__duration=12, output__window_start=4, tow__ramp=8)
 #: cases, and what each has of "with a ..." and "where ..."
 LINE = {"with a towed body", "with a tow line", "with a tow line of two branches", "with a vessel",
-        "where collisions are told apart"}
+        "where collisions are identified"}
 WINDOW = {
     "run": {"dt": 0.1, "duration": 8},
     "domain": {"frame": "geographic", "length": 24, "width": 18, "ends": "moving", "sides": "periodic",
@@ -53,7 +53,7 @@ CASES = {
     "window": (changed(WINDOW,
                        lead={"mode": "channel", "width": 3},
                        reference={"mean_force": "3 N", "source": "a test"}),
-               {"with a towed body", "where collisions are told apart", "with a moving window"}),
+               {"with a towed body", "where collisions are identified", "with a moving window"}),
     "managed": (changed(SPEED, lead={"mode": "managed", "width": 3, "floe_size": 0.4},
                         impact__conversion="none"), {"with a towed body"}),
     "bare": (changed(SPEED, body={"shape": "none"}, tow=None, output__window_start=None), set()),
@@ -188,7 +188,7 @@ def test_pictures_and_report_follow_the_roles(left):
                 assert q["label"] in drawn, q["name"]
         panels = [axes.get_ylabel() for axes in plot_force.draw_diagnostics(run).axes]
         assert [p.split(" (")[0] for p in panels] == [q["label"] for q in by_role["diagnostic"]]
-        rows = [row[0].split(",")[0] for row in report_run.forces(run) if "it has parted" not in row[3]]
+        rows = [row[0].split(",")[0] for row in report_run.forces(run) if "it parted" not in row[3]]
         for q in forces + by_role["load"]:
             assert (q["label"] in rows) == (np.isfinite(run.number(q["summary"]))
                                             or q["name"] in ("ice_resistance", "tow_force")), q["name"]

@@ -160,7 +160,7 @@ def test_a_file_of_the_users_is_refused_by_name(tmp_path, name, dear, force):
     out.mkdir()
     (out / name).write_bytes(dear)
     result = call("run", write_case(tmp_path, SHORT), "-o", out, *force)
-    assert result.returncode == IO and f"{out / name}: is not a file that this program has written" in result.stderr
+    assert result.returncode == IO and f"{out / name}: was not written by this program" in result.stderr
     assert contents(out) == {(out / name).relative_to(out): dear}
 
 
@@ -213,7 +213,7 @@ def test_contacts_replace_nothing_without_force(tmp_path):
     to.write_text("dear to somebody")
     words = ["run", path, "-o", tmp_path / "out", "--quiet", "--dump-contacts", f"20:{to}"]
     result = call(*words)
-    assert result.returncode == IO and f"{to}: is there already" in result.stderr
+    assert result.returncode == IO and f"{to}: already exists" in result.stderr
     assert to.read_text() == "dear to somebody" and not (tmp_path / "out").exists()
     assert call(*words, "--force").returncode == DONE and to.read_bytes()[:4] == b"\x89HDF"
 

@@ -599,7 +599,7 @@ def test_keys_without_effect_are_those_of_the_program():
     unused = _library.unused("run: {dt: 0.1 s, duration: 9 s}\nbody: {shape: disc}\ntow: {mode: speed}\n"
                              "water: {current_table: nowhere.csv}\nno_such: {key: 1}\n")
     assert "tow.line.type" in unused and "tow.speed" not in unused and "ice.concentration" not in unused
-    assert unused["water.current_x"] == "with water.current_table, which gives all of it"
+    assert unused["water.current_x"] == "with water.current_table, which gives the whole current"
 
 
 @pytest.mark.parametrize("words, kind", [

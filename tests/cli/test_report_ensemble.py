@@ -432,8 +432,8 @@ def test_a_half_finished_ensemble(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "status, behind, reported",
     [(WAITING, False, "has no member that has finished; run the ensemble further"),
-     (WAITING, True, "knows of none of the 1 members that have finished; run `bergtow ensemble`"),
-     (FAILED, False, "no member that has finished; 2 failed, the first: c001-r001: it is wrong; mend the study")])
+     (WAITING, True, "knows none of the 1 members that have finished; run `bergtow ensemble`"),
+     (FAILED, False, "no member that has finished; 2 failed, the first: c001-r001: it is wrong; correct the study")])
 def test_nothing_has_finished(tmp_path, status, behind, reported):
     folder = made_up.write(tmp_path / "out", [
         member(np.ones(600), {"ice.concentration": 0.5}, 0)

@@ -152,13 +152,13 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     p = begun(tmp_path, "out")
     p.send_signal(signal.SIGSTOP) # it holds the folder, and does not end meanwhile
     again = call("resume", "out", cwd=tmp_path)
-    assert again.returncode == IO and f"another run is at work in this folder (process {p.pid} on" in again.stderr
+    assert again.returncode == IO and f"another run is using this folder (process {p.pid} on" in again.stderr
     again = call("run", path, "-o", "out", "--force", cwd=tmp_path)
-    assert again.returncode == IO and "another run is at work" in again.stderr
+    assert again.returncode == IO and "another run is using" in again.stderr
     p.kill()
     p.communicate()
     again = call("run", path, "-o", "out", cwd=tmp_path)
-    assert again.returncode == IO and "holds an unfinished run; go on with it by `bergtow resume out`" in again.stderr
+    assert again.returncode == IO and "holds an unfinished run; continue it with `bergtow resume out`" in again.stderr
     # Killed before its first checkpoint: from its case, at time zero.
     result = call("resume", "out", cwd=tmp_path)
     assert (
@@ -189,10 +189,10 @@ def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
     (["nowhere"], IO, "nowhere: there is no such folder"),
     (["empty"], IO, "empty: holds no checkpoint"),
     (["empty", "--max-wall", "2 parsecs"], USAGE, "--max-wall 2 parsecs"),
-    (["empty", "--max-wall", "0"], USAGE, "give a time of more than 0"),
+    (["empty", "--max-wall", "0"], USAGE, "give a time above 0"),
     (["empty", "--stops"], USAGE, "did you mean --steps?"),
     (["empty/notes.txt"], REFUSED, "empty/notes.txt: is not this program's checkpoint file"),
-    (["empty/field.h5"], REFUSED, "empty/field.h5: is a field file, and a checkpoint file is needed here"),
+    (["empty/field.h5"], REFUSED, "empty/field.h5: is a field file, but a checkpoint file is needed here"),
 ])
 def test_what_cannot_be_resumed(tmp_path, arguments, code, text):
     (tmp_path / "empty").mkdir()
@@ -229,14 +229,14 @@ def test_a_damaged_checkpoint_is_not_taken(stopped):
     for name in "checkpoint.h5", "checkpoint.previous.h5":
         flip(folder / "out" / name, 12345)
     err = resumed(folder, "out", code=REFUSED)
-    assert f"out/{BROKEN}: its bytes do not fit their digest; take another copy" in err and "HDF5-DIAG" not in err
+    assert f"out/{BROKEN}: its bytes do not match their digest; use another copy" in err and "HDF5-DIAG" not in err
 
 
 def test_a_missing_and_a_cut_checkpoint(stopped):
     folder, whole = stopped
     path = folder / "out/checkpoint.h5"
     path.write_bytes(path.read_bytes()[:-100])
-    assert "checkpoint.h5: is cut off" in resumed(folder, "out", "--steps", 3)
+    assert "checkpoint.h5: is truncated" in resumed(folder, "out", "--steps", 3)
     assert (folder / "out/checkpoint.damaged.h5").exists() # set aside: it must not push out the sound one
     path.unlink()
     assert "the last checkpoint is missing; out/checkpoint.previous.h5 is taken" in resumed(folder, "out")
@@ -253,8 +253,9 @@ def of_an_earlier_format(path):
 
 
 ENDS = {
-    "cut": (lambda path: os.truncate(path, 5000), r"is cut off: 5000 of \d+ bytes"),
-    "cut in the seal": (lambda path: os.truncate(path, path.stat().st_size - 1), r"is cut off: \d+ of \d+ bytes"),
+    "cut": (lambda path: os.truncate(path, 5000), r"is truncated: only 5000 of \d+ bytes"),
+    "cut in the seal": (lambda path: os.truncate(path, path.stat().st_size - 1),
+                        r"is truncated: only \d+ of \d+ bytes"),
     "cut before the seal": (lambda path: os.truncate(path, path.stat().st_size - 128), "has no seal at its end"),
     "opened to change it": (opened_to_change_it, "has no seal at its end: .*another program has changed"),
     "seal": (lambda path: flip(path, -60), "is damaged"),
@@ -262,7 +263,7 @@ ENDS = {
     "longer": (lambda path: path.write_bytes(path.read_bytes() + bytes(200)), "is damaged"),
     "no HDF5": (lambda path: path.write_bytes(bytes(2000)), "is not this program's checkpoint file"),
     "empty": (lambda path: path.write_bytes(b""), "is not this program's checkpoint file"),
-    "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", this program reads "checkpoint \d+"'),
+    "earlier": (of_an_earlier_format, r'has the format "checkpoint 4", but this program reads "checkpoint \d+"'),
 }
 
 
@@ -279,7 +280,7 @@ def test_a_checkpoint_tells_how_it_ends(stopped):
 
 
 @pytest.mark.parametrize("damage, says", [
-    (lambda f: f.create_dataset("numbers", data=[1.0, 2.0]), "holds what this program does not write"),
+    (lambda f: f.create_dataset("numbers", data=[1.0, 2.0]), "holds data that this program does not write"),
     (lambda f: f.pop("contacts/value"), "/contacts/value is missing"),
     (lambda f: f.pop("history/body_yaw"), "/history/body_yaw is missing"),
     (lambda f: f.pop("history/locked_steps"), "/history/locked_steps is missing"),
@@ -533,6 +534,7 @@ def test_a_failure_is_told_before_the_state_is_made_again(tmp_path):
     time.sleep(max(0, start + 4.1 - time.time()))
     p.send_signal(signal.SIGCONT)
     rest = p.stderr.read() # communicate would lose what has been read ahead
-    assert re.search(r"the \d+ steps up to the state before .*\n.*made again: stopped meanwhile; .*resume out", rest)
+    assert re.search(r"the \d+ steps up to the state before .*\n.*computed again: stopped meanwhile; .*resume out",
+                     rest)
     ended(p, NUMERIC)
     assert not (tmp_path / "out/failure.h5").exists()

@@ -452,7 +452,7 @@ def test_looks_from_a_line(tmp_path):
     assert len(found["rounds"]) >= 4 and not found["horizon"]["perfect"] and "upper bound" not in done.stdout
     assert towed["horizon"]["arrived"] and "no_go_contact" not in towed["horizon"]["faults"]
     assert "no_go_contact" in towed["straight"]["faults"]
-    assert re.search("straight line: [^;]*touches an area to keep out of", done.stdout)
+    assert re.search("straight line: [^;]*touches a no-go area", done.stdout)
     series = []
     for name in ("look-1", "look-2", "look-3", "tow-horizon"):
         with Run(whole / "out/route" / name / "members/c001-r001") as r:
@@ -467,7 +467,7 @@ def test_looks_from_a_line(tmp_path):
     process.kill()
     process.wait()
     assert not (killed / "out/horizon.yml").exists()
-    while "another run is at work" in (again := called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)).stderr:
+    while "another run is using" in (again := called("route", "case.yml", *LOOKS, "-o", "out", cwd=killed)).stderr:
         time.sleep(0.1)  # the program still writes the ensemble of the last look
     assert again.returncode == DONE, again.stderr
     other = json.loads((killed / "out/route.json").read_text())
@@ -555,22 +555,22 @@ def local(geometry):
 
 @pytest.mark.parametrize("changes, words, code, said", [
     ({}, ["--to", "8.5,0", "--no-go", "land.geojson"], CASE,
-     r"--to: the goal lies in an area to keep out of.* \(x 8.5 m, y 0 m, polygon 1, needed .* m\)"),
-    ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* area to keep out of"),
-    ({}, ["--to", "20E,76N"], USAGE, "in degrees, and the map of this case has no place; set ice.origin_lon"),
+     r"--to: the goal lies in a no-go area.* \(x 8.5 m, y 0 m, polygon 1, needed .* m\)"),
+    ({}, ["--to", "3,0", "--no-go", "near.geojson", "--from", "8.5,0"], CASE, "--from: .* no-go area"),
+    ({}, ["--to", "20E,76N"], USAGE, "in degrees, but the map of this case has no place; set ice.origin_lon"),
     ({}, ["--to", "8.5,0", "--no-go", "degrees.geojson"], CASE, "the map of this case has no place"),
-    ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "no GeoJSON of polygons"),
+    ({}, ["--to", "8.5,0", "--no-go", "text.geojson"], CASE, "not a GeoJSON file of polygons"),
     ({}, ["--to", "8.5,0", "--no-go", "barrier.geojson"], CASE, "--to: no way leads from the start to the goal"),
     ({}, ["--to", "8.5,0", "--no-go", "list.geojson"], CASE, r"polygons \(it is built otherwise\)"),
     ({}, ["--to", "50,0"], CASE, "--to: the goal lies outside the domain"),
-    ({}, ["--to", "2.5,0"], CASE, "--to 2.5,0: is reached where the tow starts"),
-    ({}, ["--to", "3,0.1"], CASE, "--to 3,0.1: is reached where the tow starts"),
+    ({}, ["--to", "2.5,0"], CASE, "--to 2.5,0: is reached at the start of the tow"),
+    ({}, ["--to", "3,0.1"], CASE, "--to 3,0.1: is reached at the start of the tow"),
     ({}, ["--to", "nan,0"], USAGE, "--to: nan: "),
     ({}, ["--to", "8.5,0", "--no-go", "empty.geojson"], CASE, "it holds none"),
     ({}, ["--to", "8.5,0", "--no-go", "flat.geojson"], CASE, "polygon 2 has no area"),
     ({}, ["--to", "8.5,0", "--no-go", "nan.geojson"], CASE, "polygon 1 has no ring of three finite positions"),
-    ({}, ["--to", "8.5,0", "--no-go", "nowhere.geojson"], CASE, "a geometry is no polygon"),
-    ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "no whole number from 1 to 16"),
+    ({}, ["--to", "8.5,0", "--no-go", "nowhere.geojson"], CASE, "a geometry is not a polygon"),
+    ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "not a whole number from 1 to 16"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--speeds", "0.1,0.2"], USAGE, "one speed"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--map-age", "11 s"], USAGE, "--map-age"),
     ({}, ["--to", "8.5,0", "--force-limit", "1e-3"], CASE, "takes more than --force-limit"),

@@ -262,7 +262,7 @@ def test_a_run_that_is_there_twice_counts_once(tmp_path):
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     assert [c["resistance"]["n"] for c in s["conditions"]] == [2, 4]
     assert s["copies"] == {"c001-r003": "c001-r001", "c001-r004": "c001-r002"}
-    assert "2 members ended in the very state of another one" in result.stdout and "6 of 8 members" in result.stdout
+    assert "2 members ended in the same state as another one" in result.stdout and "6 of 8 members" in result.stdout
 
 
 def test_a_member_that_met_little_ice_is_known_without_its_folder(tmp_path):
@@ -336,10 +336,10 @@ def test_no_part_is_taken_for_the_whole(plain, tmp_path):
     assert complete.stderr == ""
     result = script("statistics", folder, "-o", tmp_path, "--resamples", 1)
     assert (result.returncode == 4
-            and "2 of 48 members are in no number: 1 waiting (c002-r002), 1 failed (c002-r001)" in result.stderr
+            and "2 of 48 members enter no statistics: 1 waiting (c002-r002), 1 failed (c002-r001)" in result.stderr
             and "--partial" in result.stderr)
     assert json.loads((tmp_path / "statistics.json").read_text())["waiting"] == ["c002-r002"]
-    assert "1 member to come, and in no number (c002-r002)" in result.stdout
+    assert "1 member to come, and left out (c002-r002)" in result.stdout
 
 
 DAMAGES = {
@@ -371,12 +371,12 @@ def test_a_damaged_member_is_in_no_number(tmp_path, damage):
     DAMAGES[damage](folder / "members" / "c001-r001")
     result = script("statistics", folder, "--resamples", 1)
     s = json.loads((folder / "statistics.json").read_text())
-    assert (result.returncode == 4 and "1 of 3 members are in no number: 1 not sound (c001-r001)" in result.stderr
+    assert (result.returncode == 4 and "1 of 3 members enter no statistics: 1 not sound (c001-r001)" in result.stderr
             and "Traceback" not in result.stderr)
     assert [m["name"] for m in s["members"]] == ["c001-r002", "c001-r003"] and list(s["unsound"]) == ["c001-r001"
                                                                                                       ]
     assert s["behind"] == []  # its record of an end is no news
-    assert "1 member not sound, and in no number (c001-r001)" in result.stdout and s["conditions"][0]["extremes"][
+    assert "1 member not sound, and left out (c001-r001)" in result.stdout and s["conditions"][0]["extremes"][
         "fields"] == 2
 
 
@@ -392,7 +392,7 @@ def test_a_damaged_ensemble_file_is_refused(tmp_path):
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0) for _ in range(2)])
     assert Members(folder).n == 2
     flip(folder / "ensemble.h5", (folder / "ensemble.h5").stat().st_size - 9)
-    with pytest.raises(RunError, match="do not fit their digest; run `bergtow ensemble` again"):
+    with pytest.raises(RunError, match="do not match their digest; run `bergtow ensemble` again"):
         Members(folder)
 
 
@@ -645,4 +645,4 @@ def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
         plot_chains.read(tmp_path / "none.h5")
     with h5py.File(tmp_path / "c.h5", "a") as f:
         del f["places"]
-    assert "does not say where" in script("plot-chains", tmp_path / "out", tmp_path / "c.h5").stderr
+    assert "does not give the places" in script("plot-chains", tmp_path / "out", tmp_path / "c.h5").stderr

@@ -53,7 +53,7 @@ def test_fields_of_ice_that_does_not_depend_on_the_seed_are_refused(folder, kind
     prepare(folder, STUDY | {"repeats": 2, "parameters": {"tow.speed": [0.1, 0.12]}}, READ[kind])
     for result in both(folder):
         assert result.returncode == CASE
-        assert "study.yml: repeats: the ice does not depend on the seed" in result.stderr
+        assert "study.yml: repeats: no ice depends on the seed" in result.stderr
         assert "the 2 fields of a condition would be one run; set repeats: 1" in result.stderr
     assert not (folder / "all").exists()
     prepare(folder, STUDY | {"parameters": {"tow.speed": [0.1, 0.12]}}, READ[kind])
@@ -91,9 +91,9 @@ def test_what_has_an_effect_is_left_alone(folder):
     some = {"repeats": 2, "variants": {"made": {"ice.size": 0.8}, "map": outlines}}
     (folder / "study.yml").write_text(json.dumps(STUDY | some))
     prepare(folder, STUDY | some, LOOSE)
-    assert "in 1 condition the ice does not depend on the seed" in call("check", "study.yml", cwd=folder).stdout
+    assert "in 1 condition no ice depends on the seed" in call("check", "study.yml", cwd=folder).stdout
     result = ensemble(folder, "other")
-    assert result.returncode == DONE and "warning: in 1 of 2 conditions the ice does not depend on the seed" in \
+    assert result.returncode == DONE and "warning: in 1 of 2 conditions no ice depends on the seed" in \
         result.stderr
     prepare(folder, STUDY | some | {"repeats": 1}, LOOSE)
     assert ensemble(folder, "third").stderr == ""

@@ -234,12 +234,12 @@ def test_a_turn_within_the_window_is_no_steady_tow(tmp_path):
     def told(**tow):
         case = changed(BASE_TURN, tow={**BASE_TURN["tow"], **tow})
         text = call("check", write_case(tmp_path, case)).stdout
-        return "turns at way-point 1 within one step" in text, run(tmp_path, case, "--quiet", "--force").summary
+        return "turn at way-point 1 within one step" in text, run(tmp_path, case, "--quiet", "--force").summary
 
     sharp, s = told(waypoints=[[100, 0], [150, 50]])
     assert sharp and s["window"]["verdict"] == "not steady"
     assert "the course changes by 45 deg at way-point 1, passed at 200 s" in reasons(s)
-    assert any("turns at way-point 1" in w for w in texts(s["warnings"]))
+    assert any("turn at way-point 1" in w for w in texts(s["warnings"]))
     sharp, s = told(waypoints=[[100, 0], [150, 50]], turn_radius=40)
     assert not sharp and "the course changes by 45 deg" in reasons(s)
     for points in ([[100, 0], [150, 0]], [[500, 0], [550, 50]], [[10, 0], [300, 100]]):

@@ -287,7 +287,7 @@ def test_bollard_pull_is_that_of_the_simulated_vessel(tmp_path):
 
 
 @pytest.mark.parametrize("text, said", [
-    ("speed,share\n1,1\n", ":1: the head is not"), ("speed_m_s,share\n1,x\n", ":2: share: 'x'"),
+    ("speed,share\n1,1\n", ":1: the header is not"), ("speed_m_s,share\n1,x\n", ":2: share: 'x'"),
     ("speed_m_s,share\n1,1\n1,0.5\n", ":3: speed_m_s: 1 is not above 1"), ("speed_m_s,share\n", ":1: there is no row")])
 def test_a_curve_that_is_none(tmp_path, text, said):
     file = tmp_path / "curve.csv"
@@ -352,7 +352,7 @@ def test_a_table_of_ones_own_adds_and_replaces(tmp_path):
     (LINES_HEAD + "a,w,1,1,1,1,1\n", ":2: 7 cells"), (LINES_HEAD + "\na,w,1,1,1,1,1k,s\n", ":3: breaking_kn: '1k'"),
     (LINES_HEAD + "a,w,-1,1,1,1,1,s\n", ":2: diameter_mm: '-1'"),
     (LINES_HEAD + "a,w,1,1,1,1,1,\n", ":2: source is empty"),
-    (LINES_HEAD + "a,w,1,1,1,1,1,s\na,w,1,1,1,1,1,s\n", ":3: name: 'a' stands twice")])
+    (LINES_HEAD + "a,w,1,1,1,1,1,s\na,w,1,1,1,1,1,s\n", ":3: name: 'a' is twice")])
 def test_a_table_that_is_wrong_is_refused_with_its_place(tmp_path, text, said):
     file = tmp_path / "mine.csv"
     file.write_text(text)

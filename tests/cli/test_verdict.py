@@ -169,14 +169,14 @@ def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
 
 def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
     dense = changed(BERG, ice__concentration=0.8, run__duration=5)
-    words = "of rigid floes: from some 75 % on (assumed) they lock, and their load has no upper bound"
+    words = "of rigid floes: above about 75 % (assumed) they lock, and their load has no upper bound"
     assert words in call("check", write_case(tmp_path, dense)).stdout
     assert any(words in text for text in run(tmp_path, dense).warnings)
     for looser in (changed(dense, ice__concentration=0.7), changed(dense, ice__rafting={"kappa": 10}),
                    changed(dense, ice__crushing={"pressure": 1e5})):
         assert "upper bound" not in call("check", write_case(tmp_path, looser)).stdout
     splits = call("check", write_case(tmp_path, changed(dense, ice__splitting={"toughness": 150e3}))).stdout
-    assert words.replace("rigid floes", "floes that split, into pieces that are rigid") in splits
+    assert words.replace("rigid floes", "floes that split into rigid pieces") in splits
     found = json.loads(call("check", write_case(tmp_path, dense), "--json").stdout)["warnings"]
     values, = [w["values"] for w in found if w["code"] == "load_unbounded"]
     assert values == {"concentration_percent": pytest.approx(80), "limit_percent": 75}
@@ -193,7 +193,7 @@ def test_packed_ice_that_reaches_the_end_wall_is_reported(tmp_path):
             r"wall ahead +reached by packed ice \(0\.9\) at about 206 s, after 25\.8 m of tow \(estimate\)",
             checked.stdout)
         assert ("reaches the wall at about 206 s, 179 s at the earliest" in checked.stdout) == wanted
-        assert re.search(r"domain\.length: .* the end is at 360 s",
+        assert re.search(r"domain\.length: .* the run ends at 360 s",
                          checked.stdout) if wanted else "domain.length" not in checked.stdout
     # 80 % of ice, 8 m to the wall, a body of half the width: 8 m / (1 + 0.5 * 0.8/0.1) = 1.6 m, at 0.3 m/s from the
     # ramp of 1 s on.
@@ -206,7 +206,7 @@ def test_packed_ice_that_reaches_the_end_wall_is_reported(tmp_path):
     long = run(tmp_path, case, name="long")
     said = [w for w in long.warnings if "reaches the wall" in w]
     assert len(
-        said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
+        said) == 1 and "at about 5.8" in said[0] and "the run ends at 8 s" in said[0] and said[0] in long.result.stdout
     short = run(tmp_path, case, "--steps", 45, name="short")
     assert not any("reaches the wall" in w for w in short.warnings)
 
@@ -220,7 +220,7 @@ ROUND = {
     "tow": {"speed": 0.5, "ramp": 0},
     "output": {"frame_interval": 1600},
 }
-OPENED = "the body meets ice that it has opened before"
+OPENED = "the body meets ice that it has already opened"
 # changes, and the time from which on the body meets its own wake: within its own length of the period
 WAKES = {
     "along": ({}, 2 * (400 - 30)),
@@ -312,7 +312,7 @@ def test_a_gap_of_a_field_file_is_seen(tmp_path):
     assert call("resume", "out", "--quiet", cwd=tmp_path).returncode == DONE
     said = reasons(json.loads((r.dir / "summary.json").read_text()))
     for text in (checked, said):
-        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s, and comes into", text)[1]) == pytest.approx(200, rel=0.02)
+        assert float(re.search(rf"{LEFT} ([0-9.e+]+) s, and enters", text)[1]) == pytest.approx(200, rel=0.02)
 
 
 def test_a_strip_of_ice_is_left_through_the_open_end(tmp_path):
@@ -344,6 +344,6 @@ def test_the_step_is_held_against_the_speed_of_the_ice(tmp_path):
                    ice__drag__sheltering=0)
     checked = call("check", write_case(tmp_path, case)).stdout
     assert "move 0.198 of their size" in checked and "TOO LARGE" in checked, checked
-    assert "solver.reference_speed: 0.02 m/s, and the ice comes at up to 0.494 m/s" in checked, checked
+    assert "solver.reference_speed: 0.02 m/s, but the ice approaches at up to 0.494 m/s" in checked, checked
     still = call("check", write_case(tmp_path, ROUND)).stdout
     assert "move 0." not in still and "solver.reference_speed" not in still, still

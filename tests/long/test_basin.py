@@ -74,7 +74,7 @@ def test_two_thousand_seconds_in_dense_ice(tmp_path):
     overlap, unconverged, residual = r.series("overlap", "unconverged", "residual")
     assert overlap.max() <= 0.02 * r.summary["mean_size_m"]
     assert r.summary["unconverged_steps"] == unconverged.sum() == np.sum(residual > r.summary["tolerance_m_s"])
-    assert not unconverged.any() or harness.warned(r, "met the limit of work")
+    assert not unconverged.any() or harness.warned(r, "reached the work limit")
     assert r.series("momentum_residual").max() <= 1e-10
     print(f"long: {r.summary['mean_ice_resistance_n']:.2f} N +- {r.summary['mean_ice_resistance_se_n']:.2f}, overlap "
           f"{overlap.max():.4f} m, unconverged {int(unconverged.sum())}, residual "

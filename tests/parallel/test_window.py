@@ -176,9 +176,9 @@ def test_defaults(tmp_path):
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize("changes, text", [
-    ({"tow": {"mode": "none"}}, "domain.ends: moving follows a body that is towed"),
-    ({"body": {"shape": "none"}, "tow": None}, "domain.ends: moving follows a body that is towed"),
-    ({"tow__direction": 80}, "tow.direction: 80 deg: a moving window goes along x"),
+    ({"tow": {"mode": "none"}}, "domain.ends: moving follows a towed body"),
+    ({"body": {"shape": "none"}, "tow": None}, "domain.ends: moving follows a towed body"),
+    ({"tow__direction": 80}, "tow.direction: 80 deg: a moving window moves along x"),
     ({"water": {"current_x": 0.9}}, "water.current_x: 0.9 m/s carries the ice along"),
     ({"domain__ahead": 4}, "domain.ahead: 4 m of the 26 m"),
     ({"domain__ahead": 22}, "domain.ahead: 22 m of the 26 m"),
@@ -186,7 +186,7 @@ def test_defaults(tmp_path):
     ({"domain__ends": "wall", "domain__ahead": 3}, "domain.ahead: 3 m has no effect without domain.ends: moving"),
     ({"domain__sides": "moving"}, "domain.sides"),
     ({"floes": [{"shape": "disc", "length": 0.5, "x": 3, "y": 9, "fixed": True}], "ice__concentration": 0.1
-      }, "cannot take floes[0] along"),
+      }, "cannot take the fixed floes[0] along"),
 ])
 def test_refused(tmp_path, changes, text):
     result = run(tmp_path, changed(SPEED, **changes), code=CASE).result

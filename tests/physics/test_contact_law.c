@@ -171,14 +171,14 @@ TEST(what_will_not_do_is_refused)
     const struct { bt_contact_law law; const char *says;
     } bad[] = {
         {{.name = "twin", .doc = "a law with a number that is there", .on = fender_on, .bound = fender_bound,
-          .remember = fender_remember, .numbers = taken, .n_numbers = 1}, "contacts: there is a series of this name"},
+          .remember = fender_remember, .numbers = taken, .n_numbers = 1}, "contacts: a series of this name exists"},
         {{.name = "blank", .doc = "a law with a number without a name", .on = fender_on, .bound = fender_bound,
           .remember = fender_remember, .numbers = nameless, .n_numbers = 1}, "its number 1 needs name"},
         {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
         {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
         {{.name = "Big", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without functions"}, "`on` and `bound`"},
-        {{.name = "mute", .on = fender_on, .bound = fender_bound}, "say in a line"},
+        {{.name = "mute", .on = fender_on, .bound = fender_bound}, "describe it in one line"},
         {{.name = "odd", .doc = "a law with a bad unit", .on = fender_on, .bound = fender_bound, .keys = furlong,
           .n_keys = 1}, "unit furlong"},
         {{.name = "sad", .doc = "a law with an idle number", .on = fender_on, .bound = fender_bound,

@@ -117,13 +117,13 @@ TEST(what_will_not_do_is_refused)
                               beyond[] = {{"strength", "N", "2 N", "[0, 1]", "a strength of something"}};
     const struct { bt_force_law law; const char *says;
     } bad[] = {
-        {{.name = "tilt", .doc = "a law of that name", .add = spring}, "there is a force of this name"},
-        {{.name = "drag", .doc = "a sum of that name", .add = spring}, "there is a force of this name"},
-        {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: there is a series"},
+        {{.name = "tilt", .doc = "a law of that name", .add = spring}, "a force of this name exists"},
+        {{.name = "drag", .doc = "a sum of that name", .add = spring}, "a force of this name exists"},
+        {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: a series"},
         {{.name = "share", .doc = "a part of no name", .add = spring, .part_of = "My Sum!"}, "part_of \"My Sum!\""},
         {{.name = "Big Law", .doc = "a law of that name", .add = spring}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without function"}, "no function"},
-        {{.name = "mute", .add = spring}, "say in a line"},
+        {{.name = "mute", .add = spring}, "describe it in one line"},
         {{.name = "odd", .doc = "a law with a bad unit", .add = spring, .keys = bad_contact, .n_keys = 1},
          "unit furlong"},
         {{.name = "wide", .doc = "a law without a range", .add = spring, .keys = no_range, .n_keys = 1},

@@ -69,7 +69,7 @@ TEST(what_will_not_do_is_refused)
     const struct { const char *name; bt_shape_outline outline; const char *says; } bad[] = {
         {"ship", capsule, "a shape of this name"}, {"capsule", capsule, "a shape of this name"},
         {"none", capsule, "a shape of this name"}, {"Big barge", capsule, "lower-case letters"},
-        {"barge", NULL, "no function"},            {"stick", line, "it is no outline"},
+        {"barge", NULL, "no function"},            {"stick", line, "it is not an outline"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
         bt_errors err = {0};
@@ -107,8 +107,8 @@ TEST(keys_that_cannot_be_read_back_are_refused)
         {"floes", "x", "a key of the list", "no section is base or floes"},
         {"", "x", "a key of nothing", "SECTION.NAME"},
         {"mine", "[a", "a key of brackets", "SECTION.NAME"},
-        {"mine", "x", "a key\nof two lines", "in one line"},
-        {"mine", "x", "a key \x01 of control", "in one line"},
+        {"mine", "x", "a key\nof two lines", "on one line"},
+        {"mine", "x", "a key \x01 of control", "on one line"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
         const bt_law_key keys[] = {{"good", "m", "1", "[0, 2]", "a key that is good"},

@@ -429,7 +429,8 @@ TEST(damage_is_refused)
     assert_int_equal(bt_snapshot_read(&old, path, &err), BT_ERR_CASE);
     assert_non_null(
         strstr(err.text[0],
-               "has the format \"checkpoint 1\", this program reads \"checkpoint 5\"; use the program that wrote it"));
+               "has the format \"checkpoint 1\", but this program reads \"checkpoint 5\"; use the program that "
+               "wrote it"));
     bt_errors_free(&err);
     // Two files, the front of one on the back of the other.
     bt_world_step(w);

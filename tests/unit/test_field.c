@@ -613,7 +613,7 @@ TEST(test_refusals)
     assert_refused(&c, BT_ERR_CASE, "cannot pack regular polygons to 0.95 in this region; ask for at most about 0.");
     c = basin();
     c.ice.size = 100;
-    assert_refused(&c, BT_ERR_CASE, "larger than all the ice");
+    assert_refused(&c, BT_ERR_CASE, "larger than all the requested ice");
     c.ice.size = 1e-4;
     assert_refused(&c, BT_ERR_CASE, "larger floes");
     c = basin();

@@ -66,7 +66,7 @@ TEST(paths_have_the_lengths_of_their_legs_and_arcs)
     assert_false(bt_path_make(&p, 0, 0, 3, points, 26, why)); // two tangents of 26 m on a leg of 50 m
     assert_non_null(strstr(why, "way-point 2"));
     assert_false(bt_path_make(&p, 0, 0, 2, (double[]){10, 0, 10, 0}, 0, why));
-    assert_non_null(strstr(why, "way-point 2 is where"));
+    assert_non_null(strstr(why, "way-point 2 is at the place of"));
     assert_false(bt_path_make(&p, 0, 0, 2, (double[]){10, 0, 5, 0}, 1, why)); // back on itself
 }
 

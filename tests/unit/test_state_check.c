@@ -293,7 +293,8 @@ TEST(files_of_another_make_are_refused)
         bt_errors err = {0};
         bt_snapshot s;
         const bt_status status = bt_snapshot_read(&s, path, &err);
-        if (status != BT_ERR_CASE || err.n != 1 || s.n != 0 || !strstr(err.text[0], "what this program does not write"))
+        if (status != BT_ERR_CASE || err.n != 1 || s.n != 0 ||
+            !strstr(err.text[0], "data that this program does not write"))
             fail_msg("make %d: status %d, %d arrays: %s", make, (int)status, s.n, err.n ? err.text[0] : "no message");
         bt_errors_free(&err);
         free(path);

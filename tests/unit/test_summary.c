@@ -133,13 +133,13 @@ TEST(every_doubt_is_reported)
     t.stall = (bt_stall){.windows = 3, .time = 12};
     json = summary_of(&c, 600, &t, FLOES, everything_wrong);
     static const char *const reported[] = {"stopped early: SIGTERM",
-                                       "200 of 600 steps met the limit of work",
+                                       "200 of 600 steps reached the work limit",
                                        "120 of 600 steps the contacts added energy",
                                        "overlap by up to 0.1 m",
                                        "momentum is conserved only to 0.001",
                                        "2 floes left",
                                        "differs from tow - drag - Coriolis - tilt - inertia",
-                                       "from the one by momentum",
+                                       "from that by momentum",
                                        "crushed to a depth of 0.9 m, 45 % of the mean floe size",
                                        "stood still for 12 s of 60 s"};
     for (size_t k = 0; k < sizeof reported / sizeof *reported; k++)
@@ -158,7 +158,7 @@ TEST(every_doubt_is_reported)
     c.output.window_start = 100;
     json = summary_of(&c, 600, &t, FLOES, NULL);
     assert_string_equal(json_value(json, "mean_ice_resistance_n"), "null");
-    assert_non_null(strstr(json, "no window: it would begin at 100 s and the run ends at 60 s"));
+    assert_non_null(strstr(json, "no window: it would begin at 100 s, but the run ends at 60 s"));
     free(json);
 
     c.output.window_start = -1;
@@ -243,7 +243,7 @@ TEST(what_no_mean_goes_across_is_a_verdict)
     bt_event event[] = {{.time = 45, .kind = BT_EVENT_LINE_BROKEN, .subject = 1, .value = 7}};
     const bt_events events = {.event = event, .n = 1};
     static const char *const reported[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s",
-                                       "a step in the window was left with a residual of 0.2 m/s",
+                                       "a step in the window ended with a residual of 0.2 m/s",
                                        "1.2 % of the steps in the window did not converge",
                                        "the speed programme goes from 1 to 0.5 m/s within the window",
                                        "a line parted at 45 s",
@@ -285,7 +285,7 @@ TEST(without_a_towed_body_forces_are_null)
     json = summary_of(&c, 0, &none, FLOES, NULL);
     assert_string_equal(json_value(json, "contacts_mean"), "null");
     assert_string_equal(json_value(json, "sim_time_s"), "0");
-    assert_non_null(strstr(json, "no window: it would begin at 0 s and the run ends at 0 s"));
+    assert_non_null(strstr(json, "no window: it would begin at 0 s, but the run ends at 0 s"));
     free(json);
 }
 

@@ -84,7 +84,7 @@ TEST(refuses_what_is_not_a_number_with_a_unit_of_the_kind)
         const char *fragment;
     } bad[] = {
         {"0.8x", BT_UNIT_RATIO, "\"x\" is not a unit"},
-        {"10 kN", BT_UNIT_LENGTH, "kN is the unit of a force and this is a length"},
+        {"10 kN", BT_UNIT_LENGTH, "kN is the unit of a force, but this is a length"},
         {"10 ms", BT_UNIT_SPEED, "unit of a time"},
         {"1.5 kt", BT_UNIT_SPEED, "unit of a mass"},
         {"3 m", BT_UNIT_NONE, "plain number"},
@@ -108,7 +108,7 @@ TEST(refuses_what_is_not_a_number_with_a_unit_of_the_kind)
         {"1_000", BT_UNIT_NONE, "\"_000\""},
         {"5 M", BT_UNIT_LENGTH, "\"M\" is not a unit of length"},
         {"5 %", BT_UNIT_LENGTH, "unit of a ratio"},
-        {"80 t", BT_UNIT_FORCE, "t is the unit of a mass and this is a force; use N, kN, MN, GN, tf"},
+        {"80 t", BT_UNIT_FORCE, "t is the unit of a mass, but this is a force; use N, kN, MN, GN, tf"},
         {"2 hrs", BT_UNIT_TIME, "use s, ms, min, h, d"},
         {"3 inches", BT_UNIT_LENGTH, "use m, km, cm, mm, nmi, ft"},
     };

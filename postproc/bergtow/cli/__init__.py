@@ -16,19 +16,21 @@ from bergtow._program import program_path
 COMMANDS = {
     "report": ("reporting.page", "write the report of a run, with a replay, or of an ensemble, as a page or as PDF"),
     "design": ("reporting.design",
-               "from a case or a study to the report of the design tow force, as a page and as PDF"),
+               "write the report of the design tow force of a case or a study, as a page and as PDF"),
     "statistics": ("reporting.statistics",
                    "statistics of an ensemble: design force, loads, intervals, in tables and files"),
-    "converge": ("study.converge", "find out what of the computation a result depends on: width, length, time step, "
+    "converge": ("study.converge", "find out how a result depends on the computation: width, length, time step, "
                  "tolerance, start"),
-    "budget": ("study.budget", "find out how much of the scatter is of the fields, of each assumed value, of the "
+    "budget": ("study.budget", "find out how much of the scatter comes from the fields, each assumed value, and the "
                "computation"),
-    "capability": ("study.capability", "find out how fast a vessel tows in which ice, and the ice that stops it"),
-    "route": ("routing.route", "plan the way and the speed of a tow through known ice, and verify them by tows"),
-    "outlines": ("maps.outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines"),
+    "capability": ("study.capability", "find out how fast a vessel tows in which ice, and what ice stops it"),
+    "route": ("routing.route",
+              "plan the path and the speed of a tow through known ice, and verify them by simulated tows"),
+    "outlines": ("maps.outlines",
+                 "convert a map of the ice (outlines or an image of labels) into floes for ice.outlines"),
     "export": ("maps.export", "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, "
                "trajectories"),
-    "contents": ("result.contents", "list what the folder of a run holds"),
+    "contents": ("result.contents", "list the contents of the folder of a run"),
     "film": ("plot.film", "make a film of a run"),
     "plot-force": ("plot.force", "draw the forces of a run against time"),
     "plot-field": ("plot.field", "draw the ice field before, during and after the tow"),
@@ -55,8 +57,8 @@ def _joined(words):
 
 def tree(name=None):
     """The parser of all commands, with options for `name` only, so that the other modules need not be loaded."""
-    p = command.Parser(prog="bergtow", description="Commands of the Python package bergtow; all others are those of "
-                       "the program, see bergtow --help.")
+    p = command.Parser(prog="bergtow", description="Commands of the Python package bergtow; for those of the program "
+                       "see bergtow --help.")
     some = p.add_subparsers(metavar="COMMAND", required=True)
     for other, (module, about) in COMMANDS.items():
         q = some.add_parser(other, help=about, description=f"{about[0].upper()}{about[1:]}.")

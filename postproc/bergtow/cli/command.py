@@ -79,7 +79,7 @@ def guarded(name, main):
         code = end.code
     sys.stdout.flush()
     if sys.stdout.lost and not code:
-        code = _say(name, "standard output: cannot be written; give it a place with space, or a reader that stays to "
+        code = _say(name, "standard output: cannot be written; free some space, or keep the reading program running to "
                     "the end; every file is written", IO)
     if code:
         sys.exit(code)
@@ -93,7 +93,7 @@ def _of_system(error):
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = next((part for part in (*reversed(path.parents), path) if part.is_file()), path)
         return f"{path}: is a file where a folder is needed; give another folder with -o DIR"
-    return f"{path}: {error.strerror}; check the path, and who may read and write there"
+    return f"{path}: {error.strerror}; check the path and its permissions"
 
 
 def _say(name, message, code):

@@ -104,7 +104,7 @@ class Place:
             return "longitude and latitude, degrees on WGS 84"
         if self.crs:
             return f"{self.crs}, metres east and north"
-        return f"metres of no place on the earth, {'east and north' if self.geographic else 'x and y of the basin'}"
+        return f"metres without a place on the earth, {'east and north' if self.geographic else 'x and y of the basin'}"
 
 
 # ---- exported quantities
@@ -367,7 +367,7 @@ def dataset(t, place, start, title):
     time = {"standard_name": "time", "long_name": "time", "axis": "T", "calendar": "standard",
             "units": f"seconds since {named:%Y-%m-%d %H:%M:%S}"}
     if start is None:
-        time["comment"] = "assumed: the case names no date, and time zero is that of the run"
+        time["comment"] = "assumed: the case gives no date, and time zero is the start of the run"
     lonlat, at = place.lonlat(t.xy), place.coordinates(t.xy)
     coordinates = {}
     if lonlat is not None:
@@ -420,7 +420,7 @@ def date(text):
     try:
         at = datetime.datetime.fromisoformat(text.removesuffix("Z"))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: is no date; write for example 2027-03-01T06:00") from None
+        raise argparse.ArgumentTypeError(f"{text}: is not a date; write for example 2027-03-01T06:00") from None
     if at.tzinfo is not None:
         at = at.astimezone(datetime.timezone.utc).replace(tzinfo=None)
     return at
@@ -430,8 +430,8 @@ def options(p):
     p.add_argument("run", metavar="RUN", help="output folder of a run")
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="file to write: .gpkg, .geojson, "
                    ".shp, or trajectories of everything as .csv or .nc (CF-1.8)")
-    p.add_argument("--time", metavar="T", type=moment, help="floes and bodies at the frame next to T seconds, at the "
-                   "last one, or at all (default: last; all for trajectories)")
+    p.add_argument("--time", metavar="T", type=moment, help="floes and bodies at the frame nearest to T seconds, at "
+                   "the last one, or at all (default: last; all for trajectories)")
     p.add_argument("--layer", choices=LAYERS, help="that alone (default: all in a .gpkg, floes in a .geojson or .shp)")
     p.add_argument("--start", metavar="DATE", type=date, help="UTC at time zero, for a .nc: 2027-03-01T06:00 "
                    "(default: 1970, marked as assumed)")
@@ -463,7 +463,7 @@ def perform(a):
                 write_netcdf(t, place, path, a.force, a.start, run.attributes.get("title", "") or "tow through ice")
             print(f"{path}: {len(t.name)} trajectories, {len(t.time)} times")
             if kind == ".nc" and not a.start:
-                print("time: seconds since 1970, assumed: the case names no date; say it with --start")
+                print("time: seconds since 1970, assumed: the case gives no date; give it with --start")
         else:
             layers = [MAKE[name](run, frames) for name in ([a.layer] if a.layer else DEFAULT[kind])]
             layers = [layer for layer in layers if layer.places]
@@ -505,5 +505,5 @@ def _write(layers, place, path, kind, force):
         raise RunError(path, f"cannot be written ({map_read.first_line(error)})", "choose another place with -o",
                        IO) from None
     if renamed:
-        print("columns: names of a shapefile have ten characters: "
+        print("columns: names in a shapefile have only ten characters: "
               + ", ".join(f"{ours} is {theirs}" for ours, theirs in renamed.items()))

@@ -39,7 +39,7 @@ def finite(text):
 def place(text):
     """Read LON,LAT."""
     if len(some := finite(text)) != 2:
-        raise argparse.ArgumentTypeError(f"{text}: is no place; write two numbers, LON,LAT")
+        raise argparse.ArgumentTypeError(f"{text}: is not a place; write two numbers, LON,LAT")
     return tuple(some)
 
 
@@ -49,7 +49,7 @@ metres = arguments.measure("m")
 def extent(text):
     parts = text.split(",")
     if len(parts) != 2:
-        raise argparse.ArgumentTypeError(f"{text}: is no extent; write for example 2km,800m")
+        raise argparse.ArgumentTypeError(f"{text}: is not an extent; write for example 2km,800m")
     return tuple(map(metres, parts))
 
 
@@ -57,14 +57,14 @@ def integers(text):
     try:
         return tuple(int(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: are no labels; write whole numbers, 0,3") from None
+        raise argparse.ArgumentTypeError(f"{text}: are not labels; write whole numbers, 0,3") from None
 
 
 def corners(text):
     """Read X,Y,X,Y,..."""
     some = finite(text)
     if len(some) < 6 or len(some) % 2:
-        raise argparse.ArgumentTypeError(f"{text}: are no corners; write at least three, column,row,column,row,...")
+        raise argparse.ArgumentTypeError(f"{text}: are not corners; write at least three, column,row,column,row,...")
     return tuple(zip(some[::2], some[1::2]))
 
 
@@ -95,17 +95,18 @@ def options(p):
     p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
                    "about the centre, along x and y of the case")
-    p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out what reaches into this "
-                   "circle about the centre: room for the towed body, which may be on the map itself")
+    p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out floes that reach into this "
+                   "circle about the centre, to make room for the towed body; the map may show the body itself")
     p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
-    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: made straight "
-                   "within half a pixel, each floe keeping its area, or kept but for the tolerance")
+    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: straightened "
+                   "within half a pixel (each floe keeps its area), or kept, apart from the tolerance")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
                    "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
     p.add_argument("--least", metavar="AREA", type=arguments.not_below_zero,
                    help="smallest floe, m² (default: four pixels; 0)")
-    p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
-    p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
+    p.add_argument("--record", metavar="FILE", type=Path, help="write this report as JSON, too")
+    p.add_argument("--picture", metavar="FILE", type=Path,
+                   help="draw the map and the resulting floes (.png, .pdf, .svg)")
     arguments.add_force(p)
 
 def check_files(a):
@@ -117,7 +118,7 @@ def check_files(a):
         arguments.ends_in(a.picture, writing.PICTURES)
     written = [f for f in (a.output, a.record, a.picture) if f]
     if len({f.resolve() for f in [a.map, *written]}) <= len(written):
-        raise BergtowError("the map and the files to write need names of their own", USAGE)
+        raise BergtowError("the map and the files to write need different names", USAGE)
     for file in written:
         writing.may_write(file, a.force)
 
@@ -232,11 +233,11 @@ def perform(a):
     distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
     farthest = _library.limit("map_farthest_m")
     if distortion["farthest_m"] > farthest:
-        raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes "
+        raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow allows "
                        f"{farthest / 1e3:g} km",
-                       "choose a part with --box or --where, or set --centre")
+                       "choose part of it with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:
-        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
+        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m on average, as degrees look in "
                        "metres",
                        "say its crs: --crs EPSG:4326")
     print("\n".join(map_text.plane_lines(plane, distortion, bend)))

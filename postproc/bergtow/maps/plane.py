@@ -30,7 +30,7 @@ from bergtow.maps.read import local_crs, need
 WGS84 = "OGC:CRS84"   # degrees, longitude first
 ROUNDING = 1e-3       # degrees outside the valid range, beyond which coordinates cannot be degrees
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
-      "east and north of no place on the earth"
+      "east and north without a place on the earth"
 
 try:
     import pyproj
@@ -58,14 +58,14 @@ def system(path, found, said, implied=False):
     ours = None if said is None else local_crs() if said in ("local", local_crs()) else known(path, said, "--crs")
     theirs = None if found is None else local_crs() if found == local_crs() else known(path, found, "its crs")
     if theirs is None and ours is None:
-        raise RunError(path, "says no coordinate reference system", SAY)
+        raise RunError(path, "names no coordinate reference system", SAY)
     if theirs is None or ours is None:
         return theirs or ours
     if implied:
         return ours
     local = isinstance(theirs, str), isinstance(ours, str)
     if local[0] != local[1] or not local[0] and not same(theirs, ours):
-        raise RunError(path, f"is in {name_of(theirs)}, and --crs says {name_of(ours)}",
+        raise RunError(path, f"is in {name_of(theirs)}, but --crs says {name_of(ours)}",
                        "leave --crs out, or correct the file (ogr2ogr -a_srs, gdal_edit.py -a_srs)")
     return theirs
 
@@ -82,7 +82,7 @@ def known(path, text, whose):
     if crs.is_geographic or crs.is_projected:
         return crs
     if whose == "--crs":
-        raise RunError(path, f"--crs {text} is {crs.type_name}, neither degrees nor a projection", SAY)
+        raise RunError(path, f"--crs {text} is {crs.type_name}, neither in degrees nor a projection", SAY)
     return None
 
 
@@ -141,7 +141,7 @@ class Plane:
             plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)
             return plane
         if centre and not _library.library().bt_outline_in_degrees(*centre, False):
-            raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is no place on the earth",
+            raise RunError(found.path, f"--centre {centre[0]:g},{centre[1]:g} is not a place on the earth",
                            "give longitude and latitude in degrees")
         lonlat = plane._prepare(found, xy)
         plane.centre = centre or middle(lonlat)
@@ -159,8 +159,8 @@ class Plane:
         lonlat = np.array(first.transform(*xy.T)).T
         if not np.isfinite(lonlat).all():
             bad = xy[~np.isfinite(lonlat).all(axis=1)][0]
-            raise RunError(found.path, f"has a vertex {bad[0]:.8g}, {bad[1]:.8g}, which is no place in "
-                           f"{name_of(self.crs)}", "correct the crs of the file, or take the outline out")
+            raise RunError(found.path, f"has a vertex {bad[0]:.8g}, {bad[1]:.8g}, which is not a place in "
+                           f"{name_of(self.crs)}", "correct the crs of the file, or remove the outline")
         lon, lat = middle(lonlat)
         around = AreaOfInterest(lon - 1, max(lat - 1, -90), lon + 1, min(lat + 1, 90))
         with warnings.catch_warnings():

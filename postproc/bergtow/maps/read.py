@@ -111,7 +111,7 @@ def read(path, how):
     try:
         source = quietly(gdal.OpenEx, str(path), gdal.OF_VECTOR | gdal.OF_RASTER)
     except RuntimeError as error:
-        raise RunError(path, f"is no map that GDAL can read ({first_line(error)})",
+        raise RunError(path, f"is not a map that GDAL can read ({first_line(error)})",
                        "name outlines (GeoJSON, shapefile, GeoPackage, ...) or an image of labels") from None
     if source.GetLayerCount():
         return from_layer(path, source, how)
@@ -165,12 +165,12 @@ def from_layer(path, source, how):
             add_feature(found, feature, column)
     except RuntimeError as error:
         raise RunError(path, f"cannot be read ({first_line(error)})",
-                       f"mend {'--where, or ' if how.where else ''}the file (ogrinfo tells more)") from None
+                       f"correct {'--where, or ' if how.where else ''}the file (ogrinfo tells more)") from None
     if how.stairs == "undo":
         retrace(found.shapes)
     if not found.shapes:
         others = sum(len(names) for names in found.skipped.values())
-        raise RunError(path, f"holds no polygons ({others} of its features are none)" if others else
+        raise RunError(path, f"holds no polygons ({others} of its features are not polygons)" if others else
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
     return found
 
@@ -204,7 +204,7 @@ def add_feature(found, feature, column):
     if column and feature.IsFieldSetAndNotNull(column):
         thickness = positive(feature.GetField(column))
         if thickness is None:
-            raise RunError(found.path, f"{name}: {column} = {feature.GetField(column)} is no thickness in metres",
+            raise RunError(found.path, f"{name}: {column} = {feature.GetField(column)} is not a thickness in metres",
                            "correct it, or leave the column empty")
     if geometry is None or geometry.IsEmpty():
         found.skipped.setdefault("empty", []).append(name)
@@ -215,7 +215,7 @@ def add_feature(found, feature, column):
     polygons, others = polygons_of(geometry)
     for ring in (r for p in polygons for r in [p.exterior, *p.interiors]):
         if not np.isfinite(np.asarray(ring.coords)).all():
-            raise RunError(found.path, f"{name} has a vertex that is no finite number", "correct it or take it out")
+            raise RunError(found.path, f"{name} has a vertex that is not a finite number", "correct it or remove it")
     if others:
         found.skipped.setdefault(others, []).append(name)
     if polygons:
@@ -377,7 +377,7 @@ def from_array(path, how):
     try:
         labels = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
-        raise RunError(path, f"is no array of numpy ({first_line(error)})", "write it with numpy.save") from None
+        raise RunError(path, f"is not an array of numpy ({first_line(error)})", "write it with numpy.save") from None
     if labels.ndim != 2 or labels.dtype.kind not in "biuf" or not labels.size:
         raise RunError(path, f"has the shape {labels.shape} and the type {labels.dtype}",
                        "save one label a pixel: rows, from the north, by columns")
@@ -436,13 +436,13 @@ def of_labels(found, labels, valid, water, place, how):
     ice = valid & ~water
     some = labels[ice]
     if labels.dtype.kind == "f" and np.any(some != np.rint(some)):
-        raise RunError(found.path, "has values that are no labels (whole numbers)", "classify the image first")
+        raise RunError(found.path, "has values that are not labels (whole numbers)", "classify the image first")
     if some.size and some.min() < 0:
-        raise RunError(found.path, f"has the label {some.min():.0f}, which programs that group pixels give to those of "
-                       "no floe", f"say which labels are no ice: --water {some.min():.0f}, or with 0 among them: "
-                       f"--water 0,{some.min():.0f}")
+        raise RunError(found.path, f"has the label {some.min():.0f}, which programs that group pixels give to pixels "
+                       "outside floes", f"say which labels are not ice: --water {some.min():.0f}, or with 0 among "
+                       f"them: --water 0,{some.min():.0f}")
     if place is None and how.pixel is None:
-        raise RunError(found.path, "says nothing of its place and scale (no geotransform, no world file)",
+        raise RunError(found.path, "gives neither its place nor its scale (no geotransform, no world file)",
                        "give the size of a pixel in metres with --pixel, or a world file beside it")
     if place is not None and how.pixel is not None:
         raise RunError(found.path, "has a scale of its own", "leave --pixel out")
@@ -483,7 +483,7 @@ def thickness_by_value(path, text):
     except ValueError:
         out = {0: None}
     if None in out.values():
-        raise RunError(path, f"--thickness {text} is no list VALUE=M,...", "write for example 1=0.5,2=1.2")
+        raise RunError(path, f"--thickness {text} is not a list VALUE=M,...", "write for example 1=0.5,2=1.2")
     return out
 
 

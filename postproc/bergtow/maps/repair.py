@@ -46,15 +46,15 @@ NAMED = 20               # at most so many floes are named in the record
 #: kinds of change, in the order of the report
 KINDS = {
     "empty": "features without a geometry, left out",
-    "no polygon": "features that are no polygons, left out",
+    "no polygon": "features that are not polygons, left out",
     "fewer than 3 vertices": "rings of fewer than 3 vertices, left out",
-    "crossing": "outlines that crossed or touched themselves, mended",
+    "crossing": "outlines that crossed or touched themselves, repaired",
     "joined": "features in pieces that meet (as at the 180th meridian), joined",
     "several": "features of several polygons, each now a floe",
     "holes": "floes with holes, filled",
     "outside": "floes with their middle outside the box, left out",
     "clear": "floes in the clear circle, left out",
-    "stairs": "staircases of pixels made straight",
+    "stairs": "staircases of pixels straightened",
     "simplified": "outlines simplified to the tolerance",
     "slivers": "slivers narrower than the tolerance, left out",
     "small": "floes smaller than --least, left out",
@@ -317,7 +317,7 @@ def apart(floes, rules, book):
         floes = [f for some, _ in kept for f in some]
         changed = np.array([is_new for some, is_new in kept for _ in some], bool)
     raise RunError("outlines", f"floes still overlap after {PASSES} passes, near {floes[int(np.argmax(changed))].name}",
-                   "raise --tolerance, or mend the map there")
+                   "raise --tolerance, or correct the map there")
 
 
 def parted(a, b, rules, book):

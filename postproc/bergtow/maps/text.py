@@ -24,9 +24,9 @@ def map_lines(found, crs, said=None):
     lines = [f"map: {len(found.shapes)} shapes in {name_of(crs)}"]
     if said and (found.crs is None or found.implied):
         lines.append("crs: as --crs says; the file " + (
-            "names none" if found.crs is None else "is in degrees only by the default of GeoJSON"))
+            "names none" if found.crs is None else "is in degrees only by the GeoJSON default"))
     if found.about:
-        lines.append(f"the file says of itself: {found.about}")
+        lines.append(f"the file describes itself as: {found.about}")
     if found.near:
         lines.append(f"not read as the thickness: {', '.join(found.near)}; name the column with --thickness if it is "
                      "in metres")
@@ -43,7 +43,8 @@ def plane_lines(plane, distortion, bend):
     lines = [f"plane: azimuthal equidistant about longitude {lon:.7g}, latitude {lat:.7g}; farthest vertex "
              f"{length(distortion['farthest_m'])}",
              f"distortion at most: lengths {distortion['length_error']:.1e}, areas {distortion['area_error']:.1e}, "
-             f"north turns by {distortion['north_turns_deg']:.2g}°, edges straight on the map bend by {length(bend)}"]
+             f"north is turned by {distortion['north_turns_deg']:.2g}°, edges straight on the map bend by "
+             f"{length(bend)}"]
     if distortion["map_scale"]:
         least, most = distortion["map_scale"]
         lines.append(f"a metre of the map is {1 / most:.6f} to {1 / least:.6f} m on the ground; the outlines are "
@@ -51,7 +52,7 @@ def plane_lines(plane, distortion, bend):
     if plane.accuracy:
         lines.append("the map's datum is tied to WGS 84 " + (
             f"within {plane.accuracy:g} m" if math.isfinite(plane.accuracy) else
-            "by no known relation: places may be off by some hundred metres, all alike"))
+            "by no known relation: all places may be off by the same few hundred metres"))
     if plane.heading is not None:
         lines.append(f"first axis towards {plane.heading:g}°, second to its left (frame: basin)")
     return lines
@@ -111,13 +112,13 @@ def floe_lines(numbers):
              f"{length(y1 - y0)}"]
     if numbers["imaged_share"] < 0.97:
         seen = "was imaged" if numbers["refers_to"] == IMAGED else "lies in the hull of the outlines"
-        lines.append(f"only {100 * numbers['imaged_share']:.0f} % of this rectangle {seen}, and bergtow takes the rest "
-                     "for water: choose a smaller one with --box")
+        lines.append(f"only {100 * numbers['imaged_share']:.0f} % of this rectangle {seen}, and bergtow treats the "
+                     "rest as water: choose a smaller one with --box")
     if not numbers["with_thickness"]:
         lines.append("thickness: no floe has one; give ice.thickness in the case")
     else:
-        lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m in "
-                     "the mean")
+        lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m on "
+                     "average")
     lines.append("       size, m          floes   share of the ice")
     return lines + [f"{row['from_m']:9.4g} to {row['to_m']:<9.4g} {row['floes']:6d} {100 * row['share_of_area']:8.1f} %"
                     for row in numbers["distribution"]]

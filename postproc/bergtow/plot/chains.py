@@ -40,7 +40,7 @@ def read(path):
     try:
         with h5py.File(path, "r") as f:
             if "places" not in f or "solution" not in f:
-                raise RunError(path, "does not say where its contacts are",
+                raise RunError(path, "does not give the places of its contacts",
                                "write it with --dump-contacts of this version")
             places = f["places"]
             dt = float(places.attrs["dt"])
@@ -53,7 +53,7 @@ def read(path):
         raise RunError(path, "no such file",
                        "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None
     except (OSError, KeyError, ValueError) as error:
-        raise RunError(path, f"is no dumped contact problem ({str(error).splitlines()[0]})",
+        raise RunError(path, f"is not a dumped contact problem ({str(error).splitlines()[0]})",
                        "write it with --dump-contacts") from None
 
 
@@ -198,12 +198,12 @@ def options(p):
         metavar="FILE.h5",
         type=Path,
         help=
-        "what --dump-contacts STEP:FILE.h5 of that run wrote; without one, bergtow plot-field --colour force shows the "
-        "largest force on each floe"
+        "the file that --dump-contacts STEP:FILE.h5 of that run wrote; without one, bergtow plot-field --colour force "
+        "shows the largest force on each floe"
     )
     p.add_argument("-o", "--output", metavar="FILE", type=Path, help="file to write (default: RUN/chains.png)")
     p.add_argument("--whole", action="store_true",
-                   help="draw the whole domain (default: what holds the towed body and the forces)")
+                   help="draw the whole domain (default: the part with the towed body and the forces)")
     arguments.add_force(p)
 
 

@@ -181,7 +181,7 @@ def perform(a):
         print(f"bergtow plot-ensemble: warning: {e.holes()}", file=sys.stderr)
     drawn = pictures(e, a, conditions_with_loads(e, a))
     if not drawn:
-        raise RunError(e.file, "varies nothing that can be drawn", "read the tables of bergtow statistics")
+        raise RunError(e.file, "varies no parameter that can be drawn", "read the tables of bergtow statistics")
     places = {name: (a.output or e.path) / f"{name}.{a.format}" for name, _ in drawn}
     for path in places.values():
         writing.may_write(path, a.force)

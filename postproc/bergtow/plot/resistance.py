@@ -60,7 +60,7 @@ def read(path):
                            "run a case with a towed body, with this version")
         if estimates.get("speed_along_m_s") is None:
             if np.isfinite(run.adrift):
-                raise RunError(run.path / "summary.json", f"is of a tow whose last line parted at {run.adrift:g} s",
+                raise RunError(run.path / "summary.json", f"shows a tow whose last line parted at {run.adrift:g} s",
                                "run it with a stronger line, or end it before")
             raise RunError(run.path / "summary.json", "is of a body that is not towed", "run a case with a tow")
         made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
@@ -94,11 +94,12 @@ def check_alike(points):
                 raise RunError(
                     other.path,
                     f"has other conditions than {first.path} (thickness, width, speed or a key of estimate)",
-                    "draw them in pictures of their own")
+                    "draw them in separate pictures")
         key, here, there = next(compared.unlike(first.case, other.case, ("ice.concentration", )), (None, "", ""))
         if key:
-            raise RunError(other.path, f"has another case than {first.path}: {key} is {here} there and {there} here",
-                           "draw them in pictures of their own")
+            raise RunError(other.path,
+                           f"has a different case from {first.path}: {key} is {here} there and {there} here",
+                           "draw them in separate pictures")
 
 
 def once(points):
@@ -107,7 +108,7 @@ def once(points):
     seen, out = set(), []
     for p in points:
         if p.state and p.state in seen:
-            print(f"bergtow plot-resistance: left out: {p.path}: ends in the same state as a run before it",
+            print(f"bergtow plot-resistance: left out: {p.path}: ends in the same state as an earlier run",
                   file=sys.stderr)
         else:
             out.append(p)

@@ -220,7 +220,7 @@ def draw_sweep(e, key):
             axes.tick_params(labelbottom=True)
     pairs = fields_legend(e) + [(handle, label) for label, handle in extra.items()]
     note = " ".join(
-        ([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else []) +
+        ([f"{len(panels) - MOST_PANELS} further combinations are not shown."] if len(panels) > MOST_PANELS else []) +
         (["Estimates at the speed made good, dotted outside the range they are meant for."]
          if key == "ice.concentration" else []) +
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +

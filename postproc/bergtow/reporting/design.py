@@ -199,8 +199,8 @@ def more_fields(left, member, n, most, conditions, jobs):
 def run_case(work, a, case):
     """Run as many fields of a case as the budget allows. Raises RunError."""
     if reads_ice(case) and a.fields > 1:
-        print("the ice is read, and no seed changes it: one field is run, which says nothing of the scatter between "
-              "fields")
+        print("the ice is read, and no seed changes it: one field is run, which tells nothing about the scatter "
+              "between fields")
         a.fields = 1
     settled = fields_settled(a.output)
     n = min(max(FIRST, settled), a.fields)
@@ -211,9 +211,9 @@ def run_case(work, a, case):
     start = time.monotonic()
     whole_round = work.ensemble(write_study(a, case, n, wider))
     if not whole_round and fields_settled(a.output) < 1:
-        raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
-                       f"raise --budget to {math.ceil(2 * a.budget)}; what was begun is kept, and the same call goes "
-                       "on", SIGNAL)
+        raise RunError(a.file, f"{a.budget:g} min are not enough for one field of each condition",
+                       f"raise --budget to {math.ceil(2 * a.budget)}; finished work is kept, and the same call "
+                       "continues", SIGNAL)
     e = Members(a.output)
     conditions = len(e.conditions())
     def took(fields):  # s per member, including overheads
@@ -234,14 +234,14 @@ def run_case(work, a, case):
     work.member = member
     if not whole_round:
         n = max(1, fields_settled(a.output))
-        print(f"no time is left for further fields: the answer is from the {n} that are complete in every condition")
+        print(f"no time is left for further fields: the answer uses the {n} that are complete in every condition")
         work.end, work.quiet = np.inf, True  # nothing is left to run; the members are gathered once more
         work.ensemble(write_study(a, case, n, wider))
     if n < min(FEW, a.fields):
         share = 1 if a.no_load_cases else 1 - CASES_SHARE
         lacks = math.ceil((FEW - n) * conditions / work.jobs) * member - max(0.0, end - time.monotonic())
         need = a.budget + max(0.0, lacks) / share / 60
-        print(f"bergtow design: warning: {n} fields say nothing of the scatter between them; {FEW} need some "
+        print(f"bergtow design: warning: {n} fields tell nothing about the scatter between them; {FEW} need some "
               f"{math.floor(need) + 1} min: --budget {math.floor(need) + 1}", file=sys.stderr)
 
 
@@ -375,7 +375,7 @@ def speeds(text):
     if text.count(":") == 2:
         first, last, n = text.split(":")
         if not n.strip().isdecimal() or int(n) < 2:
-            raise argparse.ArgumentTypeError(f"{text}: {n} is no number of speeds; give 2 or more")
+            raise argparse.ArgumentTypeError(f"{text}: {n} is not a number of speeds; give 2 or more")
         return np.linspace(speed(first), speed(last), int(n)).tolist()
     return [speed(part) for part in text.split(",")]
 
@@ -383,10 +383,10 @@ def speeds(text):
 def options(p):
     p.set_defaults(by_speed={}, varied={})
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
-    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call continues "
                    "where an earlier one ended")
     p.add_argument("--budget", type=minutes, metavar="MIN",
-                   help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
+                   help=f"total wall time, min (default: {BUDGET:g} for a case, none for a study)")
     p.add_argument("--concentrations", type=several(concentration), metavar="A,...",
                    help="of a case (default: its own)")
     p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="of a case: tow speeds beside its own, "
@@ -395,23 +395,23 @@ def options(p):
                    "thicknesses of the ice beside its own, \"0.8 m,1.6 m\"")
     p.add_argument("--winds", type=several(from_zero("m/s")), metavar="V,...", default=[],
                    help="of a case: winds from ahead beside its own, \"10 m/s,20 m/s\"")
-    p.add_argument("--vessel", metavar="NAME", help="class of the library, or bollard pull, \"110 t\": is it enough?")
+    p.add_argument("--vessel", metavar="NAME", help="vessel to check: class of the library, or bollard pull, \"110 t\"")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
     p.add_argument("--line-length", type=measure("m"), metavar="M", help="its length, for snap loads (default: that "
                    "of the case)")
     p.add_argument("--line-factor", type=factor, metavar="X", help="safety factor of the line (default: none is "
                    "applied)")
     p.add_argument("--efficiency", type=measure("%", lambda x: 0 < x <= 1, "not above 0 and up to 100 %"),
-                   default=1.0, metavar="X", help="share of the bollard pull that "
-                   "the vessel tows with in the weather (default: 1)")
+                   default=1.0, metavar="X", help="share of the bollard pull available to the vessel in the "
+                   "weather (default: 1)")
     for kind in ("vessels", "lines"):
         p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
-    p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of what is assumed, as the "
+    p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of the assumed values, as the "
                    "parameters of a study (default: a few with their sources)")
     p.add_argument("--head-current", type=from_zero("m/s"), metavar="V",
                    help="against the tow, in the load case with head current and wind (default: "
                    f"{load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design value)")
-    p.add_argument("--head-wind", type=from_zero("m/s"), metavar="V", help="the same of the wind (default: "
+    p.add_argument("--head-wind", type=from_zero("m/s"), metavar="V", help="the same for the wind (default: "
                    f"{load_cases.HEAD_WIND:g} m/s)")
     p.add_argument("--bend", type=measure("rad", lambda x: BENDS[0] <= abs(x) <= BENDS[1], "not from 1 to "
                                           "150 degrees, to either side"),
@@ -419,18 +419,19 @@ def options(p):
                    f"(default: {answer.BEND:g}, assumed)")
     p.add_argument("--bend-radius", type=measure("m"), metavar="M", help="its radius (default: ten body widths, "
                    "assumed)")
-    p.add_argument("--no-load-cases", action="store_true", help="no runs of load cases and ranges: closed forms alone")
+    p.add_argument("--no-load-cases", action="store_true", help="no runs of load cases and ranges: closed forms only")
     domain_width.add_option(p)
     p.add_argument("--fields", type=at_least_one, default=MOST_FIELDS, metavar="N",
-                   help="of a case: at most so many of each condition (default: %(default)s)")
-    p.add_argument("--seed", type=at_least_one, default=1, metavar="N", help="of a case: of its fields (default: 1)")
+                   help="of a case: largest number for each condition (default: %(default)s)")
+    p.add_argument("--seed", type=at_least_one, default=1, metavar="N",
+                   help="of a case: seed of its fields (default: 1)")
     p.add_argument("--title", metavar="TEXT", help="of a case: title of the report")
     p.add_argument("--no-pdf", action="store_true", help="the page alone")
     p.add_argument("--no-replay", action="store_true", help="no replay of a tow")
     p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
                    help="take results of converge, budget and capability from this folder into the report; may be "
                    "repeated")
-    p.add_argument("--quiet", action="store_true", help="no line for each member")
+    p.add_argument("--quiet", action="store_true", help="do not print a line for each member")
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
     analysis.add_runs(p)
@@ -508,4 +509,4 @@ def perform(a):
     print(f"{(time.monotonic() - began) / 60:.1f} min")
     holes = Members(a.output).holes()
     if holes:
-        raise RunError(a.output, holes, "call again: it goes on; bergtow ensemble --retry-failed tries failed ones")
+        raise RunError(a.output, holes, "call again: it continues; bergtow ensemble --retry-failed tries failed ones")

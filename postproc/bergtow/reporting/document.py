@@ -16,18 +16,17 @@ EVIDENCE = (
      "channels of 5 to 15 floes"),
     ("ship model in floes", "none: a prediction"))
 NO_FORCE = ("No measured mean force of a tow with complete conditions is public. No force of this report has been "
-            "compared with a measured one; the cases compare where and in which form ice jams with what was reported "
-            "of laboratories.")
+            "compared with a measured one; the cases compare where and how ice jams with reports from laboratories.")
 SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"),
            ("d", "draft of the body, m"),
            ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
            ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("ρ", "density, kg/m³; of ice with i, of water with w"), ("kN, t", "1 t of force is 9.80665 kN"))
-STANDARDS = ("No rule of a standard or of a class society is applied, and none was at hand: not ISO 19906, not ISO "
+STANDARDS = ("No rule of a standard or of a class society is applied, and none was available: not ISO 19906, not ISO "
              "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
-             "that one, and efficiencies of the vessel, are those that the user named. Whoever approves the tow "
-             "chooses standard, factors and weather window.")
+             "the user named that factor and any efficiencies of the vessel. Whoever approves the tow chooses the "
+             "standard, factors and weather window.")
 #: keys that limit an operation, with their names; the first known one describes what was simulated
 LIMITING = (("concentration of the ice", ("ice.concentration", )), ("thickness of the ice", ("ice.thickness", )),
             ("size of the floes", ("ice.size", )), ("speed of the tow", ("tow.speed", )),
@@ -58,9 +57,9 @@ def pull_of(cases, answer):
     the answer, or else the bollard pull of the case, part of which is lost at speed; NaN if no vessel is named."""
     at_speed = [x["has_n"] for x in (answer or {}).get("speeds", []) if x.get("has_n")]
     if at_speed:
-        return float(min(at_speed)), "what the vessel pulls at the speed asked for"
+        return float(min(at_speed)), "pull of the vessel at the requested speed"
     return (max((case.bollard_pull for _, case in cases), default=np.nan),
-            "the bollard pull, of which less is left at speed")
+            "the bollard pull; at speed less of it is left")
 
 
 def held(s, pull, what):
@@ -93,8 +92,8 @@ def operation(s, cases, values, answer):
         elif keys[0] == "tow.speed" and answer and (most := (answer.get("feasible") or {}).get("not_above_m_s")):
             limit = f"not above {number(most)} m/s with the vessel named"
         rows.append([name, said, limit])
-    rule = ("Nothing is known outside of what was simulated. Where ice is denser, thicker or of larger floes, wind or "
-            "current stronger, or the tow faster than in this table, the tow stops, or the load is computed anew.")
+    rule = ("Nothing is known outside the simulated conditions. Where ice is denser, thicker or of larger floes, wind "
+            "or current stronger, or the tow faster than in this table, the tow stops, or the load is computed anew.")
     if not np.isfinite(pull):
         rule += " No vessel is named, so no limit follows from one: its net pull at the speed of the tow has to " \
             "exceed the load of the condition."
@@ -133,9 +132,9 @@ def check(run, estimates):
     reporting/run.py."""
     if run is None:
         return [lines("No member can be read.")]
-    out = [lines("By hand, with the numbers of the first field of the condition that governs. All ice in the way of "
-                 "the body is brought to its speed once: ice that is pushed aside asks for less, ice that hands "
-                 "the push on, rubs or rafts for more.")]
+    out = [lines("By hand, with the numbers of the first field of the governing condition. All ice in the way of the "
+                 "body is accelerated to its speed once: ice pushed aside needs less force; ice that passes the push "
+                 "on, rubs or rafts needs more.")]
     rows = by_hand(run)
     out += [table(["what", "by hand", "force", "mean of the simulation", "simulated / by hand"], rows)] if rows else \
         [lines("Nothing is towed at a known speed.")]

@@ -67,7 +67,7 @@ def blocks(parts):
 MARGIN = 1.05  # times the largest simulated value: a lower design value leaves little room for unseen loads
 #: marks after a design value, and their footnotes
 FOOTNOTES = {
-    "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
+    "*": "beyond the hours simulated: extrapolated with the tail of the distribution.",
     "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few, or farther apart "
          "than the return time.",
     "‡": "less than 5 % above the largest simulated: little margin for so long a return time."
@@ -106,7 +106,7 @@ def answer(e, s, cases, results, told=None):
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
     if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
-        notes.append("In the start: of the same moving mean, the largest that begins before the window, which is in "
+        notes.append("In the start: of the same moving mean, the largest that begins before the window, which enters "
                      "no other number.")
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
@@ -122,7 +122,7 @@ def answer(e, s, cases, results, told=None):
     notes += [loads_text.steps(s)] if loads_text.steps(s) else []
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
-    out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
+    out += [{"kind": "pairs", "label": "line, vessel, and limits of the intervals",
              "rows": report_method.beyond(results, e)[1:] if told else
              report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
     return out + [lines(held)] * bool(held)
@@ -276,10 +276,10 @@ def of_part(name, part):
 
 #: text that replaces a chapter without results
 NOT_STUDIED = {
-    "converge": "Not studied: whether the result depends on width and length of the domain, time step, tolerance and "
-                "start is not known. bergtow converge CASE.yml examines it.",
-    "budget": "Not studied: how much the values that are assumed change the result is not known, and no interval of "
-              "this report covers it. bergtow budget STUDY.yml examines it.",
+    "converge": "Not studied: it is not known whether the result depends on the width and length of the domain, time "
+                "step, tolerance or start. bergtow converge CASE.yml examines it.",
+    "budget": "Not studied: it is not known how much the assumed values change the result, and no interval of this "
+              "report covers it. bergtow budget STUDY.yml examines it.",
 }
 
 
@@ -289,7 +289,7 @@ def doubt(name, found, folder, texts):
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
     if name == "converge" and (at := compared.alone(found, texts)):
-        return f"studied at {at} alone: of the other tows of this report it says nothing"
+        return f"studied only at {at}: it tells nothing about the other tows of this report"
     try:
         why = compared.stale(found, Members(folder)) if name == "budget" else ""
     except RunError:  # the folder holds only the result

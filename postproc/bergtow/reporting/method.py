@@ -28,7 +28,7 @@ def _fields(s, cases):
     if any(source_of_ice(case.texts) for _, case in cases):
         return ""
     seeds = {m["seed"] for m in s["members"]}
-    return ", each through an ice field of its own" if len(seeds) == len(s["members"]) else \
+    return ", each through its own ice field" if len(seeds) == len(s["members"]) else \
         f", whose ice is made from {len(seeds)} seeds, the same in all conditions"
 
 
@@ -51,7 +51,7 @@ def method(s, cases):
         "non-smooth discrete element method, after Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138). Drag of water "
         "and air, added mass and the Coriolis force act on floes and body. The force of the ice on the body is the "
         "sum of these impulses over the time step. The tow force is the force along the tow: ice resistance, drag of "
-        "water and air, Coriolis force, slope of the sea and inertia. A force across the tow is not in it.",
+        "water and air, Coriolis force, slope of the sea and inertia. Forces across the tow are not included.",
         _amount(s, cases)
     ]
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
@@ -59,8 +59,8 @@ def method(s, cases):
         return out
     out.append(
         f"{loads_text.asked(s)}. This is the level of the return time −T / ln(1 − p), "
-        f"{_span([d['return_hours'] for d in tows])} h: the level that is exceeded once in so long on average, all of "
-        "it towed in that condition. The load is first averaged by a moving mean over "
+        f"{_span([d['return_hours'] for d in tows])} h: the level that is exceeded once in that time on average, if "
+        "all of it is towed in that condition. The load is first averaged by a moving mean over "
         f"{_span([d['time_scale_s'] for d in tows])} s, so that pushes and collisions count by their impulse. "
         "Excursions above a threshold are gathered into clusters, to whose maxima a generalised Pareto distribution "
         "is fitted (block maxima and a generalised extreme value distribution where there are too few clusters). The "
@@ -101,14 +101,15 @@ def _ice(case, toughness, kappa, pressure):
 
 def _pack(case):
     return "" if case.texts.get("domain.ends") != "open" or case.texts.get("domain.sides") == "wall" else \
-        "The ice is not confined along the tow: pressure in the pack by wind, current or a shore is not in the force."
+        "The ice is not confined along the tow: the force does not include pressure in the pack by wind, current or " \
+        "a shore."
 
 
 def _end(case):
     """The motion of the towing end, in a sentence."""
     return {
-        "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
-                 "the tow force holds no dynamics of the line.",
+        "speed": "The tow holds its speed whatever force this takes: no line or vessel slows down, so "
+                 "the tow force does not include the dynamics of the line.",
         "line": "The towing end of the line moves as prescribed: the vessel neither slows down nor stops.",
         "thrust": "The vessel is a point with thrust and resistance curves; it does not manoeuvre by itself.",
     }.get(case.mode, "Nothing is towed.")
@@ -142,9 +143,9 @@ def limits(cases, vessel=False):
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
     out.append("The intervals cover the scatter of fields that are alike and the error of the fit. Where fields differ "
-               "in level, return levels and the design value are borne by fields worse than any simulated, and lie "
-               "above the interval more often than it says. The intervals cover neither the values that are assumed "
-               "nor the choice of the model, and there is no safety factor in any number.")
+               "in level, fields worse than any simulated determine the return levels and the design value, which lie "
+               "above the interval more often than it says. The intervals cover neither the assumed values nor the "
+               "choice of the model, and there is no safety factor in any number.")
     return out
 
 
@@ -218,7 +219,7 @@ def _convergence(found, e):
 def beyond(results, e):
     """Rows (what, value) from the results of other commands, for the answer; results: {name: found}. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
-    rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
+    rows = [("assumed values, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]

@@ -98,8 +98,8 @@ def options(p):
         type=float,
         default=LIMIT / 1e6,
         help=
-        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page says so "
-        "(default: %(default)g)"
+        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page reports "
+        "this (default: %(default)g)"
     )
     p.add_argument("--no-compression", action="store_true",
                    help="store the replay's data as they are, for browsers that cannot unpack them")
@@ -128,10 +128,10 @@ def pages(folder, paths, given, also, size, compressed):
         template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, also)
     else:
         if also:
-            raise RunError(folder, "is a run, and --also is of an ensemble", "leave --also out")
+            raise RunError(folder, "is a run, but --also is for an ensemble", "leave --also out")
         with Run(folder) as run:
             if not len(run["time"]):
-                raise RunError(folder, "has made no step to report on", "go on with it: bergtow resume")
+                raise RunError(folder, "has no step to report on", "continue it with bergtow resume")
             template, context = "run.html", report_run.context(run, 1e6 * size, compressed, given)
     return {path: render(template, context, is_pdf(path)) for path in paths}, context.get("members", [])
 

@@ -26,7 +26,8 @@ def browser():
     """Path of a suitable Chromium. Raises RunError."""
     path = next(filter(None, map(shutil.which, NAMES)), None)
     if path is None:
-        raise RunError("chromium", "not installed, and a PDF is made by it", f"apt-get install chromium, {INSTEAD}")
+        raise RunError("chromium", "not installed, but bergtow needs it to make a PDF",
+                       f"apt-get install chromium, {INSTEAD}")
     said = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=PATIENCE).stdout
     version = re.search(r"(\d+)\.\d+", said)
     if not version or int(version[1]) < LEAST:

@@ -172,11 +172,10 @@ class Replay:
             notes.append(f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all "
                          "are in result.h5.")
         if len(floes) < run.n_floes:
-            which = "those that come nearest to the towed body" if run.towed is not None else "the largest ones"
+            which = "those that come closest to the towed body" if run.towed is not None else "the largest ones"
             notes.append(
-                f"{len(floes)} of the {run.n_floes} floes are in this page, {which}, to keep it small: the rest of the "
-                f"water is not free of ice. "
-                "All are in result.h5.")
+                f"{len(floes)} of the {run.n_floes} floes are in this page, {which}, to keep it small. The rest of the "
+                f"water is not free of ice: all floes are in result.h5.")
         worst = max(self.quanta[axis][1] / 2 for axis in "xy")
         notes.append(f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact "
                      "force to 16 bits; result.h5 holds them in full.")

@@ -141,7 +141,7 @@ def forces(run):
             peaks = [n(f"window.series.{name}.{when}peak_n") for when in ("", "start_")]
             if np.isfinite(peaks).any():
                 rows.append((f"{run.label(name)}, largest step mean", force(peaks[0]), "",
-                             "no mean over the window: it has parted" +
+                             "no mean over the window: it parted" +
                              start_peak(run, f"window.series.{name}.start_peak_n")))
             continue
         known = re.fullmatch(r"mean_(.*)_n", key)

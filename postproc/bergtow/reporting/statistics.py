@@ -72,7 +72,8 @@ def options(p):
                    help="where to write statistics.csv and .json (default: DIR)")
     p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
     p.add_argument("--error", type=above_zero, metavar="E",
-                   help="relative error of the mean that the number of fields needed is for (default %(default)s)")
+                   help="relative error of the mean, from which the needed number of fields follows (default "
+                        "%(default)s)")
     p.add_argument("--hours", type=above_zero, nargs="+", metavar="T",
                    help="return times of loads and peaks, hours of tow (default 1 10 100)")
     loads.add_options(p)
@@ -85,7 +86,7 @@ def options(p):
     p.add_argument("--resamples", type=at_least_one, metavar="B",
                    help="resamples for p-values and return levels (default %(default)s)")
     p.add_argument("--partial", action="store_true",
-                   help="exit with 0 even where members of the study are in no number")
+                   help="exit with 0 even if some members of the study enter no statistics")
     arguments.add_force(p)
     p.set_defaults(**conditions.DEFAULTS | {"exclude": []})
 
@@ -103,4 +104,4 @@ def perform(a):
     if s["holes"] and not a.partial:
         again = "" if np.all(e.status == FINISHED) else "run `bergtow ensemble` again, with --retry-failed for those " \
             "that failed, or "
-        raise RunError(e.path, s["holes"], f"{again}take what there is with --partial")
+        raise RunError(e.path, s["holes"], f"{again}use the members that exist with --partial")

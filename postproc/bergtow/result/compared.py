@@ -114,7 +114,7 @@ def stale(found, e):
     """Why a result with state(e) no longer belongs to this ensemble; "" if it does, or has no state."""
     now = state(e)
     if found.get("study", now["study"]) != now["study"]:
-        return "of another study than its folder holds"
+        return "of a different study from that in its folder"
     then = found.get("finished", now["finished"])
     return "" if then == now["finished"] else f"of {then} members, while {now['finished']} have finished"
 

@@ -33,7 +33,7 @@ class Result:
         try:
             return json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
-            raise BergtowError(f"{path}: is not there: the run has not ended; go on with it by `bergtow resume "
+            raise BergtowError(f"{path}: is missing: the run has not ended; continue it with `bergtow resume "
                                f"{self.folder}`", IO) from None
 
     def open(self) -> xarray.Dataset:

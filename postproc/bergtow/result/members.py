@@ -33,11 +33,11 @@ LEAST_TOW = 150.0
 
 #: kinds of doubt about a member, with their meanings
 DOUBTS = {
-    "unconverged": "steps met the limit of work before the tolerance",
-    "unbounded": "the load of the body has no bound in some steps of its window: its means and peaks are lower bounds",
-    "jammed": "the towed body stood still while the tow asked for motion",
-    "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
-                "solved",
+    "unconverged": "steps reached the work limit before the tolerance",
+    "unbounded": "the load on the body has no bound in some steps of its window: its means and peaks are lower bounds",
+    "jammed": "the towed body stood still although the tow demanded motion",
+    "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or unsolved "
+                "steps",
     "short": "no window, or fewer than 20 independent samples in it",
     "few": "the body met no ice in its window, or little: contact worth fewer than 10 equal stretches",
     "stopped": "the run stopped early",
@@ -114,10 +114,10 @@ class WithoutBound:
     def words(self, named=False):
         """The number of such tows and the share of such steps; named: with their names."""
         some, ended = (f" ({listed(names)})" if named else "" for names in (self.some, self.ended))
-        parts = [f"the load of the body has no bound in some steps of {len(self.some)} of {self.tows} tows{some}, "
+        parts = [f"the load on the body has no bound in some steps of {len(self.some)} of {self.tows} tows{some}, "
                  f"{100 * self.share:.2g} % of the steps of all that finished"] * bool(self.some)
-        parts += [f"{len(self.ended)} of {self.tows} tows ended for want of a solution (guard.no_solution) and are in "
-                  f"no number{ended}"] * bool(self.ended)
+        parts += [f"{len(self.ended)} of {self.tows} tows ended for lack of a solution (guard.no_solution) and enter "
+                  f"no statistics{ended}"] * bool(self.ended)
         return "; ".join(parts)
 
 
@@ -151,7 +151,7 @@ class Members:
             self.unsound = self._unsound()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise RunError(self.file, f"is not an ensemble ({str(error).splitlines()[0]})",
-                           "run `bergtow ensemble` again: it makes the file anew") from None
+                           "run `bergtow ensemble` again: it makes the file again") from None
         self._dropped = {}
 
     def _read(self):
@@ -159,8 +159,8 @@ class Members:
             integrity.check_seal(self.file, "ensemble")
         except BergtowError as error:
             why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
-            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file anew") from None
-        with opened(self.file, "run `bergtow ensemble` again: it makes the file anew") as f:
+            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file again") from None
+        with opened(self.file, "run `bergtow ensemble` again: it makes the file again") as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
                 setattr(self, key, f[f"members/{key}"][()])
@@ -363,7 +363,7 @@ class Members:
                  ("failed", [self.name[m]
                              for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
         parts = [f"{len(names)} {kind} ({listed(names)})" for kind, names in kinds if names]
-        return (f"{sum(len(names) for _, names in kinds)} of {self.n} members are in no number: {', '.join(parts)}"
+        return (f"{sum(len(names) for _, names in kinds)} of {self.n} members enter no statistics: {', '.join(parts)}"
                 if parts else "")
 
     def exclude(self, kinds):
@@ -405,11 +405,11 @@ class Members:
         said = []
         if len(builds) > 1:
             of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
-            said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits "
+            said.append(f"The members come from {len(builds)} builds of the program, which may differ in the last bits "
                         f"({of}).")
         if any(str(build[1]).endswith("-dirty") for build in builds):
-            said.append("The program was built from sources with changes that no revision holds: its results cannot be "
-                        "made again from the revision alone.")
+            said.append("The program was built from sources with uncommitted changes: its results cannot be reproduced "
+                        "from the revision alone.")
         return " ".join(said)
 
     def conditions(self):

@@ -144,7 +144,7 @@ def not_used(run, case):
     asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant" or bool(
         np.any(np.isclose(run.thickness[:run.n_start], run.value("ice.thickness"), rtol=1e-12, atol=0))))
     if ice and not asked:
-        found |= dict.fromkeys(THICKNESS, f"not used: the ice is read by {ice}, with its thickness")
+        found |= dict.fromkeys(THICKNESS, f"not used: {ice} supplies the ice with its thickness")
     return found
 
 

@@ -467,7 +467,7 @@ class Run(Frames):
     def impacts(self):
         """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", the
         definition of a peak."""
-        return self._group("impacts", "collisions were not told apart")
+        return self._group("impacts", "collisions were not identified")
 
     @cached_property
     def panels(self):

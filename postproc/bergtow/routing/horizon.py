@@ -86,8 +86,9 @@ class Horizon:
         keys = self.keys(points, duration)
         why = self.runs.make(name, range(1), keys)
         if SPENT in why:
-            raise RunError(self.files.folder, f"the budget of {self.a.budget:g} min is spent before every tow is made",
-                           "call again: what is made is kept", IO)
+            raise RunError(self.files.folder,
+                           f"the budget of {self.a.budget:g} min is spent, but some tows are still to be made",
+                           "call again: finished work is kept", IO)
         if why[0]:
             self.runs.tell_failed()
         return self.runs.path(name, 0)
@@ -156,7 +157,7 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
                                                           ice=seen(s.ice, w["errors"], 0))
     route = best(first)
     if route is None:
-        raise RunError("bergtow route", "no route is allowed at the first look", "take a higher --force-limit, or a "
+        raise RunError("bergtow route", "no route is allowed at the first look", "give a higher --force-limit, or a "
                        "smaller --radius or --clearance", CASE)
     points = once = led(route, s, h.speed)
     found["horizon"] = {"every": w["replan"], "age": w["age"], "perfect": perfect, "tows": {}}

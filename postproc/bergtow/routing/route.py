@@ -40,19 +40,19 @@ FILES = ("route-base.yml", "straight.yml", "routes.geojson", "routes.gpx", "rout
 
 #: status of a plan without routes: (name of the option or key, reason, remedy)
 STATUS = {
-    "start_no_go": ("--from", "the body would lie in an area to keep out of", "start elsewhere, or take less "
+    "start_no_go": ("--from", "the body would lie in a no-go area", "start elsewhere, or give less "
                     "--clearance"),
-    "goal_no_go": ("--to", "the goal lies in an area to keep out of, or too near to one for the body",
-                   "choose a goal in free water, or take less --clearance"),
-    "start_outside": ("--from", "the body would reach out of the domain", "start elsewhere, or enlarge the domain"),
-    "goal_outside": ("--to", "the goal lies outside the domain, or too near to its edge for the body",
-                     "choose a goal within, or enlarge the domain"),
+    "goal_no_go": ("--to", "the goal lies in a no-go area, or too close to one for the body",
+                   "choose a goal in free water, or give less --clearance"),
+    "start_outside": ("--from", "the body would reach outside the domain", "start elsewhere, or enlarge the domain"),
+    "goal_outside": ("--to", "the goal lies outside the domain, or too close to its edge for the body",
+                     "choose a goal inside it, or enlarge the domain"),
     "start_too_thick": ("--from", "the ice about the start takes more than --force-limit at every speed",
-                        "start elsewhere, or take a lower speed or a higher limit"),
+                        "start elsewhere, or give a lower speed or a higher limit"),
     "goal_too_thick": ("--to", "the ice about the goal takes more than --force-limit at every speed",
-                       "choose another goal, or take a lower speed or a higher limit"),
+                       "choose another goal, or give a lower speed or a higher limit"),
     "no_route": ("--to", "no way leads from the start to the goal",
-                 "take a smaller --radius, --clearance or --width, or a higher --force-limit"),
+                 "give a smaller --radius, --clearance or --width, or a higher --force-limit"),
     "at_goal": ("--to", "the tow starts at its goal", "choose a goal elsewhere"),
     "goal_drifts_away": ("--to", "the goal drifts away from the ice faster than the body is towed",
                          "take a higher speed"),
@@ -64,20 +64,22 @@ STATUS = {
 
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
-    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, in degrees "
-                   "as 20.1E,76.5N where the map has a place; X,Y:X,Y is a line, at any point of which the tow may end")
+    p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, or in "
+                   "degrees as 20.1E,76.5N if the map has a place; X,Y:X,Y is a line, and the tow may end at any of "
+                   "its points")
     p.add_argument("--from", dest="start", metavar="X,Y", help="start (default: where the case has the body)")
     p.add_argument("--map", type=Path, metavar="FILE", help="the ice: outlines (.geojson) or a field (.h5) in place of "
                    "that of the case")
-    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons to keep "
-                   "out of: land, shoals, zones; may be repeated. Fixed floes of the case are such areas, too")
+    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons of no-go "
+                   "areas: land, shoals, zones; may be repeated. Fixed floes of the case are no-go areas, too")
     p.add_argument("--clearance", type=from_zero("m"), metavar="M", default=0.0,
                    help="distance to keep from them (default 0 m)")
-    p.add_argument("--objective", choices=tuple(words.UNITS), default="work", help="what is to be small (default work)")
+    p.add_argument("--objective", choices=tuple(words.UNITS), default="work",
+                   help="quantity to minimise (default work)")
     p.add_argument("--speeds", type=several(measure("m/s")), metavar="V,V",
                    help="speeds to choose among (default: tow.speed)")
     p.add_argument("--force-limit", type=measure("N"), default=np.inf, metavar="F",
-                   help="tow force or tension that is not to be exceeded")
+                   help="largest tow force or tension allowed")
     p.add_argument("--routes", type=whole_from(1, 16), default=ROUTES, metavar="K", help="routes besides the straight "
                    f"line, at least a width apart (default {ROUTES})")
     p.add_argument("--members", type=whole_from(1, 1000), default=MEMBERS, metavar="N", help="members of the map that "
@@ -91,13 +93,13 @@ def options(p):
     p.add_argument("--calibrate", type=whole_from(0, 1000), default=0, metavar="N", help="fit the cost to N straight "
                    "swaths towed through the map first, at least 6 (default 0: none)")
     p.add_argument("--replan", type=measure("s"), metavar="S",
-                   help="look at the ice anew after every S of the tow and plan the rest")
+                   help="look at the ice again after every S of the tow and plan the rest")
     p.add_argument("--map-age", type=from_zero("s"), metavar="S", default=0.0,
                    help="age of the map at each look of --replan (default 0 s)")
     p.add_argument("--width", type=measure("m"), metavar="M",
-                   help="of the body across its way (default: the mean over its headings)")
+                   help="of the body across its path (default: the mean over its headings)")
     p.add_argument("--radius", type=from_zero("m"), metavar="M",
-                   help=f"least radius of the body's way (default: the length of the line, or {LENGTHS:g} times the "
+                   help=f"least radius of the body's path (default: the length of the line, or {LENGTHS:g} times the "
                    f"body's mass over its water drag at 1 m/s; without a line {RADIUS:g} widths)")
     p.add_argument("--headings", type=int, choices=(16, 32), default=32, help="of the lattice (default 32)")
     p.add_argument("--cell", type=measure("m"), metavar="M",
@@ -107,19 +109,19 @@ def options(p):
     p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
     p.add_argument("--no-page", action="store_true", help="leave out route.html, the page with the replays")
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
-                   "the same call goes on")
+                   "the same call continues")
     analysis.add_options(p, BUDGET)
 
 
 def refuse_looks(w, s):
     """Reject options and cases that --replan does not support. Raises RunError."""
     if s.mode == "thrust":
-        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its way, so that a new "
-                       "way would change its tow before the look", "set tow.mode to speed or line", USAGE)
+        raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its path, so that a new "
+                       "path would change its tow before the look", "set tow.mode to speed or line", USAGE)
     if len(w["speeds"]) > 1:
-        raise RunError("--replan", "plans the way at one speed", "give --speeds one speed", USAGE)
+        raise RunError("--replan", "plans the path at one speed", "give --speeds one speed", USAGE)
     if w["age"] > w["replan"]:
-        raise RunError("--map-age", "is longer than --replan", "take a map that is younger than the time between looks",
+        raise RunError("--map-age", "is longer than --replan", "give a map that is younger than the time between looks",
                        USAGE)
 
 
@@ -220,7 +222,7 @@ def calibrated(a, w, s, runs):
             ratios.append(np.percentile(force, tows.PEAK) / force.mean())
         features.append(route.features)
     if len(forces) < 6:
-        raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their end", "give --budget more time, "
+        raise RunError("--calibrate", f"only {len(forces)} swaths were towed to their ends", "give --budget more time, "
                        "or leave --calibrate out", SIGNAL if spent else IO)
     fit = planner.fit_weights(features, np.array(forces))
     rank = float(fit.rank_correlation)
@@ -356,7 +358,7 @@ def perform(a):
     s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, a.width)
     w = wanted(a, s)
     if tows.to_goal(np.array([s.start]), goal)[0] <= tows.ARRIVED * s.hull.width:
-        raise RunError(f"--to {a.to}", f"is reached where the tow starts: within a width of the body, "
+        raise RunError(f"--to {a.to}", f"is reached at the start of the tow: within a width of the body, "
                        f"{s.hull.width:.4g} m", "choose a goal farther away", CASE)
     if w["replan"]:
         refuse_looks(w, s)
@@ -415,8 +417,8 @@ def verify(a, w, s, goal, some, n, runs, files, found, told):
                   if c is some[0] else None)
         if SPENT in why:
             files.write(found)
-            raise RunError(folder, f"the budget of {a.budget:g} min is spent before every tow is made",
-                           "call again: what is made is kept", SIGNAL)
+            raise RunError(folder, f"the budget of {a.budget:g} min is spent, but some tows are still to be made",
+                           "call again: finished work is kept", SIGNAL)
         if any(why):
             runs.tell_failed()
         rows = []

@@ -74,21 +74,21 @@ def position(text, place, option):
     """(x, y) in m of the case, from "X,Y" with any unit of length or from degrees, "20.1E,76.5N". Raises RunError."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 2:
-        raise RunError(f"{option} {text}", "is no position", "write it as X,Y in metres of the case, or as degrees, "
+        raise RunError(f"{option} {text}", "is not a position", "write it as X,Y in metres of the case, or as degrees, "
                        "20.1E,76.5N", USAGE)
     sides = [part[-1:].upper() if part[-2:-1] in "0123456789. " else "" for part in parts]  # not the n of nan
     if {*sides} & {*"NESW"}:
         if not ({*sides} & {*"EW"} and {*sides} & {*"NS"}):
-            raise RunError(f"{option} {text}", "is no place on the earth", "write a longitude and a latitude, as in "
+            raise RunError(f"{option} {text}", "is not a place on the earth", "write a longitude and a latitude, as in "
                            "20.1E,76.5N", USAGE)
         if place.origin is None:
-            raise RunError(f"{option} {text}", "is in degrees, and the map of this case has no place",
+            raise RunError(f"{option} {text}", "is in degrees, but the map of this case has no place",
                            "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, or write metres of the case",
                            USAGE)
         values = dict(zip(sides, (number(part[:-1], "", option) for part in parts)))
         degrees = [values.get("E", -values.get("W", 0.0)), values.get("N", -values.get("S", 0.0))]
         if abs(degrees[0]) > 360 or abs(degrees[1]) > 90:
-            raise RunError(f"{option} {text}", "is no place on the earth", "longitudes go to 360, latitudes to 90",
+            raise RunError(f"{option} {text}", "is not a place on the earth", "longitudes go to 360, latitudes to 90",
                            USAGE)
         return tuple(map(float, place.metres([degrees])[0]))
     return tuple(number(part, "m", option) for part in parts)
@@ -110,7 +110,7 @@ def no_go_file(path, place):
         features = found["features"] if found.get("type") == "FeatureCollection" else [found]
         geometries = [f.get("geometry", f) for f in features]
         if any(g is None or g["type"] not in ("Polygon", "MultiPolygon") for g in geometries):
-            raise ValueError("a geometry is no polygon, or a feature has none")
+            raise ValueError("a geometry is not a polygon, or a feature has none")
         polygons = [p for g in geometries for p in ([g["coordinates"]] if g["type"] == "Polygon" else g["coordinates"])]
         rings = []
         for k, polygon in enumerate(polygons):
@@ -127,14 +127,14 @@ def no_go_file(path, place):
         raise RunError(path, f"cannot be read ({error.strerror})", "name a GeoJSON file of polygons") from None
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
         why = error if type(error) in (ValueError, json.JSONDecodeError) else "it is built otherwise"
-        raise RunError(path, f"is no GeoJSON of polygons ({why})", "write Polygon or MultiPolygon features, in "
+        raise RunError(path, f"is not a GeoJSON file of polygons ({why})", "write Polygon or MultiPolygon features, in "
                        "degrees", CASE) from None
     local = _library.limit("map_local_crs")
     if crs not in ("", local) and not crs.upper().endswith("CRS84"):
         raise RunError(path, f"its coordinates are {crs}", f"convert it with ogr2ogr -t_srs EPSG:4326, or give metres "
                        f"east and north of x = y = 0 the crs {local}", CASE)
     if crs != local and place.origin is None:
-        raise RunError(path, "is in degrees, and the map of this case has no place", "set ice.origin_lon and "
+        raise RunError(path, "is in degrees, but the map of this case has no place", "set ice.origin_lon and "
                        f"ice.origin_lat, or give the file metres and the crs {local}", CASE)
     return [place.map(ring) if crs == local else place.metres(ring) for ring in rings]
 
@@ -176,7 +176,7 @@ def own_case(path, sets, values, folder, map_file=None, force=False):
     for key in OWN:
         merged.get("tow", {}).pop(key, None)
     out = folder / "route-base.yml"
-    text = f"# {path.name} without the way of the tow, which each route says; {writing.MARK}\n"
+    text = f"# {path.name} without the path of the tow, which each route gives; {writing.MARK}\n"
     writing.write_text(text + json.dumps(merged, indent=1, ensure_ascii=False) + "\n", out, force)
     return out, ramp
 
@@ -271,8 +271,8 @@ def checked(values):
         raise RunError("tow.mode", "nothing is towed in this case", "set body.shape, and tow.mode to speed, line or "
                        "thrust", CASE)
     if values["domain.ends"] in ("moving", "periodic"):
-        raise RunError("domain.ends", f"{values['domain.ends']} ends bring the same ice again and again, which is no "
-                       "map", "set domain.ends to open or wall", CASE)
+        raise RunError("domain.ends", f"{values['domain.ends']} ends bring the same ice again and again, so there is "
+                       "no map of it", "set domain.ends to open or wall", CASE)
 
 
 def place_of(path, sets):

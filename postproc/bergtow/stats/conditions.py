@@ -186,19 +186,19 @@ def nothing_to_count(e, dropped):
     if dropped:
         return RunError(e.file, "has no member with a mean ice resistance left", "exclude less")
     if e.behind:
-        return RunError(e.file, f"knows of none of the {len(e.behind)} members that have finished",
+        return RunError(e.file, f"knows none of the {len(e.behind)} members that have finished",
                         "run `bergtow ensemble` again: it takes them in")
     failed = e.reasons(FAILED)
     name, why = next(iter(failed.items()), (None, None))
     failures = f"; {len(failed)} failed, the first: {name}: {why}" if failed else ""
     if e.unsound:
         return RunError(e.file, f"has no sound member{failures}; {e.holes()}",
-                        "run `bergtow ensemble` again: it runs them anew")
+                        "run `bergtow ensemble` again: it runs them again")
     if np.any(e.status == FINISHED):
         return RunError(e.file, f"has no member with a mean ice resistance{failures}",
                         "tow a body, on a line that holds, for longer than output.window_start")
     return RunError(e.file, f"has no member that has finished{failures}",
-                    "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
+                    "run the ensemble further" if not e.complete else "correct the study, and give it another folder")
 
 
 def waiting(e):

@@ -34,7 +34,7 @@ DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
     "unsteady": "members whose window is not steady",
     "short": "members with fewer than 20 independent samples",
-    "few": "members whose mean is made of contact worth fewer than 10 equal stretches, or of none",
+    "few": "members whose mean rests on contact worth fewer than 10 equal stretches, or on none",
     "stopped": "members that stopped early"
 }
 #: for the line "holds for": case key, words before and after its value
@@ -141,7 +141,7 @@ def _of_the_case(e, rows, case, tow):
     """Warnings that follow from the simulated case: pairs of problem and amount."""
     out = []
     if case is None:
-        out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
+        out.append(("the members' cases cannot be read: it is not known whether anything limits the force", ""))
     elif case.jams:
         splits = case_value(case.texts, "ice.splitting.toughness", 0.0) > 0
         out.append((f"{'pieces of floes' if splits else 'rigid floes'} so dense that they jam: nothing in the model "
@@ -174,21 +174,22 @@ def _of_the_sample(e, rows, c, load):
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
     if load["fields"] < load["members"]:
         out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
-                    "in which it is known throughout, are in no number of it",
+                    "where it is known throughout, are left out of its numbers",
                     f"{load['members'] - load['fields']} of {load['members']} members"))
     if load["fields"] < SHORT_FIELDS:
         out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
                     f"{load['fields']}"))
     if load["step_mean"]:
-        out.append(("the time scale is not above the time step: a step mean is no peak", f"{load['time_scale_s']:g} s"))
+        out.append(("the time scale is not above the time step: a step mean is not a peak",
+                    f"{load['time_scale_s']:g} s"))
     if "refused" in d:
         return out + [("no value", d["refused"])]
     out += _of_unlike_fields(load)
     hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
     needed = np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0)
     if hours > LONG * simulated > 0 and needed >= _library.limit("locking_body_widths"):
-        out.append(("the load of ice as dense as this can grow with the length of the tow, while the value takes a tow "
-                    "for tows of the length simulated, one after the other",
+        out.append(("the load of ice as dense as this can grow with the length of the tow, while the value treats a "
+                    "tow as a series of tows of the simulated length",
                     f"{hours_text(hours)} against {hours_text(simulated)}"))
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
@@ -206,7 +207,7 @@ def _of_unlike_fields(load):
     """Warning if the fields differ by more than chance; a single field gets another warning."""
     p = load["alike_p"]
     if np.isnan(p):
-        return [("the windows are too short to tell whether the fields are alike, as the interval takes them", "")
+        return [("the windows are too short to tell whether the fields are alike, as the interval assumes", "")
                 ] if load["fields"] > 1 else []
     return [] if p >= stat_alike.LEVEL else [(
         "the fields differ by more than chance within a field: the interval holds for fields that are alike, and the "
@@ -280,15 +281,17 @@ def _of_the_line(e, rows, lines):
                 for k in sorted({v["subject"] for v in broken} - {0})]
         first = min((v["time_s"] for v in broken if np.isfinite(v["time_s"])), default=np.nan)
         out.append(("tow force and tension have no design value where a line parts: they are cut off there, or, where "
-                    "one branch of two holds, go on as those of another tow, whose body lies otherwise and can load "
-                    "that branch more; means and largest values are of each tow until nothing tows it, of a tension "
-                    "until its branch parts, and mix the two; for a design value simulate without breaking_load",
+                    "one branch of two holds, continue as those of a different tow, whose body lies differently and "
+                    "can load that branch more. Means and largest values cover each tow until nothing tows it (a "
+                    "tension until its branch parts), and mix the two; for a design value simulate without "
+                    "breaking_load",
                     ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
     known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # these are reported above
     for words, key, some in (("the design tension is", "design", lines),
-                             ("the largest mean tension over one step, by which a line parts, is", "largest_step",
+                             ("the largest mean tension over one step, which decides when a line parts, is",
+                              "largest_step",
                               [x for x in lines if x["series"] not in known])):
         above = [f"{quantity(x['breaking_load'], 'N')} of the {x['label']}, which reaches {quantity(x[key], 'N')}"
                  for x in some if x[key] > x["breaking_load"]]
@@ -326,7 +329,7 @@ def statement(e, rows, c):
     warned = _of_the_case(e, rows, case, tow and tow["design"])
     if not len(rows):
         counts = [f"{c['members'][kind]} {kind}" for kind in ("failed", "waiting", "excluded") if c["members"][kind]]
-        warned = [("nothing is known of a condition without a member that is in the numbers", ", ".join(counts))]
+        warned = [("nothing is known of a condition without a member in the numbers", ", ".join(counts))]
     elif tow is None:
         left = c["loads_left_out"].get("tow_force")
         warned.append(("no tow force that varies", left["why"]) if left else

@@ -74,7 +74,7 @@ def _floe_force(run):
     return Load("floe_force", "force of one floe", run.units("largest_quasi_static_load"),
                 "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion=conversion,
-                refused=f"of every {steps} steps the largest alone was kept; set output.sample_every: 1"
+                refused=f"of every {steps} steps only the largest was kept; set output.sample_every: 1"
                 if steps > 1 else ""), np.maximum(push, peak)
 
 
@@ -267,11 +267,11 @@ def panels(e, rows):
 def add_options(p):
     """Add the options of the statistics of loads, and --exclude."""
     p.add_argument("--exclude", action="append", choices=EXCLUDABLE, default=[],
-                   help="leave out members with this doubt, and name them; may be repeated")
+                   help="leave out members with this doubt, and list them; may be repeated")
     p.add_argument("--time-scale", type=above_zero, metavar="S",
                    help="loads are moving means over this time, s (default: 30 at full scale, by Froude's law at model "
                         "scale: stats/loads.py says why)")
     p.add_argument("--tow-hours", type=above_zero, metavar="H",
-                   help="length of the tow that the design values are for, h (default: 24 at full scale)")
+                   help="length of the tow for the design values, h (default: 24 at full scale)")
     p.add_argument("--probability", type=share, default=PROBABILITY, metavar="P",
-                   help="with which the design value is exceeded in such a tow (default %(default)s)")
+                   help="probability that the design value is exceeded in such a tow (default %(default)s)")

@@ -26,7 +26,7 @@ ANALYTIC = {"body.drag.water_form": "water", "body.drag.air_form": "wind"}
 TENTH = 0.1
 NORMAL_ENDS = 1.96   # standard deviations from the middle to an end of a normal range
 DRAG = ("0.25: OpenBerg of OpenDrift (revision 130bc999, after Keghouche et al. 2010); 0.85: Hunke & Comeau 2011; "
-        "1.25: IceDEF (iceberg.py). Models of drift, whose coefficients also stand for what is not known of the "
+        "1.25: IceDEF (iceberg.py). Models of drift, whose coefficients also stand for the unknown part of the "
         "current")
 AIR = "0.4: Hunke & Comeau 2011; 0.8: OpenBerg of OpenDrift (revision 130bc999); 1.25: IceDEF (iceberg.py)"
 
@@ -54,7 +54,7 @@ def read(path):
     found, out = contents(path).get("parameters"), []
     for key, at in (found if isinstance(found, dict) else {}).items():
         if not (isinstance(at, dict) and {"from", "to"} <= set(at)):
-            raise RunError(path, f"parameters: {key} is no range", "write it as {from: 0.25, to: 1.25, source: ...}",
+            raise RunError(path, f"parameters: {key} is not a range", "write it as {from: 0.25, to: 1.25, source: ...}",
                            CASE)
         out.append(Range(str(key), str(at["from"]), str(at["to"]), str(at.get("source") or "assumed"),
                          str(at.get("distribution") or "")))

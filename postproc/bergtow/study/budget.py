@@ -52,7 +52,7 @@ def quantile(e, rows, name, share):
     for k, m in enumerate(rows):
         for load, field, _ in loads.in_window(e, m, scale):
             if load.name == name and (why := load.refused or loads.cut_off(e, rows, load)):
-                raise RunError(e.file, f"has no {load.label}: {why}", "name another with --of, or run it anew")
+                raise RunError(e.file, f"has no {load.label}: {why}", "name another with --of, or run it again")
             if load.name == name and field is not None:
                 known, out[k] = load, np.percentile(field["peak"], share)
     if known is None:
@@ -130,7 +130,7 @@ def without_intervals(found):
 def refuse(file, latin, common):
     """Raises RunError if a study cannot have a budget, however many of its members are run."""
     if not latin:
-        raise RunError(file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study", CASE)
+        raise RunError(file, "is not a Latin hypercube", "set sampling: latin-hypercube and samples in the study", CASE)
     if common:
         raise RunError(file, "has common fields, whose scatter is in all conditions alike", "set fields: own", CASE)
 
@@ -177,7 +177,7 @@ def read_converge(path, folder):
         return findings.read("converge", folder)
     found = findings.read("converge", path)
     if not isinstance(found, dict) or "rows" not in found:
-        raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
+        raise RunError(path, "is not a converge.json", "name the folder or the file of bergtow converge")
     return found
 
 
@@ -187,8 +187,8 @@ def options(p):
     p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a "
                    "quantile of a load in %%, 100 for the largest value of a tow, as the moving mean over its time "
                    f"scale; may be repeated (default: {', '.join(OF)})")
-    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
-                   "computation adds")
+    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for the part of the "
+                   "computation")
     analysis.add_options(p, BUDGET)
 
 
@@ -208,5 +208,5 @@ def perform(a):
     analysis.keep("budget", found, folder, a.force)
     if found["failed"]:
         raise RunError(folder, f"{len(found['failed'])} of {e.n} members failed ({listed(list(found['failed']))}): the "
-                       "budget is without the values that they have", "mend what made them fail, or narrow the ranges; "
+                       "budget lacks their values", "correct the cause of their failure, or narrow the ranges; "
                        "`bergtow ensemble --retry-failed` tries them again")

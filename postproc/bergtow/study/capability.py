@@ -82,7 +82,7 @@ def trial(run, number, least):
     if np.sum(within(run["time"], *run.window)) < 2:
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less", CASE)
     if run.at_least:
-        raise RunError(run.path, "the load of the body has no bound in some steps of the window",
+        raise RunError(run.path, "the load on the body has no bound in some steps of the window",
                        "let ice give way (ice.rafting.kappa, ice.crushing.pressure)", CASE)
     domain = run.summary.get("domain") or {}
     widths, needed = np.array([domain.get(k) for k in ("body_widths", "body_widths_needed")], dtype=float).tolist()
@@ -264,7 +264,7 @@ def with_number(binary, case, sets, key, text):
     found = resolved(binary, case, [*sets, f"{key}={text}"])
     value = case_value(found, key)
     if not np.isfinite(value):
-        raise RunError(case, f"{key}={text} is no number", "search a key that is a number", USAGE)
+        raise RunError(case, f"{key}={text} is not a number", "search a key that is a number", USAGE)
     return found, value
 
 
@@ -293,7 +293,8 @@ def check(case, key):
                        "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
                        "tow.line.breaking_load", CASE)
     if source_of_ice(case):
-        raise RunError("ice", "the ice of this case is read, so that every field is the same, and one tow says all",
+        raise RunError("ice",
+                       "the ice of this case is read, so that every field is the same, and one tow tells everything",
                        "let the program make the ice, by removing ice.outlines or ice.field, or run the case once at "
                        "each value", CASE)
     if key == "ice.seed":
@@ -306,7 +307,7 @@ share = measure("%", lambda x: 0.05 <= x <= 0.95, "not from 0.05 to 0.95")
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/capability-CASE; runs are kept "
-                   "there, and the same call takes those of the same case file and program")
+                   "there, and the same call reuses those of the same case file and program")
     p.add_argument("--search", default="ice.concentration", metavar="KEY", help="key along which the limit is searched "
                    "(default ice.concentration)")
     p.add_argument("--from", dest="start", metavar="V", help="one end of its range (ice.concentration: 0.2)")
@@ -391,6 +392,6 @@ def perform(a):
              "conditions": [found_of(c, least) for c in some]}
     if not any(any(c.trials.values()) for c in some):
         runs.tell_failed()
-        raise RunError(folder, "the budget does not reach for a run", "raise --budget; the same call continues", SIGNAL)
+        raise RunError(folder, "the budget is not enough for a run", "raise --budget; the same call continues", SIGNAL)
     analysis.keep("capability", found, folder, a.force)
     runs.tell_failed()

@@ -87,7 +87,7 @@ def longer(run, k):
     that is not along the domain."""
     length, ahead, along = run.value("domain.length"), run.value("domain.ahead"), run.headings[:, 0]
     if np.abs(along).min() < np.sqrt(0.5) or np.ptp(np.sign(along)):
-        raise RunError(run.path, "the tow does not go along the domain, whose length is not ahead of the body",
+        raise RunError(run.path, "the tow does not run along the domain, so its length is not ahead of the body",
                        "take the width, or leave the length out of --vary", USAGE)
     more, x0 = length * (1.5 ** k - 1), run.value("domain.x0")
     out = {"domain.length": length + more, "domain.x0": x0 - (more if along[0] < 0 else 0.0),
@@ -335,7 +335,7 @@ def varied(study, kinds, margin, tries, end):
 def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
-        raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case",
+        raise RunError(study.folder, f"the budget is not enough for {FIELDS[0]} runs of the case",
                        "raise --budget; runs are kept, and the same call continues them", SIGNAL)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
@@ -359,7 +359,7 @@ def names_of(text):
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/converge-CASE; runs are kept there, "
-                   "and the same call takes those of the same case file and program")
+                   "and the same call reuses those of the same case file and program")
     p.add_argument("--vary", type=names_of, default=list(NAMES), metavar="NAME,...",
                    help=f"some of {', '.join(NAMES)} (default: all)")
     p.add_argument("--margin", type=above_zero, default=MARGIN, metavar="M",

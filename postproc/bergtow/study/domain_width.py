@@ -13,8 +13,8 @@ PLACED = "domain.y0", "ice.y_min", "ice.y_max", "ice.extent.y_min", "ice.extent.
 
 
 def add_option(parser):
-    parser.add_argument("--keep-width", action="store_true", help="leave domain.width as the case has it, although "
-                        "dense ice needs a wider domain")
+    parser.add_argument("--keep-width", action="store_true", help="keep domain.width of the case, although dense ice "
+                        "needs a wider domain")
 
 
 def reads_ice(case):

@@ -75,7 +75,7 @@ class Ensemble:
     def _open(self) -> h5py.File:
         _imported("h5py")
         from bergtow.result.hdf5 import opened
-        return opened(self.folder / "ensemble.h5", "run `bergtow ensemble` again: it makes the file anew")
+        return opened(self.folder / "ensemble.h5", "run `bergtow ensemble` again: it makes the file again")
 
     @property
     def counts(self) -> dict[str, int]:

@@ -57,7 +57,7 @@ def force(text, option):
 def known(table, text, option, what):
     """Look up a row of the library. Raises BergtowError."""
     if text not in table:
-        raise BergtowError(f"{option} {text}: is no {what}, as \"110 t\" or \"1.1 MN\", and none of "
+        raise BergtowError(f"{option} {text}: is not a {what}, as \"110 t\" or \"1.1 MN\", and none of "
                            f"{', '.join(table)}; name one of these, or add a table of your own with {option}s", USAGE)
     return table[text]
 

@@ -103,7 +103,7 @@ class CaseRuns:
 
     def __post_init__(self):
         if any(text.partition("=")[0].strip() == "ice.seed" for text in self.given):
-            raise RunError("--set ice.seed", "changes nothing, for each field has a seed of its own", "leave it out",
+            raise RunError("--set ice.seed", "changes nothing, because each field has its own seed", "leave it out",
                            USAGE)
 
     @cached_property
@@ -172,8 +172,8 @@ class CaseRuns:
         except Refused as error:
             codes = {message.code for message in error.errors}
             if "other_study" in codes:
-                self.tell((name, "other_study"), f"{self.home(name)}: its runs are of other settings, and are made "
-                          "anew")
+                self.tell((name, "other_study"), f"{self.home(name)}: its runs have other settings, and are made "
+                          "again")
                 shutil.rmtree(self.home(name))
             elif "one_field" in codes:
                 self._alike.add(name)
@@ -278,7 +278,7 @@ def run_members(binary, study, folder, sets, jobs, seconds, quiet=True, more=(),
     code, said = called(call + ["--quiet"] * quiet, line, env=os.environ | MESSAGES | ONE_THREAD, **options)
     if code < 0:
         raise RunError(folder, f"signal {-code} ({signal.strsignal(-code)}) has ended bergtow ensemble",
-                       "call again: what is made is kept; if the memory ran out (SIGKILL), give fewer --jobs", SIGNAL)
+                       "call again: finished work is kept; if the memory ran out (SIGKILL), give fewer --jobs", SIGNAL)
     if code not in (DONE, STOPPED) and ensemble_made(folder) == before:
         raise Refused(study, messages(said), code, f"bergtow ensemble ended with exit code {code}")
     return not stopped_by_limit(code, time.monotonic() - began, limit), messages(said)

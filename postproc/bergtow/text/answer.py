@@ -23,10 +23,10 @@ REASONS = {
     "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above",
     "no_window": "no window that is long enough", "no_member": "no run",
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
-    "budget": "the budget does not reach so far", "run_failed": "the run failed",
+    "budget": "the budget is not enough for it", "run_failed": "the run failed",
     "domain_too_short": "the domain is too short",
-    "case_has_path": "the case has a path of its own: it is in the steady tow",
-    "case_has_programme": "the case has a programme of its own",
+    "case_has_path": "the case has its own path: it is in the steady tow",
+    "case_has_programme": "the case has its own programme",
     "environment_from_table": "the case has current or wind from a table",
     "line_not_known": "stiffness and length of the line are not known: give --line and --line-length",
     "line_length_not_known": "the length of the line is not known: give --line-length",
@@ -38,7 +38,7 @@ REASONS = {
 #: why there is no combined figure for fields and ranges
 NOT_COMBINED = {"range_without_distribution": "some ranges have no distribution",
                 "range_without_effect": "the effect of some ranges is not known",
-                "no_interval_of_fields": "the value has no interval", "no_range": "no range was looked at"}
+                "no_interval_of_fields": "the value has no interval", "no_range": "no range was examined"}
 
 
 def known(x):
@@ -130,8 +130,8 @@ def _at_least(v, a):
 
 def _band(v, a):
     if v["low_n"] is None:
-        return "What is assumed was not looked at"
-    out = f"Over the ranges of what is assumed the steady tow needs {kn(v['low_n'])} to {kn(v['high_n'])} kN"
+        return "The assumed values were not examined"
+    out = f"Over the ranges of the assumed values the steady tow needs {kn(v['low_n'])} to {kn(v['high_n'])} kN"
     if v["without"]:
         out += f", without {' and '.join(v['without'])}, whose effect is not known"
     drag = next((r for r in a["assumed"] if r["key"] == "body.drag.water_form" and known(r["n_per_tenth"])), None)
@@ -162,15 +162,15 @@ def _line(v, a):
 
 def _feasible(v, a):
     at = speed(v["speed_m_s"])
-    why = "its pull lies within the interval" if a["design"]["interval_95"] else "a larger load than the largest " \
-        "simulated can come"
+    why = "its pull lies within the interval" if a["design"]["interval_95"] else "a load larger than the largest " \
+        "simulated is possible"
     out = {"yes": f"The vessel named can tow at {at}", "no": f"The vessel named cannot tow at {at}",
            "open": f"Whether the vessel named can tow at {at} is open, since {why}"}[v["verdict"]]
     if known(v["not_above_m_s"]):
         by = ", if the drag alone grows with the speed (assumed)" if v["by"] == "drag_alone" else ""
         out += f", at most at {speed(v['not_above_m_s'])}{by}"
     if v["verdict"] == "yes" and known(a["band"]["high_n"]) and a["band"]["high_n"] > a["vessel"]["has_n"]:
-        out += f"; at the upper end of what is assumed its pull of {kn(a['vessel']['has_n'])} kN is not enough"
+        out += f"; at the upper end of the assumed ranges its pull of {kn(a['vessel']['has_n'])} kN is not enough"
     return out
 
 
@@ -283,7 +283,7 @@ def plan(p):
              "nothing": "not one"}[p["gives"]]
     return (f"A design value takes some {short(p['needs_hours'], 2)} h of tow in windows: {fields}, some "
             f"{short(p['needs_min'], 2)} min here. The budget allows {p['budget_fields']} fields, {gives}. "
-            "(Estimates: the program's own of its speed, and of how soon the ice in contact is other ice.)")
+            "(Both are estimates: of the program's speed, and of how soon new ice is in contact.)")
 
 
 def took(a):

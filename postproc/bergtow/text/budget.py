@@ -71,14 +71,14 @@ def numerics_notes(found):
     if not n:
         return " Numerics: run `bergtow converge` on the base case and name its file with --converge." \
             if found["of"] == "mean_ice_resistance_n" else \
-            " Numerics: `bergtow converge` knows what the computation adds to the mean ice resistance alone."
+            " Numerics: `bergtow converge` knows only what the computation adds to the mean ice resistance."
     if "refused" in n:
         return f" Numerics: {n['refused']}."
     said = ""
     if n.get("biases"):
         each = ", ".join(f"{name} by {percent(b)}" for name, b in n["biases"].items())
         said = (f" Bias: the values to which it was converged change the mean, {each}; together "
-                f"{percent(n['bias'] / found['mean'])}. It is no scatter: no number here is corrected for it, and "
+                f"{percent(n['bias'] / found['mean'])}. It is not scatter: no number here is corrected for it, and "
                 "its square is in the last line and the shares.")
     if n.get("unknown"):
         said += f" Numerics without {', '.join(f'{name} ({why})' for name, why in n['unknown'].items())}."
@@ -88,12 +88,12 @@ def numerics_notes(found):
 def notes(found):
     s = found["shares"]
     if "refused" in s:
-        shares = f"The parameters' part is not shared out: {s['refused']}."
+        shares = f"The parameters' part is not divided: {s['refused']}."
     else:
         trust = "" if s["q2"] >= TRUSTED_Q2 else (
-            " That is little: take the shares as a rough guide, and more conditions for better ones.")
+            " That is little: use the shares as a rough guide, and run more conditions for better ones.")
         shares = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
-                f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
+                f"predicts {100 * s['q2']:.0f} % of the variance of unseen conditions (Q²).{trust}")
     return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "
             f"{found['members']} tows. {shares}{numerics_notes(found)}")
 
@@ -104,7 +104,7 @@ def warnings(found):
     left = found.get("waiting", wanted - found["members"])
     if left:
         beyond = found.get("left_out")
-        out.append(f"{left} of {wanted} members are still to come: this is of the first {found['conditions']} "
+        out.append(f"{left} of {wanted} members are still to come: this uses the first {found['conditions']} "
                    "conditions, which are a fair sample, and its intervals are wider than those of the whole study."
                    + (f" Of those beyond the first gap {beyond} are done, and left out until it is closed: which they "
                       "are depends on how long a tow takes." if beyond else ""))
@@ -112,7 +112,8 @@ def warnings(found):
         name, why = next(iter(failed.items()))
         within = set(failed) - set(found.get("failed_beyond", []))
         out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). " + (
-            "What made them fail may be what the budget asks for: there are no intervals." if within else
+            "The cause of their failure may be an effect that the budget is to measure: there are no "
+            "intervals." if within else
             "They lie beyond the first gap, and are not in this sample."))
     if lacking := found.get("without_number"):
         out.append(f"{len(lacking)} of {wanted} members have no such number ({listed(lacking)}): there are no "

@@ -67,11 +67,11 @@ def meaning(found):
     if any(None in p["speed"] for c in found["conditions"] for p in c["points"]):
         more += (" Where nothing tows the body to the end of the window, a field has no speed and no tow force; its "
                  "tension, the largest of a step, the start included, is among the others.")
-    return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s along the ordered tow, in the mean "
-            f"over the window, as far as it is ordered to be so fast there, and over the last quarter of that "
+    return (f"A tow makes it in a field if it keeps {number(found['speed'])} m/s along the ordered tow, on average "
+            f"over the window (as far as it is ordered to be so fast there) and over the last quarter of that "
             f"time{line}. Stood still: tows that the ice held for a while. "
-            f"At a value that makes it more than {100 * found['share']:g} % of all tows do, at one that does not "
-            f"fewer, each at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
+            f"A value makes it if more than {100 * found['share']:g} % of all tows do, and does not if fewer do, each "
+            f"at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
             f"{found['budget_min']:g} min; a grid of this resolution with {found['most_fields']} fields has "
             f"{found['grid_runs']}.{more}")
 

@@ -60,12 +60,12 @@ def doubtful(found):
     if not some:
         return []
     return [[Warned(f"of the {sum(verdicts.values())} tows of the case as it is, {' and '.join(some)}: an effect on "
-                    "their mean is one on the mean of that stretch of time.")]]
+                    "their mean is an effect on the mean of that stretch of time.")]]
 
 
 def content(found):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
-    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: what "
-            "it is of the error that other ice for each value would leave. What is below "
-            f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
+    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: ratio of "
+            "its error to the error with other ice for each value. Effects below "
+            f"{100 * found['margin']:g} % do not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return [*doubtful(found), Table(head, [cells(row) for row in found["rows"]]), [note]]

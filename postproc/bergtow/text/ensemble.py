@@ -77,11 +77,12 @@ def estimates(s):
             text = number(e["force"] / factor) + ("" if e["valid"] or not np.isfinite(e["force"]) else "*")
             cells.append(text + (f" ({number(e['ratio'])})" if np.isfinite(e["ratio"]) else ""))
         rows.append(cells)
-    on_top = [f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
+    on_top = [f"{label}: no ice resistance; add it to the others." for name, label in labels.items()
               if s["conditions"][0]["estimates"][name]["on_top"]]
-    note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
-            "* outside the range the estimate is meant for. –: no value there. The estimates were not made for each "
-            "other's conditions and can differ tenfold; none has been checked against a measured tow here.")
+    note = ("In brackets: simulated / estimate, where the estimate is meant for the conditions and depends on the "
+            "concentration. * outside the range the estimate is meant for. –: no value there. The estimates were not "
+            "made for each other's conditions and can differ tenfold; none has been checked against a measured tow "
+            "here.")
     return [Table(head, rows), [" ".join([note, *on_top])]]
 
 
@@ -150,7 +151,7 @@ def sensitivity(s):
     if "refused" in x:
         return [[f"No sensitivity: {x['refused']}."]]
     if len(set(x["ranks"]).union(x["sobol"].get("indices", ()))) == 1:
-        return [["One parameter was varied: there is nothing to share out."]]
+        return [["One parameter was varied: there is nothing to divide."]]
     kinds = (("mean", x["sobol"]), ("logarithm", x["sobol_of_logarithm"]))
     given = [(of, k["indices"]) for of, k in kinds if "refused" not in k]
     names = set(x["ranks"]).union(*(i for _, i in given))
@@ -192,20 +193,20 @@ def members(s, markdown):
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
     lines = [(f"{n} of " if n < whole else "") + f"{counted(whole)} in {counted(len(s['conditions']), 'condition')}."]
     if s["waiting"]:
-        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
+        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and left out "
                      f"({listed(s['waiting'])}). Until then conditions may have different numbers of fields.")
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
-        lines.append(f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the "
+        lines.append(f"{counted(len(s['unsound']))} not sound, and left out ({listed(list(s['unsound']))}); the "
                      f"first: {name}: {why}. Call `bergtow ensemble` again to rerun damaged members.")
     if s["without_mean"]:
-        lines.append(f"{counted(len(s['without_mean']))} without a mean, and in no number "
+        lines.append(f"{counted(len(s['without_mean']))} without a mean, and left out "
                      f"({listed(s['without_mean'])}): no window, nothing that is towed, or a line that parted before "
                      "the window or early in it.")
     if s["behind"]:
         lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow "
                      "ensemble` again, which takes them in.")
-    for kind, words in (("failed", "failed, and in no number"), ("died", "whose process died")):
+    for kind, words in (("failed", "failed, and left out"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
             lines.append(f"{counted(len(s[kind]))} {words}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; "
@@ -214,8 +215,8 @@ def members(s, markdown):
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " +
                      ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     if s["copies"]:
-        lines.append(f"{counted(len(s['copies']))} ended in the very state of another one of the same condition, and "
-                     f"count with it once ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): "
+        lines.append(f"{counted(len(s['copies']))} ended in the same state as another one of the same condition, and "
+                     f"count once with it ({listed([f'{name} as {other}' for name, other in s['copies'].items()])}): "
                      "no seed changes ice that is read, or water without floes.")
     if s["builds"]:
         lines.append(s["builds"])

@@ -65,8 +65,8 @@ def design(s):
         rows.append([c["label"], value(d, factor), ends(d, factor), *tension, number(d["mean"] / factor),
                      number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
                      d.get("model", "–")])
-    notes = [f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without what the "
-             f"warnings name. * beyond the hours simulated: extrapolated by the tail."]
+    notes = [f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without the effects "
+             f"that the warnings name. * beyond the hours simulated: extrapolated with the tail."]
     notes += [text for text in (steps(s), holds_for(s)) if text]
     return [Table(head, rows), notes + warnings(s)]
 
@@ -179,9 +179,9 @@ def signals(s):
         rows += _rows_of(s, name, cells)
     if not rows:
         return [[nothing(s), *left_out(s)]]
-    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
-            "that means differ a little from those of the whole window. In the start: the largest of the means that "
-            "begin before the window, which is in no other number. 95 %: interval over fields.")
+    note = ("Moving mean, over the time given, of the signal in the window from its first time scale on; means "
+            "therefore differ a little from those of the whole window. In the start: the largest of the means that "
+            "begin before the window, which enters no other number. 95 %: interval over fields.")
     return [Table(head, rows, 1), [note, *left_out(s), *conversions(s), *panel_lines(s)]]
 
 
@@ -205,7 +205,7 @@ def left_out(s):
         for x in c["loads_left_out"].values():
             why.setdefault((x["label"], x["why"]), []).append(c["label"])
     return [f"Members without {' and '.join(labels)}, or without a window of {stat_load.LEAST_SCALES} time scales in "
-            f"which they are known throughout, are in no number of these: {several(where)}."
+            f"which they are known throughout, enter none of these numbers: {several(where)}."
             for labels, where in few.items()] + [
                 f"{sentence(label)} is left out: {reason}: {several(where)}." for (label, reason), where in why.items()]
 
@@ -299,11 +299,11 @@ def returns(s, markdown):
                              f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
                              number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
                              number(x["hours"])])
-    note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
-            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
-            "below 0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, profile likelihood, widened "
-            "by the scatter between fields that are alike. * beyond the hours simulated: extrapolated. ! shape below "
-            "-0.5: the levels "
+    note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded on average once "
+            "in the given hours of tow. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
+            "below 0.05 the tail does not fit. A tail with a shape below 0 has an end. Brackets: 95 %, profile "
+            "likelihood, widened by the scatter between fields that are alike. * beyond the hours simulated: "
+            "extrapolated. ! shape below -0.5: the levels "
             "are little more than the largest value seen. No bound: the upper end is more than "
             f"{text_table.FAR:g} times the level.")
     # advice on the remedy is only for a terminal

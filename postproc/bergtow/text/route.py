@@ -4,10 +4,10 @@ from bergtow.table import number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
 WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak force", "length": "length of the way"}
-FAULTS = {"missed": "misses the goal", "no_go_contact": "touches an area to keep out of",
+FAULTS = {"missed": "misses the goal", "no_go_contact": "touches a no-go area",
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
-PLANNED = {"no_go": "crosses an area to keep out of", "outside": "leaves the domain",
+PLANNED = {"no_go": "crosses a no-go area", "outside": "leaves the domain",
            "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
 
 
@@ -82,7 +82,7 @@ def answer(found):
         much = f"{chosen} has {percent(c['relative'])} of {objective}" if c and c["relative"] is not None else \
             f"{chosen} cannot be compared with it"
         return (f"No route shown better than the straight line: there is one member, and no interval ({much} in it). "
-                "If the map is perfect, that is the answer; take --members and errors of the map for one that counts.")
+                "If the map is perfect, that is the answer; give --members and errors of the map for an interval.")
     return f"No route shown better than the straight line: {objective} of {chosen} {interval(c)}."
 
 
@@ -140,6 +140,6 @@ def rounds(found, markdown=False):
     names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
     told = "; ".join(", ".join([f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}",
                                 *(FAULTS[f] for f in t["faults"])]) for k, t in h["tows"].items())
-    bound = ("The looks are perfect: what is gained is an upper bound. " if h["perfect"] else "")
+    bound = ("The looks are perfect, so the gain is an upper bound. " if h["perfect"] else "")
     return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
            f"{told}. {bound}One tow is one sample, and has no interval."

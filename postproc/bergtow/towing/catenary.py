@@ -29,7 +29,7 @@ class Catenary:
 
     def _at(self, span: float) -> tuple[float, float]:
         if not 0 <= span < math.inf:
-            raise BergtowError(f"span: {span:g} m is no distance of two ends; give a number from 0")
+            raise BergtowError(f"span: {span:g} m is not a distance of two ends; give a number from 0")
         tangent = ctypes.c_double()
         pull = _library.library().bt_catenary_pull(self.length, self.stiffness, self.weight, span,
                                                    ctypes.byref(tangent))

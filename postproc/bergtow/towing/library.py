@@ -73,7 +73,7 @@ def _value(where: str, column: str, text: str, factor: float | None, optional: b
     except ValueError:
         value = math.nan
     if not 0 < value < math.inf:
-        raise BergtowError(f"{where}: {column}: {text!r} is no number above 0; correct it", CASE)
+        raise BergtowError(f"{where}: {column}: {text!r} is not a number above 0; correct it", CASE)
     return value
 
 
@@ -92,12 +92,12 @@ def _read(path: Path, columns: tuple[tuple[str, str, float | None, bool], ...],
                 if not any(c.strip() for c in row) or row[0].lstrip().startswith("#"):
                     continue
                 if len(row) != len(head):
-                    raise BergtowError(f"{where}: {len(row)} cells, and the head has {len(head)}; correct the row (a "
-                                       "text with a comma takes quotes)", CASE)
+                    raise BergtowError(f"{where}: {len(row)} cells, but the header has {len(head)}; correct the row "
+                                       "(put a text with a comma in quotes)", CASE)
                 one = make(**{member: _value(where, column, text.strip(), factor, optional)
                               for text, (column, member, factor, optional) in zip(row, columns)})
                 if one.name in out:
-                    raise BergtowError(f"{where}: name: {one.name!r} stands twice in this table; rename one", CASE)
+                    raise BergtowError(f"{where}: name: {one.name!r} is twice in this table; rename one", CASE)
                 out[one.name] = one
             return out
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -20,7 +20,8 @@ def effective_mass(one: float, other: float = math.inf) -> float:
     """Effective mass of two bodies at the ends of a line, kg; other = inf: an end with prescribed motion."""
     above_zero(one=one)
     if not other > 0:
-        raise BergtowError(f"other: {other:g} kg is no mass; give a number above 0, or inf for an end that is led")
+        raise BergtowError(f"other: {other:g} kg is not a mass; give a number above 0, or inf for an end on a "
+                           "prescribed path")
     return one if math.isinf(other) else one * other / (one + other)
 
 

@@ -52,7 +52,7 @@ def read_curve(path: str | os.PathLike[str]) -> list[tuple[float, float]]:
     except (OSError, UnicodeDecodeError) as error:
         raise BergtowError(f"{path}: cannot be read ({error}); name a CSV file", IO) from None
     if not rows or [c.strip() for c in rows[0]] != ["speed_m_s", "share"]:
-        raise BergtowError(f"{path}:1: the head is not speed_m_s,share; give these two columns", CASE)
+        raise BergtowError(f"{path}:1: the header is not speed_m_s,share; give these two columns", CASE)
     points: list[tuple[float, float]] = []
     for number, row in enumerate(rows[1:], 2):
         if not any(c.strip() for c in row):
@@ -64,14 +64,14 @@ def read_curve(path: str | os.PathLike[str]) -> list[tuple[float, float]]:
             except ValueError:
                 value = math.nan
             if not 0 <= value < math.inf:
-                raise BergtowError(f"{path}:{number}: {name}: {text!r} is no number from 0; correct it", CASE)
+                raise BergtowError(f"{path}:{number}: {name}: {text!r} is not a number from 0; correct it", CASE)
             values.append(value)
         if points and values[0] <= points[-1][0]:
-            raise BergtowError(f"{path}:{number}: speed_m_s: {values[0]:g} is not above {points[-1][0]:g} of the row "
-                               "before; put the speeds in order", CASE)
+            raise BergtowError(f"{path}:{number}: speed_m_s: {values[0]:g} is not above {points[-1][0]:g} of the "
+                               "previous row; put the speeds in order", CASE)
         points.append((values[0], values[1]))
     if not points:
-        raise BergtowError(f"{path}:1: there is no row below the head; give at least one", CASE)
+        raise BergtowError(f"{path}:1: there is no row below the header; give at least one", CASE)
     return points
 
 
@@ -83,10 +83,10 @@ def pull_share(speed: float, free_speed: float | None = None, curve: Curve = "qu
     if not isinstance(curve, str):
         return float(np.interp(speed, *zip(*curve)))
     if curve not in ("quadratic", "linear"):
-        raise BergtowError(f"curve: {curve!r} is none; give quadratic, linear, or points (read_curve)")
+        raise BergtowError(f"curve: {curve!r} is not a curve; give quadratic, linear, or points (read_curve)")
     if free_speed is None or not 0 < free_speed < math.inf:
-        raise BergtowError(f"free_speed: {free_speed} is no speed, and a {curve} curve needs it; give the free-running "
-                           "speed in m/s, or points of a curve")
+        raise BergtowError(f"free_speed: {free_speed} is not a speed, and a {curve} curve needs it; give the "
+                           "free-running speed in m/s, or points of a curve")
     ratio = min(speed / free_speed, 1.0)
     return 1 - ratio * ratio if curve == "quadratic" else 1 - ratio
 
@@ -104,7 +104,7 @@ def needed_bollard_pull(tow_force: float, speed: float, *, free_speed: float | N
     not_below_zero(tow_force=tow_force, own_resistance=own_resistance)
     for name, value in (("weather", weather), ("tow", tow)):
         if not 0 < value <= 1:
-            raise BergtowError(f"{name}: {value:g} is no efficiency; give a number above 0 and at most 1")
+            raise BergtowError(f"{name}: {value:g} is not an efficiency; give a number above 0 and at most 1")
     left = pull_share(speed, free_speed, curve) * weather * tow
     return (tow_force + own_resistance) / left if left > 0 else math.inf
 
@@ -124,7 +124,7 @@ def ice_resistance(beam: float, thickness: float, concentration: float, speed: f
     above_zero(beam=beam, ice_density=ice_density)
     not_below_zero(thickness=thickness, speed=speed)
     if not 0 <= concentration <= 1:
-        raise BergtowError(f"concentration: {concentration:g} is no share of the area; give a number from 0 to 1")
+        raise BergtowError(f"concentration: {concentration:g} is not a share of the area; give a number from 0 to 1")
     e = _library.library().bt_estimate_ship(beam, thickness, concentration, speed, ice_density)
     return IceResistance(e.low, e.high, "form of Colbourne 2000 (not at hand), coefficients of PolarRoute (British "
                                         "Antarctic Survey): slender to blunt hull")
