@@ -68,16 +68,14 @@ bt_file_kind bt_case_kind_of(const char *path)
     struct stat st;
     char *text = NULL;
     size_t size;
-    bt_errors unheard = {0};
     bt_file_kind kind = BT_FILE_OTHER;
     if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
-        bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
-        bt_node *root = bt_tree_parse(text, size, path, &unheard);
+        bt_file_read(path, "a case file", &text, &size, NULL) == BT_OK) {
+        bt_node *root = bt_tree_parse(text, size, path, NULL);
         kind = bt_case_kind(root);
         bt_tree_free(root);
     }
     free(text);
-    bt_errors_free(&unheard);
     return kind;
 }
 

@@ -68,8 +68,7 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         free(text);
         bt_h5_attr_text(&h5, "/", "program", "bergtow " BT_VERSION);
         status = bt_h5_close(&h5);
-        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_FIELD, err);
-        if (status == BT_OK) status = bt_file_rename(part, path, err);
+        if (status == BT_OK) status = bt_checksum_publish(part, path, BT_CHECKSUM_FIELD, err);
         if (status != BT_OK) unlink(part);
     }
     free(part);

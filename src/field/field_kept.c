@@ -57,10 +57,8 @@ void bt_field_digest(const bt_case *input, char digest[BT_CHECKSUM_DIGEST])
         if (!BEGINS(key->name, sections) || BEGINS(key->name, idle)) continue;
         write_keys(t.out, key, 1, input);
         const char *path = bt_case_file(input, key);
-        bt_errors unheard = {0}; // the reader of the file reports it
-        int64_t bytes;
-        if (path && bt_checksum_digest_file(path, digest, &bytes, &unheard) == BT_OK) fprintf(t.out, "%s\n", digest);
-        bt_errors_free(&unheard);
+        int64_t bytes; // the reader of the file reports its errors
+        if (path && bt_checksum_digest_file(path, digest, &bytes, NULL) == BT_OK) fprintf(t.out, "%s\n", digest);
     }
     for (bt_idx i = 0; i < input->n_floes; i++) write_keys(t.out, bt_floe_keys, bt_n_floe_keys, &input->floes[i]);
     double v[2 * BT_MAX_VERTICES]; // keys only name a shape that a program adds
@@ -149,11 +147,9 @@ static bool take(const char *path, const char *name, bt_field *field)
     if (access(path, F_OK) != 0) return false;
     char *bytes = NULL;
     size_t size;
-    bt_errors why = {0};
-    const bool whole = bt_file_read_to(path, "a kept field", SIZE_MAX / 2, &bytes, &size, &why) == BT_OK &&
+    const bool whole = bt_file_read_to(path, "a kept field", SIZE_MAX / 2, &bytes, &size, NULL) == BT_OK &&
                        unpacked(field, name, bytes, size);
     free(bytes);
-    bt_errors_free(&why);
     if (!whole)
         bt_errors_warn("warning: %s: is damaged, or not a field of this program; the field is made again", path);
     return whole;
@@ -176,16 +172,13 @@ bt_status bt_field_load_kept(const char *dir, const bt_case *input, bt_field *fi
     if (!dir) return bt_field_load(input, field, err);
     char name[BT_CHECKSUM_DIGEST];
     bt_field_digest(input, name); // before loading: if a file of the ice changes later, its digest differs
-    char *path = bt_text_of("%s/%s", dir, name);
-    bt_errors unheard = {0};
-    const bool room = bt_file_make_dir(dir, &unheard) == BT_OK;
-    bt_errors_free(&unheard);
+    const char *path = BT_PATH(dir, name);
+    const bool room = bt_file_make_dir(dir, NULL) == BT_OK;
     bt_status status = BT_OK;
     if (!room || !take(path, name, field)) {
         status = bt_field_load(input, field, err);
         if (status == BT_OK && room) keep(path, name, field);
     }
-    free(path);
     return status;
 }
 
@@ -196,9 +189,7 @@ void bt_field_forget_kept(const char *dir)
         const char *name = entry->d_name;
         const size_t digits = strspn(name, "0123456789abcdef");
         if (digits != BT_CHECKSUM_DIGEST - 1 || (name[digits] && name[digits] != '.')) continue;
-        char *path = bt_file_join(dir, name);
-        unlink(path);
-        free(path);
+        unlink(BT_PATH(dir, name));
     }
     if (d) closedir(d);
     rmdir(dir);

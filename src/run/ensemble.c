@@ -57,14 +57,12 @@ static void complete_journal(const bt_ensemble *ensemble)
 /// end, and the next call tries it again.
 static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status status, const bt_errors *why)
 {
-    bt_errors unrecorded = {0};
     entry->settled = true;
-    if (bt_member_record_failure(entry->folder, status, why, &unrecorded) != BT_OK &&
+    if (bt_member_record_failure(entry->folder, status, why, NULL) != BT_OK &&
         ensemble->lost++ < BT_MOST_REPORTED)
         bt_errors_add(ensemble->err,
                       "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again",
                       entry->m.name, (int)status, why->n ? why->text[0] : "no reason given");
-    bt_errors_free(&unrecorded);
 }
 
 /// May this group run suspects? A suspect that ends the program would also end another member run beside it, at every
@@ -156,16 +154,14 @@ static bt_status run_or_go_on(const bt_comm *group, const bt_case *input, const 
 static bt_status gather(bt_ensemble *ensemble, bool wait)
 {
     bt_status status = BT_OK;
-    bt_errors unheard = {0};
     const double t0 = bt_clock();
     const int fd = bt_member_open(ensemble->o->dir, "lock", O_RDWR | O_CREAT);
     if (fd < 0 && wait) status = bt_file_fail(ensemble->o->dir, "open the lock in the folder", errno, ensemble->err);
     else if (fd >= 0 && bt_member_take_lock(fd, wait))
         status = bt_ensemble_gather(ensemble->s, ensemble->o->dir, &ensemble->records, &ensemble->warnings,
-                                    wait ? ensemble->err : &unheard);
+                                    wait ? ensemble->err : NULL);
     if (fd >= 0 && wait) complete_journal(ensemble);
     if (fd >= 0) close(fd);
-    bt_errors_free(&unheard);
     ensemble->gathered = bt_clock();
     ensemble->gathering = ensemble->gathered - t0;
     return status;

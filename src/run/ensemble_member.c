@@ -16,10 +16,7 @@
 
 int bt_member_open(const char *folder, const char *name, int flags)
 {
-    char *path = bt_file_join(folder, name);
-    const int fd = bt_file_descriptor(path, flags);
-    free(path);
-    return fd;
+    return bt_file_descriptor(BT_PATH(folder, name), flags);
 }
 
 bool bt_member_take_lock(int fd, bool wait)
@@ -44,15 +41,12 @@ bool bt_member_held(const char *folder)
 
 int bt_member_attempts(const char *folder)
 {
-    char *path = bt_file_join(folder, "attempts"), *checkpoint = bt_file_join(folder, BT_CHECKPOINT_FILE);
     struct stat st, last;
-    int n = stat(path, &st) == 0 ? (int)bt_min((double)st.st_size, BT_MAX_ATTEMPTS) : 0;
-    if (n > 0 && stat(checkpoint, &last) == 0 &&
+    int n = stat(BT_PATH(folder, "attempts"), &st) == 0 ? (int)bt_min((double)st.st_size, BT_MAX_ATTEMPTS) : 0;
+    if (n > 0 && stat(BT_PATH(folder, BT_CHECKPOINT_FILE), &last) == 0 &&
         (last.st_mtim.tv_sec > st.st_mtim.tv_sec ||
          (last.st_mtim.tv_sec == st.st_mtim.tv_sec && last.st_mtim.tv_nsec > st.st_mtim.tv_nsec)))
         n = 0;
-    free(path);
-    free(checkpoint);
     return n;
 }
 
@@ -66,9 +60,7 @@ void bt_member_note_attempt(const char *folder)
 
 void bt_member_forget_attempts(const char *folder)
 {
-    char *path = bt_file_join(folder, "attempts");
-    unlink(path);
-    free(path);
+    unlink(BT_PATH(folder, "attempts"));
 }
 
 // --- failures --------------------------------------------------------------------------------------------------------
@@ -92,9 +84,7 @@ bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_
     bt_status status = BT_ERR_IO;
     for (int k = 0; k < 2 && status != BT_OK; k++) {
         char *path = record_path(folder, k);
-        bt_errors unheard = {0};
-        status = bt_file_write(path, text, k ? err : &unheard);
-        bt_errors_free(&unheard);
+        status = bt_file_write(path, text, k ? err : NULL);
         free(path);
     }
     free(text);
@@ -114,9 +104,8 @@ static bool read_failure(const char *folder, int which, int *code, char **failur
 {
     char *path = record_path(folder, which), *text = NULL;
     size_t size;
-    bt_errors none = {0};
     const bool there = access(path, F_OK) == 0;
-    if (there && bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
+    if (there && bt_file_read(path, "a record", &text, &size, NULL) == BT_OK) {
         char *rest = strchr(text, '\n'), *end;
         const long number = strtol(text, &end, 10);
         if (code) *code = (int)number;
@@ -125,7 +114,6 @@ static bool read_failure(const char *folder, int which, int *code, char **failur
     }
     free(text);
     free(path);
-    bt_errors_free(&none);
     return there;
 }
 

@@ -511,9 +511,8 @@ static bt_status close_steps(run *running, bt_status status, bt_errors *err)
     } else if (status == BT_OK) {
         status = running->record ? finish(running, err) : look_last(running, err);
     } else if (running->record) {
-        bt_errors more = {0}; // after a failed write further errors say nothing new
-        bt_record_close(running->record, NULL, NULL, false, status == BT_ERR_IO ? &more : err);
-        bt_errors_free(&more);
+        // after a failed write further errors say nothing new
+        bt_record_close(running->record, NULL, NULL, false, status == BT_ERR_IO ? NULL : err);
     }
     if (status == BT_ERR_NUMERIC && running->w->step > running->first_step) running->failed = running->w->step;
     bt_halt_end(&running->halt);
