@@ -102,6 +102,12 @@ char *bt_file_path(char out[BT_PATH_BYTES], const char *dir, const char *name)
     return out;
 }
 
+char *bt_file_beside(char out[BT_PATH_BYTES], const char *path, const char *ending)
+{
+    snprintf(out, BT_PATH_BYTES, "%s%s", path, ending);
+    return out;
+}
+
 char *bt_file_join(const char *dir, const char *name) { return bt_text_copy(BT_PATH(dir, name)); }
 
 /// Is this a descriptor that this process was given, such as a pipe of the shell? Opening it does not block.
@@ -212,11 +218,8 @@ bt_status bt_file_read_to(const char *path, const char *what, size_t most, char 
 
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
 {
-    char *temporary = bt_text_of("%s.tmp", path);
-    if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) {
-        free(temporary);
-        return BT_ERR_IO;
-    }
+    const char *temporary = BT_BESIDE(path, ".tmp");
+    if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) return BT_ERR_IO;
 
     // A link under the temporary name must not lead the text elsewhere. One under the final name does not: the rename
     // replaces it.
@@ -230,7 +233,6 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     bt_status status = reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
     if (status == BT_OK) status = bt_file_rename(temporary, path, err);
     if (status != BT_OK && fd >= 0) unlink(temporary);
-    free(temporary);
     return status;
 }
 

@@ -42,7 +42,7 @@ const char *bt_field_frame(const bt_case *input)
 bt_status bt_field_write(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
     // Write under another name until complete, so that a full disk never leaves half a field under the right one.
-    char *part = bt_text_of("%s.part", path);
+    const char *part = BT_BESIDE(path, ".part");
     bt_h5 h5;
     bt_status status = bt_h5_create(&h5, part, err);
     if (status == BT_OK) {
@@ -71,7 +71,6 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         if (status == BT_OK) status = bt_checksum_publish(part, path, BT_CHECKSUM_FIELD, err);
         if (status != BT_OK) unlink(part);
     }
-    free(part);
     return status;
 }
 

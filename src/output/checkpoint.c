@@ -77,23 +77,15 @@ const char *bt_checkpoint_meaning(const char *name, const char **units, const ch
 
 // --- files -----------------------------------------------------------------------------------------------------------
 
-static char *path_of_part(const char *dir, const char *name)
-{
-    return bt_text_of("%s.tmp", BT_PATH(dir, name));
-}
-
 void bt_checkpoint_begin(bt_snapshot *snap, const char *dir, const char *name, bt_errors *err)
 {
-    char *part = path_of_part(dir, name);
-    bt_snapshot_create(snap, part, bt_checkpoint_meaning, err);
-    free(part);
+    bt_snapshot_create(snap, BT_BESIDE(BT_PATH(dir, name), ".tmp"), bt_checkpoint_meaning, err);
 }
 
 bt_status bt_checkpoint_write(bt_snapshot *snap, const char *dir, const char *name, bt_errors *err)
 {
     const char *path = BT_PATH(dir, name), *before = BT_PATH(dir, BT_CHECKPOINT_BEFORE),
-               *damaged = BT_PATH(dir, BT_CHECKPOINT_DAMAGED);
-    char *part = path_of_part(dir, name);
+               *damaged = BT_PATH(dir, BT_CHECKPOINT_DAMAGED), *part = BT_BESIDE(path, ".tmp");
     bt_status status = bt_snapshot_close(snap, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // A checkpoint that has been damaged meanwhile must not replace a sound one.
@@ -102,7 +94,6 @@ bt_status bt_checkpoint_write(bt_snapshot *snap, const char *dir, const char *na
     }
     if (status == BT_OK) status = bt_file_rename(part, path, err);
     if (status != BT_OK) unlink(part);
-    free(part);
     return status;
 }
 

@@ -62,12 +62,6 @@ static const struct {
 };
 enum { N_FILES = sizeof files / sizeof *files };
 
-static bool is_there(const char *path)
-{
-    struct stat st;
-    return lstat(path, &st) == 0;
-}
-
 /// Is file k in the folder, and this program's? A link is replaced and never followed: its target stays.
 static bool holds(const char *dir, int k)
 {
@@ -89,7 +83,8 @@ static bool is_known(const char *dir)
 /// Was the file under the name of file k written by something else?
 static bool is_foreign(const char *dir, int k, const char *path)
 {
-    if (!is_there(path)) return false;
+    struct stat st;
+    if (lstat(path, &st) != 0) return false;
     if (!holds(dir, k)) return true;
     return files[k].hdf5 && is_regular(path) && !is_sealed(path) && !is_known(dir);
 }

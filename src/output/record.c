@@ -137,9 +137,9 @@ static bt_status prepare_dir(const bt_record *record, const char *resolved, cons
     return status;
 }
 
-static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *input,
-                             const bt_record_bodies *bodies, const char *command_line, const char *digests, bool fresh,
-                             bt_errors *err)
+bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *input,
+                         const bt_record_bodies *bodies, const char *command_line, const char *digests, bool fresh,
+                         bt_errors *err)
 {
     *out = NULL;
     bt_record *record = bt_alloc(1, sizeof *record);
@@ -196,18 +196,6 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     }
     *out = record;
     return BT_OK;
-}
-
-bt_status bt_record_open(bt_record **record, const bt_comm *comm, const char *dir, const bt_case *input,
-                         const bt_record_bodies *bodies, const char *command_line, const char *digests, bt_errors *err)
-{
-    return open_record(record, comm, dir, input, bodies, command_line, digests, true, err);
-}
-
-bt_status bt_record_reopen(bt_record **record, const bt_comm *comm, const char *dir, const bt_case *input,
-                           const bt_record_bodies *bodies, const char *command_line, bt_errors *err)
-{
-    return open_record(record, comm, dir, input, bodies, command_line, NULL, false, err);
 }
 
 bt_status bt_record_watch_splitting(bt_record *record, const struct bt_splitting *splitting,

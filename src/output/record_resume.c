@@ -116,21 +116,16 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
     const char *path = BT_PATH(record->dir, CASE_FILE);
     char *text = NULL, *resolved = bt_case_resolved(record->c);
     size_t size = 0;
-    bt_errors warnings = {0};
     const bool read = bt_file_read(path, "a case", &text, &size, NULL) == BT_OK;
     char *digests = read ? bt_case_digests_in(record->c, text) : NULL,
          *wanted = bt_case_with_digests(resolved, digests);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        if (!read || !same_values(record->c, text)) // otherwise only its comments have been edited
-            bt_errors_add(&warnings,
-                          "warning: %s: was not the case that the run began with; it is written anew, by the "
-                          "checkpoint",
-                          path);
         status = bt_record_write_text(record, CASE_FILE, wanted, err);
+        if (status == BT_OK && (!read || !same_values(record->c, text))) // otherwise only its comments have been edited
+            bt_errors_warn("warning: %s: was not the case that the run began with; it is written anew, by the "
+                           "checkpoint", path);
     }
-    if (status == BT_OK) bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
     free(text);
     free(resolved);
     free(digests);

@@ -321,7 +321,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                           bt_errors *err)
 {
     bt_status status = bt_study_fits(study, comm->size, err);
-    bt_member_records records;
     char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;
@@ -331,7 +330,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     status = bt_comm_agree(comm, status);
     if (status != BT_OK) return status;
     bt_comm_bcast(comm, digest, sizeof digest);
-    bt_member_records_begin(&records, study, digest);
 
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)study->ranks, &group);
@@ -346,9 +344,9 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                          .err = err,
                          .n_groups = comm->size / (int)study->ranks,
                          .of_group = comm->rank / (int)study->ranks,
+                         .threads = threads,
                          .alone = -1};
-    ensemble.threads = threads;
-    ensemble.records = records;
+    bt_member_records_begin(&ensemble.records, study, digest);
     if (group.rank == 0) bt_study_files_find(&ensemble.files, study);
     bt_ensemble_list(&ensemble);
     if (options->retry && comm->rank == 0) forget_failures(&ensemble);

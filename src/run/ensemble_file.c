@@ -171,12 +171,11 @@ static void write_series(bt_h5 *h5, const table *t, const char *dir)
     hsize_t most = 0;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
-        char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+        const char *folder = BT_PATH(BT_PATH(dir, "members"), t->name[m]);
         double *x;
         const hsize_t n = read_column(h5, folder, "/series", series[0], &x);
         if (n > most) most = n;
         free(x);
-        free(folder);
     }
     bt_h5_group(h5, "/series");
     for (int k = 0; k < N_SERIES; k++) {
@@ -185,14 +184,13 @@ static void write_series(bt_h5 *h5, const table *t, const char *dir)
             bt_h5_growing(h5, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
         double *row = bt_alloc(most, sizeof *row);
         for (int64_t m = 0; m < t->n; m++) {
-            char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+            const char *folder = BT_PATH(BT_PATH(dir, "members"), t->name[m]);
             double *x;
             const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_column(h5, folder, "/series", series[k], &x)
                                                                     : (x = NULL, 0);
             for (hsize_t i = 0; i < most; i++) row[i] = i < n ? x[i] : (double)NAN;
             bt_h5_append(h5, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
             free(x);
-            free(folder);
         }
         free(row);
         if (set >= 0) H5Dclose(set);
@@ -210,7 +208,7 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
     int64_t *member = NULL;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
-        char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+        const char *folder = BT_PATH(BT_PATH(dir, "members"), t->name[m]);
         double *x[N_NAMES];
         hsize_t n = read_column(h5, folder, "/events", names[TIME], &x[TIME]);
         for (int k = KIND; k < N_NAMES; k++) {
@@ -224,7 +222,6 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
             bt_events_add(&all, x[TIME][i], (bt_event_kind)x[KIND][i], (int64_t)x[SUBJECT][i], x[VALUE][i]);
         }
         for (int k = 0; k < N_NAMES; k++) free(x[k]);
-        free(folder);
     }
     const hsize_t n = (hsize_t)all.n;
     double *time = bt_alloc(n, sizeof *time), *value = bt_alloc(n, sizeof *value);
@@ -312,7 +309,7 @@ static void fill(table *t, const bt_study *study, const char *dir, bt_member_rec
     for (int64_t m = 0; m < t->n; m++) {
         bt_member member;
         bt_study_member(study, m, &member);
-        char *folder = bt_text_of("%s/members/%s", dir, member.name);
+        const char *folder = BT_PATH(BT_PATH(dir, "members"), member.name);
         t->id[m] = m + 1;
         t->condition[m] = member.condition;
         t->repeat[m] = member.repeat;
@@ -324,7 +321,6 @@ static void fill(table *t, const bt_study *study, const char *dir, bt_member_rec
         if (!t->hole[m]) put_text(&t->hole[m], t->status[m] == BT_MEMBER_FAILED ? "failed" : died ? "died" : "");
         if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
         if (!t->reason[m]) t->reason[m] = bt_text_copy("");
-        free(folder);
         bt_member_free(&member);
     }
 }

@@ -111,18 +111,15 @@ bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_op
     char *text = bt_study_resolved(study, err);
     if (!text) return BT_ERR_CASE;
     bt_study_files files;
-    bt_errors warnings = {0};
     bool old = false;
     bt_study_files_find(&files, study);
     bt_status status = bt_file_make_dir(BT_PATH(options->dir, "members"), err);
     const int fd = status == BT_OK ? bt_member_open(options->dir, "lock", O_RDWR | O_CREAT) : -1;
     if (fd >= 0) bt_member_take_lock(fd, true); // for calls that begin together
     if (status == BT_OK) status = keep_resolved(options->dir, text, &old, digest, err);
-    if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, &warnings, err);
+    if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, err);
     if (status == BT_OK) status = bt_file_write(BT_PATH(options->dir, "study.yml"), study->text, err);
     if (fd >= 0) close(fd);
-    bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
     bt_study_files_free(&files);
     free(text);
     return status;

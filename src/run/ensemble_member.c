@@ -65,11 +65,8 @@ void bt_member_forget_attempts(const char *folder)
 
 // --- failures --------------------------------------------------------------------------------------------------------
 
-/// Names of the record in the folder (0) and beside it (1); the caller frees it.
-static char *record_path(const char *folder, int which)
-{
-    return bt_text_of("%s%s", folder, which ? ".failed.txt" : "/failed.txt");
-}
+/// The record is in the folder, or beside it.
+static const char *const records[] = {"/failed.txt", ".failed.txt"};
 
 bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
 {
@@ -82,27 +79,21 @@ bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_
     for (size_t i = 0; i < why->n; i++) fprintf(lines.out, "%s\n", why->text[i]);
     char *text = bt_text_end(&lines);
     bt_status status = BT_ERR_IO;
-    for (int k = 0; k < 2 && status != BT_OK; k++) {
-        char *path = record_path(folder, k);
-        status = bt_file_write(path, text, k ? err : NULL);
-        free(path);
-    }
+    for (int k = 0; k < 2 && status != BT_OK; k++)
+        status = bt_file_write(BT_BESIDE(folder, records[k]), text, k ? err : NULL);
     free(text);
     return status;
 }
 
 void bt_member_forget_failure(const char *folder)
 {
-    for (int k = 0; k < 2; k++) {
-        char *path = record_path(folder, k);
-        unlink(path);
-        free(path);
-    }
+    for (int k = 0; k < 2; k++) unlink(BT_BESIDE(folder, records[k]));
 }
 
 static bool read_failure(const char *folder, int which, int *code, char **failure, char **why)
 {
-    char *path = record_path(folder, which), *text = NULL;
+    const char *path = BT_BESIDE(folder, records[which]);
+    char *text = NULL;
     size_t size;
     const bool there = access(path, F_OK) == 0;
     if (there && bt_file_read(path, "a record", &text, &size, NULL) == BT_OK) {
@@ -113,7 +104,6 @@ static bool read_failure(const char *folder, int which, int *code, char **failur
         if (failure && *end == ' ') *failure = bt_text_of("%.*s", (int)strcspn(end + 1, "\n"), end + 1);
     }
     free(text);
-    free(path);
     return there;
 }
 

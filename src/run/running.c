@@ -74,12 +74,9 @@ static bt_status open_record(run *running, bt_snapshot *kept, bt_errors *err)
     if (status != BT_OK) return status;
     bodies.outlines = &running->totals.outlines;
     // repeated steps must not replace the existing result
-    const bool again = kept || running->until >= 0;
-    status =
-        again ? bt_record_reopen(&running->record, running->comm, running->o->dir, running->c, &bodies,
-                                 running->o->command_line, err)
-              : bt_record_open(&running->record, running->comm, running->o->dir, running->c, &bodies,
-                               running->o->command_line, running->digests, err);
+    const bool fresh = !kept && running->until < 0;
+    status = bt_record_open(&running->record, running->comm, running->o->dir, running->c, &bodies,
+                            running->o->command_line, running->digests, fresh, err);
     bt_gather_free(&bodies);
     free(running->roster.thickness); // result.h5 has it
     running->roster.thickness = NULL;

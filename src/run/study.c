@@ -414,8 +414,7 @@ void bt_study_files_free(bt_study_files *files)
     *files = (bt_study_files){0};
 }
 
-bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *warnings,
-                              bt_errors *err)
+bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *err)
 {
     const char *path = BT_PATH(dir, "study.files");
     char *kept = NULL;
@@ -442,8 +441,8 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         fprintf(text.out, "%s: %s", file->path, line);
         added++;
         if (old)
-            bt_errors_add(warnings, "warning: %s: nothing in %s tells what it held when members were made with it; it "
-                                    "is taken as it is now", file->path, dir);
+            bt_errors_warn("warning: %s: nothing in %s tells what it held when members were made with it; it "
+                           "is taken as it is now", file->path, dir);
     }
     char *now = bt_text_end(&text);
     if (status == BT_OK && added) status = bt_file_write(path, now, err);
