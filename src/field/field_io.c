@@ -12,7 +12,6 @@
 // The reader trusts nothing: the file may be cut off, damaged, or made by hand. Files of this program carry a checksum
 // (checksum.h), so damage is refused before HDF5, which some damage crashes, reads a byte. In a file without one, made
 // by h5py say, only the values are checked; damage to such a file may still crash HDF5.
-#include <errno.h>
 #include <hdf5.h>
 #include <math.h>
 #include <stdio.h>

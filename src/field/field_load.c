@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The ice field of a case, generated or read, and the warnings about outlines that were read.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/field.h"

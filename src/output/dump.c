@@ -7,9 +7,7 @@
 // solution. Sheets (contact/raft.h) are also contacts; their two components lie in a disc about a separate centre.
 #include "output/dump.h"
 
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

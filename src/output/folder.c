@@ -2,10 +2,6 @@
 // Replacing the result in a folder; its states meanwhile are listed in folder.h.
 #include "output/folder.h"
 
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -8,10 +8,7 @@
 // until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "output/record.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "output/checkpoint.h"

@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "geometry/path.h"
-#include "step/window.h"
 #include "case/case_tow.h"
 #include "case/track.h"
 #include "case/warning.h"

@@ -24,7 +24,6 @@
 // or the new file. Only members whose files match their record (ensemble_record.h) are included. Members are written in
 // their order, columns in the order of their first appearance, so the file depends on the set of finished members
 // alone.
-#include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>

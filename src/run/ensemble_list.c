@@ -254,9 +254,8 @@ void bt_ensemble_list(bt_ensemble *ensemble)
         // fields of one condition cost the same; an unreadable case fails when its turn comes
         if (entry->m.condition != priced) {
             bt_case input;
-            bt_errors unheard = {0};
             priced = entry->m.condition;
-            const bool read = bt_member_case(ensemble->s, &entry->m, &input, &unheard) == BT_OK;
+            const bool read = bt_member_case(ensemble->s, &entry->m, &input, NULL) == BT_OK;
             cost = read ? bt_cost_seconds(&input) : 0;
             alike = read && !bt_case_ice_is_random(&input);
             ensemble->fixed += alike;
@@ -266,7 +265,6 @@ void bt_ensemble_list(bt_ensemble *ensemble)
                 ice[n_ice++].member = i;
             }
             bt_case_free(&input);
-            bt_errors_free(&unheard);
         }
         entry->cost = cost;
         entry->shares = alike && ensemble->s->repeats > 1;

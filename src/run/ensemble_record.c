@@ -2,7 +2,6 @@
 // The record of a finished member; reasons in ensemble_record.h.
 #include "run/ensemble_record.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>

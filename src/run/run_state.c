@@ -4,10 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "output/checkpoint.h"
-#include "partition/domain.h"
 #include "base/checksum.h"
 #include "base/largest.h"
 #include "revision.h"

@@ -296,9 +296,8 @@ static void look_at_condition(const bt_study *study, int64_t condition, verdict 
 {
     bt_member member;
     bt_case input;
-    bt_errors unheard = {0};
     bt_study_member(study, condition * study->repeats, &member);
-    const bool read = bt_member_case(study, &member, &input, &unheard) == BT_OK;
+    const bool read = bt_member_case(study, &member, &input, NULL) == BT_OK;
     v->fixed = v->fixed && read && !bt_case_ice_is_random(&input);
     for (int i = 0; i < v->n; i++) {
         char key[96];
@@ -307,7 +306,6 @@ static void look_at_condition(const bt_study *study, int64_t condition, verdict 
     }
     bt_case_free(&input);
     bt_member_free(&member);
-    bt_errors_free(&unheard);
 }
 
 void bt_study_check_ice(const bt_study *study, bt_errors *err)
@@ -398,12 +396,10 @@ void bt_study_files_find(bt_study_files *files, const bt_study *study)
 {
     *files = (bt_study_files){0};
     bt_case input;
-    bt_errors unheard = {0};
-    if (bt_study_base_case(study, &input, &unheard) == BT_OK)
+    if (bt_study_base_case(study, &input, NULL) == BT_OK)
         for (int k = 0; k < bt_n_case_keys; k++)
             add(files, text_of(&bt_case_keys[k], &input));
     bt_case_free(&input);
-    bt_errors_free(&unheard);
     add_of_axes(files, study);
 }
 
