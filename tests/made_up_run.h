@@ -128,7 +128,7 @@ static inline bt_status write_run(const char *dir, const bt_case *c, int steps, 
 {
     const bt_record_bodies b = bodies();
     bt_record *r;
-    bt_status status = bt_record_open(&r, &bt_comm_alone, dir, c, &b, "bergtow run x.yml", NULL, err);
+    bt_status status = bt_record_open(&r, &bt_comm_alone, dir, c, &b, "bergtow run x.yml", NULL, true, err);
     if (status != BT_OK) return status;
     for (int i = 0; i < steps; i++) {
         const bt_sample s = sample(i);

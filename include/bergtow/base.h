@@ -44,7 +44,8 @@ typedef struct bt_note {
     char *values; ///< NULL = none; only for warnings
 } bt_note;
 
-/// Append a message (printf-style). Aborts only when out of memory.
+/// Append a message (printf-style); err = NULL here and in the next three: nobody is to hear it. Aborts only when out
+/// of memory.
 void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 /// The same with a list of arguments.
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
@@ -60,7 +61,7 @@ void bt_errors_print(const bt_errors *err);
 void bt_errors_warn(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 /// Release the messages; the list is empty then.
 void bt_errors_free(bt_errors *err);
-/// Append all messages of `from` to those of `to`; `from` is then empty.
+/// Append all messages of `from` to those of `to`, unless that is NULL; `from` is then empty.
 void bt_errors_move(bt_errors *to, bt_errors *from);
 
 /// Plural ending of a noun for the number n.

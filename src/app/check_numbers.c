@@ -13,7 +13,6 @@
 #include "base/elementary.h"
 #include "base/json.h"
 #include "base/units.h"
-#include "bergtow/comm.h"
 #include "bergtow/shape.h"
 #include "case/arch.h"
 #include "case/case_derived.h"

@@ -31,12 +31,13 @@ void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input);
 
 /// The argp parser of CASE.yml and --set; put it first among the children. Its input is a bt_cmd_case.
 extern const struct argp bt_cmd_case_argp;
+/// The children of a command that takes nothing else from a parser.
+extern const struct argp_child bt_cmd_with_case[];
+/// The argp parser of --threads, --steps, --max-wall and --quiet. Its input is a bt_run_options.
+extern const struct argp bt_cmd_steps_argp;
 
 /// A whole number in [lo, hi] from an option's text; anything else ends the program with code 2.
 int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi);
-
-/// A time of more than 0 from an option's text, s: "2 h", "90 min", "600"; anything else ends the program with code 2.
-double bt_cmd_duration(const struct argp_state *state, const char *option, const char *text);
 
 /// out/NAME for path/NAME.yml; the caller frees it.
 char *bt_cmd_default_folder(const char *path);

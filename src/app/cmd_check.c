@@ -49,11 +49,10 @@ static const struct argp_option check_options[] = {
     {"scale", 'l', "L", 0, "print the Froude-scaled twin with all lengths times L as a case file instead", 0},
     {0},
 };
-static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp check_argp = {.options = check_options,
                                        .parser = parse,
                                        .args_doc = "CASE.yml|STUDY.yml",
-                                       .children = children,
+                                       .children = bt_cmd_with_case,
                                        .doc =
                                            "Validate a case and print the numbers that follow from it; or a study, "
                                            "with the case of each of its conditions. Nothing is computed or written."};

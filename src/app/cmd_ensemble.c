@@ -11,8 +11,8 @@
 #include <unistd.h>
 
 #include "bergtow/ensemble.h"
+#include "bergtow/run.h"
 #include "app/cmd.h"
-#include "base/largest.h"
 
 // --- processes -------------------------------------------------------------------------------------------------------
 
@@ -102,53 +102,40 @@ static void jobs_end(void *of, bool stop)
 
 typedef struct {
     bt_cmd_case file; ///< the study, and overrides of its values
+    bt_run_options steps;
     bt_ensemble_options run;
 } options;
 
-enum { KEY_RETRY = 256, KEY_LEAVE, KEY_STEPS, KEY_WALL };
+enum { KEY_RETRY = 256, KEY_LEAVE };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
     options *opt = state->input;
     switch (key) {
-    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file; return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file, state->child_inputs[1] = &opt->steps; return 0;
     case 'o':
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
         opt->run.dir = arg;
         return 0;
-    case 't': opt->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
     case 'j': opt->run.jobs = (int)bt_cmd_number(state, "--jobs", arg, 1, BT_MAX_JOBS); return 0;
-    case 'q': opt->run.quiet = true; return 0;
     case KEY_RETRY: opt->run.retry = true; return 0;
     case KEY_LEAVE: opt->run.leave = true; return 0;
-    case KEY_STEPS: opt->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
-    case KEY_WALL: opt->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
 
 static const struct argp_option ensemble_options[] = {
     {"output", 'o', "DIR", 0, "folder of the ensemble, default out/ and the name of the study without .yml", 0},
-    {"threads", 't', "N", 0,
-     "OpenMP threads of each rank, default run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node "
-     "divided among its ranks; results do not depend on it",
-     0},
     {"jobs", 'j', "N", 0,
      "processes on this machine that share the members; default: as many as fit on the cores, with one thread per "
      "15,000 floes of a member unless the number of threads is given; always 1 under mpirun or srun, and with --steps",
      0},
-    {"steps", KEY_STEPS, "N", 0, "stop each member after N steps of this call; the same call continues", 0},
-    {"max-wall", KEY_WALL, "TIME", 0,
-     "write checkpoints of the current members and stop after this wall time, as in 2h, 90min or 600; the same call "
-     "continues",
-     0},
-    {"quiet", 'q', NULL, 0, "do not print a line for each member", 0},
     {"retry-failed", KEY_RETRY, NULL, 0, "try failed members again", 0},
     {"no-wait", KEY_LEAVE, NULL, 0,
      "end when no member is left to start; exit code 6 if other calls are still running members of the folder", 0},
     {0},
 };
-static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {.argp = &bt_cmd_steps_argp}, {0}};
 static const struct argp ensemble_argp = {
     .options = ensemble_options,
     .parser = parse,
@@ -165,6 +152,8 @@ int bt_cmd_ensemble(int argc, char **argv)
     char *command_line = bt_cmd_join(argc, argv);
     opt.run.command_line = command_line;
     bt_cmd_parse(&ensemble_argp, argc, argv, &opt);
+    opt.run.threads = opt.steps.threads, opt.run.quiet = opt.steps.quiet;
+    opt.run.max_steps = opt.steps.max_steps, opt.run.max_wall = opt.steps.max_wall;
     const bt_comm *comm = bt_comm_world();
     char *folder = opt.run.dir ? NULL : bt_cmd_default_folder(opt.file.path);
     if (folder) opt.run.dir = folder;

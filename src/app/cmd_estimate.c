@@ -32,11 +32,10 @@ static const struct argp_option estimate_options[] = {
     {"json", 'j', NULL, 0, "print JSON, with curves over the concentration", 0},
     {0},
 };
-static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp estimate_argp = {.options = estimate_options,
                                           .parser = parse,
                                           .args_doc = "CASE.yml",
-                                          .children = children,
+                                          .children = bt_cmd_with_case,
                                           .doc = "Print estimates of the resistance of broken ice for the body, ice "
                                                  "and speed of a case: by Lichey & Hellmer 2001, by three closures of "
                                                  "Marchenko et al. 2010, in the dilute limit, and by a regression of "

@@ -43,11 +43,10 @@ static const struct argp_option field_options[] = {
     {"force", KEY_FORCE, NULL, 0, "replace any file of that name", 0},
     {0},
 };
-static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp field_argp = {.options = field_options,
                                        .parser = parse,
                                        .args_doc = "CASE.yml",
-                                       .children = children,
+                                       .children = bt_cmd_with_case,
                                        .doc = "Make the ice field of a case, or read it from its ice.outlines, and "
                                               "write it; another case reads it with ice.field or ice.outlines, or "
                                               "includes it as fixed floes with base."};

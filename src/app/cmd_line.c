@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Shared by the commands: option parsing with suggestions, the case argument, the end of a command.
 #include "app/cmd.h"
+#include "bergtow/run.h"
 #include "base/fileio.h"
+#include "base/largest.h"
 #include "base/name.h"
 #include "base/units.h"
 
@@ -103,6 +105,7 @@ static const struct argp_option case_options[] = {
     {0},
 };
 const struct argp bt_cmd_case_argp = {.options = case_options, .parser = parse_case};
+const struct argp_child bt_cmd_with_case[] = {{.argp = &bt_cmd_case_argp}, {0}};
 
 int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi)
 {
@@ -114,7 +117,8 @@ int64_t bt_cmd_number(const struct argp_state *state, const char *option, const 
     return v;
 }
 
-double bt_cmd_duration(const struct argp_state *state, const char *option, const char *text)
+/// A time of more than 0, s: "2 h", "90 min", "600"; anything else ends the program with code 2.
+static double duration(const struct argp_state *state, const char *option, const char *text)
 {
     double seconds = 0;
     char why[BT_WHY] = "";
@@ -122,6 +126,35 @@ double bt_cmd_duration(const struct argp_state *state, const char *option, const
     if (!(seconds > 0)) argp_error(state, "%s %s: give a time above 0, as in 2h, 90min or 600", option, text);
     return seconds;
 }
+
+enum { KEY_STEPS = 256, KEY_WALL };
+
+static error_t parse_steps(int key, char *arg, struct argp_state *state)
+{
+    bt_run_options *run = state->input;
+    switch (key) {
+    case 't': run->threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
+    case 'q': run->quiet = true; return 0;
+    case KEY_STEPS: run->max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: run->max_wall = duration(state, "--max-wall", arg); return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option steps_options[] = {
+    {"threads", 't', "N", 0,
+     "OpenMP threads of each rank, default run.threads of the case (of a study, of its base case), or OMP_NUM_THREADS, "
+     "or the cores of the node divided among its ranks; results do not depend on it",
+     0},
+    {"steps", KEY_STEPS, "N", 0, "stop after N steps of this call; in an ensemble, stop each member after N", 0},
+    {"max-wall", KEY_WALL, "TIME", 0,
+     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume continues, or for an "
+     "ensemble the same call",
+     0},
+    {"quiet", 'q', NULL, 0, "print neither progress nor the final table", 0},
+    {0},
+};
+const struct argp bt_cmd_steps_argp = {.options = steps_options, .parser = parse_steps};
 
 char *bt_cmd_default_folder(const char *path)
 {

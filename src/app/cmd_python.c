@@ -60,7 +60,8 @@ int bt_cmd_python(int argc, char **argv)
         return bt_cmd_end(&bt_comm_alone, BT_ERR_USAGE, &err);
     }
     if (readlink("/proc/self/exe", program, sizeof program - 1) < 0) program[0] = 0;
-    char *folder = find_package(program), *first = bt_file_join(folder, "bergtow/__main__.py");
+    char *folder = find_package(program);
+    const char *first = BT_PATH(folder, "bergtow/__main__.py");
     if (access(first, R_OK) == 0) {
         char **words = bt_alloc((size_t)argc + 4, sizeof *words);
         words[0] = (char *)python, words[1] = "-m", words[2] = "bergtow";
@@ -83,6 +84,5 @@ int bt_cmd_python(int argc, char **argv)
                       argv[0], first);
     }
     free(folder);
-    free(first);
     return bt_cmd_end(&bt_comm_alone, BT_ERR_IO, &err);
 }

@@ -5,12 +5,10 @@
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/process.h"
-#include "base/largest.h"
 #include "case/case_base.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 
 typedef struct {
@@ -18,8 +16,6 @@ typedef struct {
     const char *file; ///< a checkpoint instead of a folder
     bt_run_options run;
 } options;
-
-enum { KEY_STEPS = 256, KEY_WALL };
 
 static bool is_folder(const char *path)
 {
@@ -51,10 +47,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 {
     options *opt = state->input;
     switch (key) {
-    case 't': opt->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
-    case 'q': opt->run.quiet = true; return 0;
-    case KEY_STEPS: opt->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
-    case KEY_WALL: opt->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->run; return 0;
     case ARGP_KEY_ARG:
         if (opt->dir)
             argp_error(state, "%s: one folder at a time; options with a value are written --option value", arg);
@@ -68,16 +61,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     }
 }
 
-static const struct argp_option resume_options[] = {
-    {"threads", 't', "N", 0,
-     "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does "
-     "not depend on it", 0},
-    {"steps", KEY_STEPS, "N", 0, "stop after N more steps", 0},
-    {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600", 0},
-    {"quiet", 'q', NULL, 0, "print neither progress nor the final table", 0},
-    {0},
-};
-static const struct argp resume_argp = {.options = resume_options,
+static const struct argp_child children[] = {{.argp = &bt_cmd_steps_argp}, {0}};
+static const struct argp resume_argp = {.children = children,
                                         .parser = parse,
                                         .args_doc = "DIR",
                                         .doc =

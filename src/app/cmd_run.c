@@ -4,7 +4,6 @@
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"
-#include "base/largest.h"
 #include "base/process.h"
 #include "output/folder.h"
 
@@ -19,7 +18,7 @@ typedef struct {
     bool force;
 } options;
 
-enum { KEY_STEPS = 256, KEY_WALL, KEY_DUMP, KEY_FORCE };
+enum { KEY_DUMP = 256, KEY_FORCE };
 
 // STEP:FILE.h5
 static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
@@ -38,15 +37,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 {
     options *opt = state->input;
     switch (key) {
-    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file; return 0;
+    case ARGP_KEY_INIT: state->child_inputs[0] = &opt->file, state->child_inputs[1] = &opt->run; return 0;
     case 'o':
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
         opt->run.dir = arg;
         return 0;
-    case 't': opt->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
-    case 'q': opt->run.quiet = true; return 0;
-    case KEY_STEPS: opt->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
-    case KEY_WALL: opt->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
     case KEY_DUMP: parse_dump(state, arg, &opt->run); return 0;
     case KEY_FORCE: opt->force = true; return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -55,19 +50,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option run_options[] = {
     {"output", 'o', "DIR", 0, "result folder, default out/ and the name of the case without .yml", 0},
-    {"threads", 't', "N", 0,
-     "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does "
-     "not depend on it",
-     0},
-    {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
-    {"max-wall", KEY_WALL, "TIME", 0,
-     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume continues", 0},
-    {"quiet", 'q', NULL, 0, "print neither progress nor the final table", 0},
     {"force", KEY_FORCE, NULL, 0, "replace the result in the folder, and the file of --dump-contacts", 0},
     {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
     {0},
 };
-static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {.argp = &bt_cmd_steps_argp}, {0}};
 static const struct argp run_argp = {.options = run_options,
                                      .parser = parse,
                                      .args_doc = "CASE.yml",

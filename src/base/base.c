@@ -131,6 +131,7 @@ bt_status bt_fail(bt_errors *err, bt_status status, const char *fmt, ...)
 
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
 {
+    if (!err) return;
     if (err->n == err->cap) {
         err->cap = err->cap ? 2 * err->cap : 8;
         err->text = bt_realloc(err->text, err->cap, sizeof *err->text);
@@ -145,11 +146,14 @@ void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args)
     err->text[err->n++] = text;
 }
 
-void bt_errors_code(bt_errors *err, const char *code) { err->note[err->n - 1].code = bt_text_copy(code); }
+void bt_errors_code(bt_errors *err, const char *code)
+{
+    if (err) err->note[err->n - 1].code = bt_text_copy(code);
+}
 
 void bt_errors_move(bt_errors *to, bt_errors *from)
 {
-    for (size_t i = 0; i < from->n; i++) {
+    for (size_t i = 0; to && i < from->n; i++) {
         bt_errors_add(to, "%s", from->text[i]);
         to->note[to->n - 1] = from->note[i];
         from->note[i] = (bt_note){0};

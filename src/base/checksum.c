@@ -91,6 +91,12 @@ bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err)
     return reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
 }
 
+bt_status bt_checksum_publish(const char *part, const char *path, const char *kind, bt_errors *err)
+{
+    const bt_status status = bt_checksum_write(part, kind, err);
+    return status == BT_OK ? bt_file_rename(part, path, err) : status;
+}
+
 typedef struct {
     off_t size;
     char front[BT_CHECKSUM_BYTES + 1], back[BT_CHECKSUM_BYTES + 1]; ///< first and last bytes, terminated

@@ -32,6 +32,8 @@ enum {
 
 /// Append the checksum to a complete file, and sync the whole file to disk. Errors: BT_ERR_IO.
 bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err);
+/// The same, and give the file its final name.
+bt_status bt_checksum_publish(const char *part, const char *path, const char *kind, bt_errors *err);
 
 /// Does the file have a sound checksum of this kind? If bare is not NULL, a file that never had a checksum passes too,
 /// and *bare is true. Errors: BT_ERR_IO from the system, BT_ERR_CASE for the content of the file.

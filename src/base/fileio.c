@@ -95,11 +95,20 @@ int bt_file_resize(int fd, off_t size)
 
 int bt_file_close(int fd) { return close(fd) != 0 && errno != EINTR ? errno : 0; }
 
-char *bt_file_join(const char *dir, const char *name)
+char *bt_file_path(char out[BT_PATH_BYTES], const char *dir, const char *name)
 {
     const size_t n = strlen(dir);
-    return bt_text_of("%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
+    snprintf(out, BT_PATH_BYTES, "%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
+    return out;
 }
+
+char *bt_file_beside(char out[BT_PATH_BYTES], const char *path, const char *ending)
+{
+    snprintf(out, BT_PATH_BYTES, "%s%s", path, ending);
+    return out;
+}
+
+char *bt_file_join(const char *dir, const char *name) { return bt_text_copy(BT_PATH(dir, name)); }
 
 /// Is this a descriptor that this process was given, such as a pipe of the shell? Opening it does not block.
 static bool is_own_descriptor(const char *path)
@@ -209,11 +218,8 @@ bt_status bt_file_read_to(const char *path, const char *what, size_t most, char 
 
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
 {
-    char *temporary = bt_text_of("%s.tmp", path);
-    if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) {
-        free(temporary);
-        return BT_ERR_IO;
-    }
+    const char *temporary = BT_BESIDE(path, ".tmp");
+    if (bt_file_may_take(path, err) != BT_OK || bt_file_may_take(temporary, err) != BT_OK) return BT_ERR_IO;
 
     // A link under the temporary name must not lead the text elsewhere. One under the final name does not: the rename
     // replaces it.
@@ -227,7 +233,6 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     bt_status status = reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
     if (status == BT_OK) status = bt_file_rename(temporary, path, err);
     if (status != BT_OK && fd >= 0) unlink(temporary);
-    free(temporary);
     return status;
 }
 
@@ -320,10 +325,7 @@ bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
 
 bool bt_file_there(const char *dir, const char *name)
 {
-    char *path = bt_file_join(dir, name);
-    const bool there = access(path, F_OK) == 0;
-    free(path);
-    return there;
+    return access(BT_PATH(dir, name), F_OK) == 0;
 }
 
 bool bt_file_begins(const char *path, const char *text)
@@ -366,7 +368,7 @@ int bt_lock_take(const char *dir, bool *busy, bt_errors *err) { return bt_lock_t
 int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *err)
 {
     if (busy) *busy = false;
-    char *path = bt_file_join(dir, name);
+    const char *path = BT_PATH(dir, name);
     int fd = -1;
     for (bool taken = bt_file_may_take(path, err) != BT_OK; !taken;) {
         fd = bt_file_descriptor(path, O_RDWR | O_CREAT | O_NOFOLLOW);
@@ -392,15 +394,12 @@ int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *
         // the text only informs the next process; the lock holds without it
         if (ftruncate(fd, 0) != 0 || pwrite(fd, who, (size_t)n, 0) != n) errno = 0;
     }
-    free(path);
     return fd;
 }
 
 void bt_lock_drop(const char *dir, int lock)
 {
     if (lock < 0) return;
-    char *path = bt_file_join(dir, "run.lock");
-    unlink(path); // while the lock is held
+    unlink(BT_PATH(dir, "run.lock")); // while the lock is held
     close(lock);
-    free(path);
 }

@@ -71,6 +71,16 @@ bool bt_file_begins(const char *path, const char *text);
 /// dir/name in new memory; the caller frees it.
 char *bt_file_join(const char *dir, const char *name);
 
+/// One more than the system takes, so that it refuses a path that is cut off here (ENAMETOOLONG).
+enum { BT_PATH_BYTES = 4098 };
+/// The same in `out`, which is returned.
+char *bt_file_path(char out[BT_PATH_BYTES], const char *dir, const char *name);
+/// The same in memory that lasts to the end of the enclosing block.
+#define BT_PATH(dir, name) bt_file_path((char[BT_PATH_BYTES]){""}, dir, name)
+/// A path with this ending, in such memory.
+char *bt_file_beside(char out[BT_PATH_BYTES], const char *path, const char *ending);
+#define BT_BESIDE(path, ending) bt_file_beside((char[BT_PATH_BYTES]){""}, path, ending)
+
 /// The folder of a path, "." for a bare name, in new memory; the caller frees it.
 char *bt_file_folder(const char *path);
 

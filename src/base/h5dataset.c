@@ -2,7 +2,6 @@
 // Units, axes and slabs of datasets, and the provenance of a file; see h5dataset.h.
 #include "base/h5dataset.h"
 
-#include <errno.h>
 #include <hdf5_hl.h>
 #include <inttypes.h>
 #include <omp.h>

@@ -32,6 +32,7 @@ static inline int bt_ascending(const void *a, const void *b)
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
+static inline int bt_descending(const void *a, const void *b) { return bt_ascending(b, a); }
 
 // Functions that take most of the time, compiled for the processor in use, on which no bit of their results depends.
 

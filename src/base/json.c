@@ -173,7 +173,7 @@ static void write_value(bt_json *json, const bt_json_key *k, const struct bt_jso
     case BT_JSON_TEXT: bt_json_string(json, key, k->text ? k->text(view)
                                                          : *(const char *const *)(const void *)at); break;
     case BT_JSON_WRITTEN:
-    case BT_JSON_ADDED: k->write(json, key, view, source); break;
+    case BT_JSON_ADDED: k->write(json, key, view, at); break;
     case BT_JSON_LAWS:
     case BT_JSON_SPLITS:
     case BT_JSON_SAVED:

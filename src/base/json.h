@@ -55,7 +55,8 @@ typedef struct bt_json_key {
     double (*number)(const struct bt_json_view *view);
     const char *(*text)(const struct bt_json_view *view);
     bool (*when)(const struct bt_json_view *view); ///< NULL = always; if false, a group is null, a plain key left out
-    void (*write)(bt_json *json, const char *key, const struct bt_json_view *view, const void *source);
+    /// at: the member
+    void (*write)(bt_json *json, const char *key, const struct bt_json_view *view, const void *at);
     bool machine;            ///< about the machine and the moment, not the result: left out of an ensemble's numbers
 } bt_json_key;
 

@@ -135,11 +135,9 @@ bt_status bt_snapshot_close(bt_snapshot *snap, bt_errors *err)
 
 static void drop(bt_snapshot *snap)
 {
-    bt_errors unheard = {0};
     if (snap->file->dataset >= 0) H5Dclose(snap->file->dataset);
-    snap->file->h.err = &unheard;
+    snap->file->h.err = NULL;
     if (!snap->file->ended) bt_h5_close(&snap->file->h);
-    bt_errors_free(&unheard);
     release(snap, false);
 }
 

@@ -353,9 +353,12 @@ bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *
     return root;
 }
 
-bool bt_tree_has(const bt_node *node, const char *key)
+const bt_node *bt_tree_find(const bt_node *node, const char *key, int *line)
 {
     for (int i = 0; node && node->kind == BT_NODE_MAP && i < node->n; i++)
-        if (!strcmp(node->key[i], key)) return true;
-    return false;
+        if (!strcmp(node->key[i], key)) {
+            *line = node->key_line[i];
+            return node->item[i];
+        }
+    return NULL;
 }

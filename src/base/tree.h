@@ -41,7 +41,7 @@ typedef struct bt_node {
 bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *err);
 void bt_tree_free(bt_node *node);
 
-/// Is the node, which may be NULL, a map with this key?
-bool bt_tree_has(const bt_node *node, const char *key);
+/// The item of this key, and its line; NULL unless the node, which may be NULL, is a map that has it.
+const bt_node *bt_tree_find(const bt_node *node, const char *key, int *line);
 
 #endif

@@ -5,7 +5,6 @@
 #include "geometry/polygons.h"
 
 #include <assert.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

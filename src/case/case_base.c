@@ -4,7 +4,6 @@
 // and merges only maps of the first level.
 #include "case/case_base.h"
 
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -20,16 +19,6 @@ const bt_key bt_base_key = {
            "of that file",
 };
 
-static const bt_node *entry(const bt_node *root, const char *key, int *line)
-{
-    for (int i = 0; root && root->kind == BT_NODE_MAP && i < root->n; i++)
-        if (!strcmp(root->key[i], key)) {
-            *line = root->key_line[i];
-            return root->item[i];
-        }
-    return NULL;
-}
-
 /// Does this word of the first level occur in cases only: a section, a key with a dot, floes?
 static bool is_of_cases(const char *word)
 {
@@ -43,8 +32,9 @@ static bool is_of_cases(const char *word)
 /// key of studies, or none of cases (`report` belongs to both).
 static bool case_is_study(const bt_node *root)
 {
-    if (!bt_tree_has(root, "base")) return false;
+    int line;
     bool of_cases = false;
+    if (!bt_tree_find(root, "base", &line)) return false;
     for (int i = 0; i < root->n; i++) {
         const char *word = root->key[i];
         const bool both = !strcmp(word, "base") || !strcmp(word, "report");
@@ -68,16 +58,14 @@ bt_file_kind bt_case_kind_of(const char *path)
     struct stat st;
     char *text = NULL;
     size_t size;
-    bt_errors unheard = {0};
     bt_file_kind kind = BT_FILE_OTHER;
     if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
-        bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
-        bt_node *root = bt_tree_parse(text, size, path, &unheard);
+        bt_file_read(path, "a case file", &text, &size, NULL) == BT_OK) {
+        bt_node *root = bt_tree_parse(text, size, path, NULL);
         kind = bt_case_kind(root);
         bt_tree_free(root);
     }
     free(text);
-    bt_errors_free(&unheard);
     return kind;
 }
 
@@ -165,9 +153,9 @@ bt_status bt_case_files_read(bt_case_files *files, const char *path, const char 
     add(files, bt_text_copy(path), memcpy(copy, text, size), size);
     bt_status status = parse(files, err);
     int line = 0;
-    if (status == BT_OK && alone && bt_tree_has(files->file[0].root, "base"))
+    if (status == BT_OK && alone && bt_tree_find(files->file[0].root, "base", &line))
         status = bt_fail(err, BT_ERR_CASE, "%s: base: a case stored with a result has none; the file is damaged", path);
-    for (const bt_node *base; status == BT_OK && (base = entry(files->file[files->n - 1].root, "base", &line));)
+    for (const bt_node *base; status == BT_OK && (base = bt_tree_find(files->file[files->n - 1].root, "base", &line));)
         status = read_base(files, base, line, err);
     return status;
 }

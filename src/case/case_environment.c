@@ -5,7 +5,6 @@
 #include "case/warning.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "bergtow/shape.h"

@@ -4,7 +4,6 @@
 #include "case/case_tow.h"
 
 #include "bergtow/shape.h"
-#include "base/largest.h"
 
 static const double REST_SPEED = 0.01; // of the reference speed, assumed; in the basin 1e-3 m/s of 0.13 m/s
 

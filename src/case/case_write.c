@@ -6,7 +6,6 @@
 #include "case/schema.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 // Open the sections of a dotted name that the previous name is not in; returns the last part of the name.

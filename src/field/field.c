@@ -10,39 +10,46 @@
 #include "base/elementary.h"
 #include "field/field_make.h"
 
-// --- broadcast to all ranks ------------------------------------------------------------------------------------------
+// --- as blocks of memory ---------------------------------------------------------------------------------------------
 
-static void array(const bt_comm *comm, double **x, int64_t n)
+void bt_field_arrays(const bt_field *field, int64_t n_vertices, bt_field_array out[BT_FIELD_ARRAYS])
 {
-    if (comm->rank != 0) *x = bt_realloc(*x, (size_t)n, sizeof **x);
-    bt_comm_bcast(comm, *x, (size_t)n * sizeof **x);
+    const size_t row = (size_t)field->n * sizeof(double);
+    const bt_field_array all[] = {{field->offsets, row + sizeof *field->offsets},
+                                  {field->vertices, 2 * (size_t)n_vertices * sizeof *field->vertices},
+                                  {field->pose, 3 * row}, {field->thickness, row}, {field->area, row}};
+    memcpy(out, all, sizeof all);
+}
+
+bt_field bt_field_numbers(const bt_field *field)
+{
+    bt_field numbers = *field;
+    numbers.offsets = NULL;
+    numbers.vertices = numbers.pose = numbers.thickness = numbers.area = NULL;
+    numbers.cap = field->n, numbers.cap_vertices = field->offsets[field->n];
+    return numbers;
+}
+
+void bt_field_room(bt_field *field, const bt_field *numbers)
+{
+    bt_field_free(field);
+    *field = *numbers;
+    field->offsets = bt_alloc((size_t)field->n + 1, sizeof *field->offsets);
+    field->vertices = bt_alloc(2 * (size_t)field->cap_vertices, sizeof *field->vertices);
+    field->pose = bt_alloc(3 * (size_t)field->n, sizeof *field->pose);
+    field->thickness = bt_alloc((size_t)field->n, sizeof *field->thickness);
+    field->area = bt_alloc((size_t)field->n, sizeof *field->area);
 }
 
 void bt_field_share(const bt_comm *comm, bt_field *field)
 {
     if (comm->size == 1) return;
-    struct { int64_t n, vertices; double ice_area, concentration; bt_outline_counts outlines; } head = {0};
-    if (comm->rank == 0) {
-        head.n = field->n;
-        head.vertices = field->offsets[field->n];
-        head.ice_area = field->ice_area;
-        head.concentration = field->concentration;
-        head.outlines = field->outlines;
-    }
-    bt_comm_bcast(comm, &head, sizeof head);
-    if (comm->rank != 0) {
-        field->n = field->cap = (bt_idx)head.n;
-        field->cap_vertices = head.vertices;
-        field->ice_area = head.ice_area;
-        field->concentration = head.concentration;
-        field->outlines = head.outlines;
-        field->offsets = bt_realloc(field->offsets, (size_t)head.n + 1, sizeof *field->offsets);
-    }
-    bt_comm_bcast(comm, field->offsets, ((size_t)head.n + 1) * sizeof *field->offsets);
-    array(comm, &field->vertices, 2 * head.vertices);
-    array(comm, &field->pose, 3 * head.n);
-    array(comm, &field->thickness, head.n);
-    array(comm, &field->area, head.n);
+    bt_field numbers = bt_field_numbers(field);
+    bt_comm_bcast(comm, &numbers, sizeof numbers);
+    if (comm->rank != 0) bt_field_room(field, &numbers);
+    bt_field_array p[BT_FIELD_ARRAYS];
+    bt_field_arrays(field, numbers.cap_vertices, p);
+    for (int k = 0; k < BT_FIELD_ARRAYS; k++) bt_comm_bcast(comm, p[k].at, p[k].bytes);
 }
 
 // --- a field ---------------------------------------------------------------------------------------------------------

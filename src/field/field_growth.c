@@ -9,7 +9,6 @@
 // room_a = min over b of t_ab can be used by all floes at the same time.
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "field/field_make.h"
 #include "base/elementary.h"

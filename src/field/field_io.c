@@ -12,7 +12,6 @@
 // The reader trusts nothing: the file may be cut off, damaged, or made by hand. Files of this program carry a checksum
 // (checksum.h), so damage is refused before HDF5, which some damage crashes, reads a byte. In a file without one, made
 // by h5py say, only the values are checked; damage to such a file may still crash HDF5.
-#include <errno.h>
 #include <hdf5.h>
 #include <math.h>
 #include <stdio.h>
@@ -42,7 +41,7 @@ const char *bt_field_frame(const bt_case *input)
 bt_status bt_field_write(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
     // Write under another name until complete, so that a full disk never leaves half a field under the right one.
-    char *part = bt_text_of("%s.part", path);
+    const char *part = BT_BESIDE(path, ".part");
     bt_h5 h5;
     bt_status status = bt_h5_create(&h5, part, err);
     if (status == BT_OK) {
@@ -68,11 +67,9 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         free(text);
         bt_h5_attr_text(&h5, "/", "program", "bergtow " BT_VERSION);
         status = bt_h5_close(&h5);
-        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_FIELD, err);
-        if (status == BT_OK) status = bt_file_rename(part, path, err);
+        if (status == BT_OK) status = bt_checksum_publish(part, path, BT_CHECKSUM_FIELD, err);
         if (status != BT_OK) unlink(part);
     }
-    free(part);
     return status;
 }
 

@@ -2,7 +2,7 @@
 // Fields kept for other runs; design in field_kept.h.
 //
 //     head: magic, digest of everything after it, name (the digest of the case), numbers of the field
-//     offsets [n+1], vertices [V][2], pose [n][3], thickness [n], area [n] as in bt_field
+//     its arrays, in the order of bt_field_arrays
 #include "field/field_kept.h"
 
 #include <dirent.h>
@@ -18,8 +18,9 @@
 #include "base/h5dataset.h"
 #include "case/case_files.h"
 #include "case/schema.h"
+#include "field/field_make.h"
 
-#define MAGIC "bergtow kept field\n"
+#define MAGIC "bergtow kept field 2\n"
 
 /// Keys of these sections that do not affect the ice field, generated or read.
 static const char *const idle[] = {
@@ -57,10 +58,8 @@ void bt_field_digest(const bt_case *input, char digest[BT_CHECKSUM_DIGEST])
         if (!BEGINS(key->name, sections) || BEGINS(key->name, idle)) continue;
         write_keys(t.out, key, 1, input);
         const char *path = bt_case_file(input, key);
-        bt_errors unheard = {0}; // the reader of the file reports it
-        int64_t bytes;
-        if (path && bt_checksum_digest_file(path, digest, &bytes, &unheard) == BT_OK) fprintf(t.out, "%s\n", digest);
-        bt_errors_free(&unheard);
+        int64_t bytes; // the reader of the file reports its errors
+        if (path && bt_checksum_digest_file(path, digest, &bytes, NULL) == BT_OK) fprintf(t.out, "%s\n", digest);
     }
     for (bt_idx i = 0; i < input->n_floes; i++) write_keys(t.out, bt_floe_keys, bt_n_floe_keys, &input->floes[i]);
     double v[2 * BT_MAX_VERTICES]; // keys only name a shape that a program adds
@@ -73,43 +72,24 @@ void bt_field_digest(const bt_case *input, char digest[BT_CHECKSUM_DIGEST])
 
 typedef struct head {
     char magic[32], digest[BT_CHECKSUM_DIGEST], name[BT_CHECKSUM_DIGEST];
-    int64_t n, n_vertices;
-    double ice_area, concentration, strip;
-    char frame[16];
-    bt_outline_counts outlines;
+    bt_field field; ///< its numbers
 } head;
 
-enum { ARRAYS = 5 };
 static const size_t sealed = offsetof(head, name); ///< the digest covers everything from here on
 
-typedef struct piece { void *at; size_t bytes; } piece;
-
-static void pieces_of(bt_field *field, int64_t n, int64_t n_vertices, piece p[ARRAYS])
-{
-    const size_t row = (size_t)n * sizeof(double);
-    const piece all[ARRAYS] = {{field->offsets, row + sizeof *field->offsets},
-                               {field->vertices, 2 * (size_t)n_vertices * sizeof *field->vertices},
-                               {field->pose, 3 * row}, {field->thickness, row}, {field->area, row}};
-    memcpy(p, all, sizeof all);
-}
-
 /// A field as the bytes of a file; the caller frees them.
-static char *packed(bt_field *field, const char *name, size_t *size)
+static char *packed(const bt_field *field, const char *name, size_t *size)
 {
-    piece p[ARRAYS];
-    pieces_of(field, field->n, field->offsets[field->n], p);
+    bt_field_array p[BT_FIELD_ARRAYS];
+    bt_field_arrays(field, field->offsets[field->n], p);
     *size = sizeof(head);
-    for (int k = 0; k < ARRAYS; k++) *size += p[k].bytes;
+    for (int k = 0; k < BT_FIELD_ARRAYS; k++) *size += p[k].bytes;
     char *bytes = bt_alloc(*size, 1), *to = bytes + sizeof(head);
-    memset(bytes, 0, sizeof(head)); // padding, too: the digest covers it
-    head *h = (head *)bytes;
+    head *h = (head *)bytes; // zeros, its padding, too: the digest covers it
     memcpy(h->magic, MAGIC, sizeof MAGIC);
     memcpy(h->name, name, sizeof h->name);
-    h->n = field->n, h->n_vertices = field->offsets[field->n];
-    h->ice_area = field->ice_area, h->concentration = field->concentration, h->strip = field->strip;
-    memcpy(h->frame, field->frame, sizeof h->frame);
-    h->outlines = field->outlines;
-    for (int k = 0; k < ARRAYS; to += p[k++].bytes)
+    h->field = bt_field_numbers(field);
+    for (int k = 0; k < BT_FIELD_ARRAYS; to += p[k++].bytes)
         if (p[k].bytes > 0) memcpy(to, p[k].at, p[k].bytes);
     bt_checksum_digest_text(bytes + sealed, *size - sealed, h->digest);
     return bytes;
@@ -124,22 +104,14 @@ static bool unpacked(bt_field *field, const char *name, const char *bytes, size_
     memcpy(&h, bytes, sizeof h);
     bt_checksum_digest_text(bytes + sealed, size - sealed, digest);
     if (memcmp(h.magic, MAGIC, sizeof MAGIC) || memcmp(h.digest, digest, sizeof digest) ||
-        memcmp(h.name, name, sizeof h.name) || h.n < 0 || h.n > BT_MOST_FLOES || h.n_vertices < 0 ||
-        h.n_vertices > BT_MOST_FLOES * (int64_t)BT_MAX_VERTICES)
+        memcmp(h.name, name, sizeof h.name) || h.field.n < 0 || h.field.n > BT_MOST_FLOES || h.field.cap_vertices < 0 ||
+        h.field.cap_vertices > BT_MOST_FLOES * (int64_t)BT_MAX_VERTICES)
         return false;
-    field->n = field->cap = (bt_idx)h.n, field->cap_vertices = h.n_vertices;
-    field->ice_area = h.ice_area, field->concentration = h.concentration, field->strip = h.strip;
-    memcpy(field->frame, h.frame, sizeof field->frame);
-    field->outlines = h.outlines;
-    field->offsets = bt_realloc(field->offsets, (size_t)h.n + 1, sizeof *field->offsets);
-    field->vertices = bt_alloc(2 * (size_t)h.n_vertices, sizeof *field->vertices);
-    field->pose = bt_alloc(3 * (size_t)h.n, sizeof *field->pose);
-    field->thickness = bt_alloc((size_t)h.n, sizeof *field->thickness);
-    field->area = bt_alloc((size_t)h.n, sizeof *field->area);
-    piece p[ARRAYS];
-    pieces_of(field, h.n, h.n_vertices, p);
+    bt_field_room(field, &h.field);
+    bt_field_array p[BT_FIELD_ARRAYS];
+    bt_field_arrays(field, h.field.cap_vertices, p);
     const char *from = bytes + sizeof h;
-    for (int k = 0; k < ARRAYS; from += p[k++].bytes)
+    for (int k = 0; k < BT_FIELD_ARRAYS; from += p[k++].bytes)
         if (p[k].bytes > 0) memcpy(p[k].at, from, p[k].bytes);
     return true;
 }
@@ -149,18 +121,16 @@ static bool take(const char *path, const char *name, bt_field *field)
     if (access(path, F_OK) != 0) return false;
     char *bytes = NULL;
     size_t size;
-    bt_errors why = {0};
-    const bool whole = bt_file_read_to(path, "a kept field", SIZE_MAX / 2, &bytes, &size, &why) == BT_OK &&
+    const bool whole = bt_file_read_to(path, "a kept field", SIZE_MAX / 2, &bytes, &size, NULL) == BT_OK &&
                        unpacked(field, name, bytes, size);
     free(bytes);
-    bt_errors_free(&why);
     if (!whole)
         bt_errors_warn("warning: %s: is damaged, or not a field of this program; the field is made again", path);
     return whole;
 }
 
 /// Write under a name of this process, then rename. No fsync: a file that is not complete is made again.
-static void keep(const char *path, const char *name, bt_field *field)
+static void keep(const char *path, const char *name, const bt_field *field)
 {
     size_t size;
     char *bytes = packed(field, name, &size), *part = bt_text_of("%s.%ld.part", path, (long)getpid());
@@ -176,16 +146,13 @@ bt_status bt_field_load_kept(const char *dir, const bt_case *input, bt_field *fi
     if (!dir) return bt_field_load(input, field, err);
     char name[BT_CHECKSUM_DIGEST];
     bt_field_digest(input, name); // before loading: if a file of the ice changes later, its digest differs
-    char *path = bt_text_of("%s/%s", dir, name);
-    bt_errors unheard = {0};
-    const bool room = bt_file_make_dir(dir, &unheard) == BT_OK;
-    bt_errors_free(&unheard);
+    const char *path = BT_PATH(dir, name);
+    const bool room = bt_file_make_dir(dir, NULL) == BT_OK;
     bt_status status = BT_OK;
     if (!room || !take(path, name, field)) {
         status = bt_field_load(input, field, err);
         if (status == BT_OK && room) keep(path, name, field);
     }
-    free(path);
     return status;
 }
 
@@ -196,9 +163,7 @@ void bt_field_forget_kept(const char *dir)
         const char *name = entry->d_name;
         const size_t digits = strspn(name, "0123456789abcdef");
         if (digits != BT_CHECKSUM_DIGEST - 1 || (name[digits] && name[digits] != '.')) continue;
-        char *path = bt_file_join(dir, name);
-        unlink(path);
-        free(path);
+        unlink(BT_PATH(dir, name));
     }
     if (d) closedir(d);
     rmdir(dir);

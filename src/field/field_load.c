@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The ice field of a case, generated or read, and the warnings about outlines that were read.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/field.h"
@@ -79,8 +78,7 @@ static void warn_of_latitude(const bt_outline_counts *counts, const bt_case *inp
                 place, place);
     else if (fabs(place - given) > 1)
         bt_warn(warnings, BT_WARN_OTHER_LATITUDE,
-                "the outlines lie at latitude %.4g deg, but water.latitude is %.4g deg; correct one",
-                place, given);
+                "the outlines lie at latitude %.4g deg, but water.latitude is %.4g deg; correct one", place, given);
 }
 
 /// Distortion of lengths and directions by a projection, from its scale at x = y = 0.

@@ -75,6 +75,15 @@ void bt_field_visit_pairs(const bt_region *region, const bt_field *field, const 
 /// something.
 void bt_field_growth(const bt_region *region, const bt_field *field, double limit, double *clearance);
 
+enum { BT_FIELD_ARRAYS = 5 };
+typedef struct bt_field_array { void *at; size_t bytes; } bt_field_array;
+/// The arrays of a field with this number of vertices.
+void bt_field_arrays(const bt_field *field, int64_t n_vertices, bt_field_array out[BT_FIELD_ARRAYS]);
+/// The numbers of a field, with NULL for its arrays; cap_vertices is the number of its vertices.
+bt_field bt_field_numbers(const bt_field *field);
+/// Replace a field by one of these numbers, with room for its arrays.
+void bt_field_room(bt_field *field, const bt_field *numbers);
+
 /// Scale floe i about its centroid.
 void bt_field_scale(bt_field *field, bt_idx i, double s);
 /// Area with every floe but those held scaled by min(clearance, √λ), m². held: NULL = none.

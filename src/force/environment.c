@@ -2,7 +2,6 @@
 // Current and wind in time; equations in force/environment.h.
 #include "force/environment.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -2,7 +2,6 @@
 // Free velocity of every body by the forces on it, and the rest and free drift of floes; equations in bergtow/forces.h.
 #include "force/forces.h"
 
-#include <math.h>
 
 #include "base/elementary.h"
 #include "body/bodies.h"

@@ -77,38 +77,23 @@ const char *bt_checkpoint_meaning(const char *name, const char **units, const ch
 
 // --- files -----------------------------------------------------------------------------------------------------------
 
-static char *path_of_part(const char *dir, const char *name)
-{
-    char *path = bt_file_join(dir, name), *part = bt_text_of("%s.tmp", path);
-    free(path);
-    return part;
-}
-
 void bt_checkpoint_begin(bt_snapshot *snap, const char *dir, const char *name, bt_errors *err)
 {
-    char *part = path_of_part(dir, name);
-    bt_snapshot_create(snap, part, bt_checkpoint_meaning, err);
-    free(part);
+    bt_snapshot_create(snap, BT_BESIDE(BT_PATH(dir, name), ".tmp"), bt_checkpoint_meaning, err);
 }
 
 bt_status bt_checkpoint_write(bt_snapshot *snap, const char *dir, const char *name, bt_errors *err)
 {
-    char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE),
-         *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = path_of_part(dir, name);
+    const char *path = BT_PATH(dir, name), *before = BT_PATH(dir, BT_CHECKPOINT_BEFORE),
+               *damaged = BT_PATH(dir, BT_CHECKPOINT_DAMAGED), *part = BT_BESIDE(path, ".tmp");
     bt_status status = bt_snapshot_close(snap, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // A checkpoint that has been damaged meanwhile must not replace a sound one.
-        bt_errors unheard = {0};
-        const bool sound = bt_checksum_check(path, BT_CHECKSUM_CHECKPOINT, NULL, &unheard) == BT_OK;
+        const bool sound = bt_checksum_check(path, BT_CHECKSUM_CHECKPOINT, NULL, NULL) == BT_OK;
         status = bt_file_rename(path, sound ? before : damaged, err);
-        bt_errors_free(&unheard);
     }
     if (status == BT_OK) status = bt_file_rename(part, path, err);
     if (status != BT_OK) unlink(part);
-    free(path);
-    free(before);
-    free(damaged);
-    free(part);
     return status;
 }
 
@@ -126,8 +111,7 @@ bt_status bt_checkpoint_read(bt_snapshot *snap, const char *dir, char **path, ch
     const bool first = there(dir, BT_CHECKPOINT_FILE, path), second = there(dir, BT_CHECKPOINT_BEFORE, &before);
     bt_status status = first ? bt_snapshot_read(snap, *path, &why) : BT_ERR_IO;
     if (status != BT_OK && second) {
-        bt_errors unheard = {0};
-        const bt_status other = bt_snapshot_read(snap, before, first ? &unheard : &why);
+        const bt_status other = bt_snapshot_read(snap, before, first ? NULL : &why);
         if (other == BT_OK) {
             *said = bt_text_of("%s; %s is taken, step %" PRId64,
                                first ? why.text[0] : "the last checkpoint is missing", before,
@@ -139,7 +123,6 @@ bt_status bt_checkpoint_read(bt_snapshot *snap, const char *dir, char **path, ch
         } else if (!first) {
             status = other;
         }
-        bt_errors_free(&unheard);
     }
     if (status != BT_OK && !first && !second)
         bt_errors_add(err, "%s: holds no checkpoint; give the folder of a run that was stopped", dir);
@@ -157,12 +140,8 @@ bool bt_checkpoint_there(const char *dir)
 
 void bt_checkpoint_remove(const char *dir)
 {
-    static const char *const names[] = {BT_CHECKPOINT_BEFORE, BT_CHECKPOINT_FILE};
-    for (int k = 0; k < 2; k++) {
-        char *path = bt_file_join(dir, names[k]);
-        unlink(path);
-        free(path);
-    }
+    unlink(BT_PATH(dir, BT_CHECKPOINT_BEFORE));
+    unlink(BT_PATH(dir, BT_CHECKPOINT_FILE));
 }
 
 /// Print dimensions and type of an array, and its numbers if they are few.

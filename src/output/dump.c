@@ -7,9 +7,7 @@
 // solution. Sheets (contact/raft.h) are also contacts; their two components lie in a disc about a separate centre.
 #include "output/dump.h"
 
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -141,7 +139,7 @@ bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors 
 {
     bt_status status = check_problem(path, p, err);
     if (status != BT_OK) return status;
-    char *temporary = bt_text_of("%s.tmp", path);
+    const char *temporary = BT_BESIDE(path, ".tmp");
     bt_h5 h5;
     status = bt_h5_create(&h5, temporary, err);
     if (status == BT_OK) {
@@ -152,7 +150,6 @@ bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors 
         if (status == BT_OK) status = bt_file_rename(temporary, path, err);
         if (status != BT_OK) unlink(temporary);
     }
-    free(temporary);
     return status;
 }
 

@@ -2,10 +2,6 @@
 // Replacing the result in a folder; its states meanwhile are listed in folder.h.
 #include "output/folder.h"
 
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -62,41 +58,29 @@ static const struct {
 };
 enum { N_FILES = sizeof files / sizeof *files };
 
-static char *aside_of(const char *dir) { return bt_file_join(dir, BT_FOLDER_REPLACED); }
-
-static bool is_there(const char *path)
-{
-    struct stat st;
-    return lstat(path, &st) == 0;
-}
-
 /// Is file k in the folder, and this program's? A link is replaced and never followed: its target stays.
 static bool holds(const char *dir, int k)
 {
-    char *path = bt_file_join(dir, files[k].name);
+    const char *path = BT_PATH(dir, files[k].name);
     struct stat st;
-    const bool there = lstat(path, &st) == 0;
-    const bool yes = there && (S_ISLNK(st.st_mode) || files[k].ours(path));
-    free(path);
-    return yes;
+    return lstat(path, &st) == 0 && (S_ISLNK(st.st_mode) || files[k].ours(path));
 }
 
 /// Has this program certainly written into the folder?
 static bool is_known(const char *dir)
 {
     bool known = false;
-    for (int k = 0; k < N_FILES && !known; k++) {
-        char *path = bt_file_join(dir, files[k].name);
-        known = files[k].ours != is_request && holds(dir, k) && (!files[k].hdf5 || is_sealed(path));
-        free(path);
-    }
+    for (int k = 0; k < N_FILES && !known; k++)
+        known = files[k].ours != is_request && holds(dir, k) &&
+                (!files[k].hdf5 || is_sealed(BT_PATH(dir, files[k].name)));
     return known;
 }
 
 /// Was the file under the name of file k written by something else?
 static bool is_foreign(const char *dir, int k, const char *path)
 {
-    if (!is_there(path)) return false;
+    struct stat st;
+    if (lstat(path, &st) != 0) return false;
     if (!holds(dir, k)) return true;
     return files[k].hdf5 && is_regular(path) && !is_sealed(path) && !is_known(dir);
 }
@@ -105,13 +89,12 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
 {
     bt_status status = BT_OK;
     for (int k = 0; k < N_FILES; k++) {
-        char *path = bt_file_join(dir, files[k].name);
+        const char *path = BT_PATH(dir, files[k].name);
         if (is_foreign(dir, k, path))
             status = bt_fail(err, BT_ERR_IO,
                 "%s: was not written by this program, but a run would replace it; move it away, or give another folder "
                 "with -o",
                 path);
-        free(path);
     }
     return status;
 }
@@ -128,23 +111,15 @@ bool bt_folder_keeps(const char *dir) { return bt_file_there(dir, BT_FOLDER_REPL
 static bt_status move(const char *from, const char *to, int k, bt_errors *err)
 {
     if (!holds(from, k)) return BT_OK;
-    char *old = bt_file_join(from, files[k].name), *new = bt_file_join(to, files[k].name);
-    const bt_status status = bt_file_rename(old, new, err);
-    free(old);
-    free(new);
-    return status;
+    return bt_file_rename(BT_PATH(from, files[k].name), BT_PATH(to, files[k].name), err);
 }
 
 /// Remove all of the program's files.
 static bt_status clear(const char *dir, bt_errors *err)
 {
     bt_status status = BT_OK;
-    for (int k = 0; k < N_FILES && status == BT_OK; k++) {
-        if (!holds(dir, k)) continue;
-        char *path = bt_file_join(dir, files[k].name);
-        status = bt_file_remove(path, err);
-        free(path);
-    }
+    for (int k = 0; k < N_FILES && status == BT_OK; k++)
+        if (holds(dir, k)) status = bt_file_remove(BT_PATH(dir, files[k].name), err);
     return status;
 }
 
@@ -159,10 +134,9 @@ static bt_status make_room(const char *dir, bt_errors *err)
     bool any = false;
     for (int k = 0; k < N_FILES && !any; k++) any = holds(dir, k);
     if (!any) return BT_OK;
-    char *aside = aside_of(dir);
+    const char *aside = BT_PATH(dir, BT_FOLDER_REPLACED);
     bt_status status = bt_file_make_dir(aside, err);
     for (int k = 0; k < N_FILES && status == BT_OK; k++) status = move(dir, aside, k, err);
-    free(aside);
     return status;
 }
 
@@ -171,21 +145,18 @@ static bt_status make_room(const char *dir, bt_errors *err)
 static void move_back(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    bt_errors unheard = {0};
-    char *aside = aside_of(dir);
+    const char *aside = BT_PATH(dir, BT_FOLDER_REPLACED);
     bool moved = true;
     for (int k = N_FILES - 1; k >= 0 && moved; k--) {
-        move(aside, dir, k, &unheard);
+        move(aside, dir, k, NULL);
         moved = !holds(aside, k);
     }
     rmdir(aside);
-    free(aside);
-    bt_errors_free(&unheard);
 }
 
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err)
 {
-    char *ready = bt_file_join(dir, NEW_CASE), *path = bt_file_join(dir, CASE_FILE);
+    const char *ready = BT_PATH(dir, NEW_CASE), *path = BT_PATH(dir, CASE_FILE);
     bt_status status = bt_file_write(ready, resolved, err); // if the disk is full, nothing has changed
     if (status == BT_OK) {
         status = make_room(dir, err);
@@ -197,41 +168,31 @@ bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *er
         }
     }
     unlink(ready);
-    free(ready);
-    free(path);
     return status;
 }
 
 void bt_folder_put_back(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    char *path = bt_file_join(dir, CASE_FILE), *part = bt_file_join(dir, BT_RESULT_PART);
-    unlink(path);
-    unlink(part);
+    unlink(BT_PATH(dir, CASE_FILE));
+    unlink(BT_PATH(dir, BT_RESULT_PART));
     move_back(dir);
-    free(path);
-    free(part);
 }
 
 void bt_folder_recover(const char *dir)
 {
     if (!bt_file_there(dir, CASE_FILE)) bt_folder_put_back(dir);
-    char *aside = aside_of(dir), *ready = bt_file_join(dir, NEW_CASE);
+    const char *ready = BT_PATH(dir, NEW_CASE);
     if (is_case(ready)) unlink(ready);
-    free(ready);
-    rmdir(aside); // it stays if not empty
-    free(aside);
+    rmdir(BT_PATH(dir, BT_FOLDER_REPLACED)); // it stays if not empty
 }
 
 void bt_folder_settle(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    bt_errors unheard = {0}; // the next complete result tries again
-    char *aside = aside_of(dir);
-    clear(aside, &unheard);
+    const char *aside = BT_PATH(dir, BT_FOLDER_REPLACED);
+    clear(aside, NULL); // the next complete result tries again
     rmdir(aside);
-    free(aside);
-    bt_errors_free(&unheard);
 }
 
 bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err)

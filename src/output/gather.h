@@ -33,8 +33,7 @@ void bt_roster_free(bt_roster *roster);
 /// Collective. The outlines of this rank's block, for bt_record_open; released with bt_gather_free.
 /// Errors, the same status on all ranks: BT_ERR_NUMERIC (lost or duplicate bodies).
 bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_roster *roster,
-                           bt_record_bodies *bodies,
-                             bt_errors *err);
+                           bt_record_bodies *bodies, bt_errors *err);
 void bt_gather_free(bt_record_bodies *bodies);
 
 /// Collective. A frame of this rank's block, with NaN for floes that have split; and on rank 0 the existing pieces of

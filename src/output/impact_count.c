@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/inside.h"
 #include "base/units.h"
 #include "output/summary.h"
 
@@ -61,17 +62,11 @@ static void keep_peak(bt_impact_count *count, double peak)
     count->peaks[i] = peak;
 }
 
-static int descending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x < y) - (x > y);
-}
-
 void bt_impact_count_peaks(const bt_impact_count *count, double *peaks)
 {
     if (count->n_peaks == 0) return;
     memcpy(peaks, count->peaks, (size_t)count->n_peaks * sizeof *peaks);
-    qsort(peaks, (size_t)count->n_peaks, sizeof *peaks, descending);
+    qsort(peaks, (size_t)count->n_peaks, sizeof *peaks, bt_descending);
 }
 
 // --- counting --------------------------------------------------------------------------------------------------------

@@ -327,8 +327,7 @@ static void load_blocks(bt_impact_store *store, bt_snapshot *from, int64_t steps
     for (int64_t k = 0; k < rows * LOADS_WIDTH; k++) finite = finite && isfinite(load[k]);
     bt_snapshot_want(from, finite, "collisions/panel_blocks", -1, "is not finite");
     bt_snapshot_want(from, steps == late_steps(store, bt_snapshot_int(from, "world/step")), "collisions/panel_steps",
-                     -1,
-                     "does not fit the number of steps");
+                     -1, "does not fit the number of steps");
     if (!from->faulty)
         bt_snapshot_want(from, rows == bt_panel_blocks_rows(&store->blocks, steps), "collisions/panel_blocks", -1,
                          "does not fit the number of steps");

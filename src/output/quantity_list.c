@@ -20,6 +20,22 @@ enum { N_TABLES = sizeof tables / sizeof *tables };
 /// Table t, 0 = the summary's own.
 static const bt_json_key *table(int t, int *n) { return t ? (*n = *tables[t].n, tables[t].keys) : bt_summary_keys(n); }
 
+/// Key i of summary.json with its whole name, registered quantities last; false after the last.
+static bool summary_key(int i, bt_json_key *key, char name[96])
+{
+    for (int t = 0, n; t < N_TABLES; t++, i -= n) {
+        const bt_json_key *keys = table(t, &n);
+        if (i >= n) continue;
+        *key = keys[i];
+        snprintf(name, 96, "%s%s", tables[t].prefix, key->key);
+        return true;
+    }
+    if (i >= bt_n_added()) return false;
+    *key = (bt_json_key){.units = bt_added(i)->units, .description = bt_added(i)->description, .kind = BT_JSON_REAL};
+    snprintf(name, 96, "%s", bt_added(i)->summary);
+    return true;
+}
+
 static void list_series(FILE *out)
 {
     fprintf(out, "%-24s %-6s %-5s %-32s %s\n", "series", "units", "merge", "applies", "meaning");
@@ -34,17 +50,10 @@ static void list_series(FILE *out)
 static void list_summary(FILE *out)
 {
     fprintf(out, "\n%-46s %-6s %s\n", "summary.json", "units", "meaning");
-    for (int t = 0, n; t < N_TABLES; t++) {
-        const bt_json_key *keys = table(t, &n);
-        for (const bt_json_key *key = keys; key < keys + n; key++) {
-            if (key->kind == BT_JSON_ADDED) continue;
-            char name[96];
-            snprintf(name, sizeof name, "%s%s", tables[t].prefix, key->key);
-            fprintf(out, "%-46s %-6s %s\n", name, key->units, key->description);
-        }
-    }
-    for (int k = 0; k < bt_n_added(); k++)
-        fprintf(out, "%-46s %-6s %s\n", bt_added(k)->summary, bt_added(k)->units, bt_added(k)->description);
+    bt_json_key key;
+    char name[96];
+    for (int i = 0; summary_key(i, &key, name); i++)
+        if (key.kind != BT_JSON_ADDED) fprintf(out, "%-46s %-6s %s\n", name, key.units, key.description);
 }
 
 void bt_quantities_list(void *stream)
@@ -82,24 +91,13 @@ static void json_series(bt_json *json, const bt_quantity *quantity)
     bt_json_close(json, '}');
 }
 
-static void json_summary_key(bt_json *json, const char *prefix, const bt_json_key *key)
+static void json_summary_key(bt_json *json, const char *name, const bt_json_key *key)
 {
-    char name[96];
-    snprintf(name, sizeof name, "%s%s", prefix, key->key);
     bt_json_open(json, NULL, '{');
     json_texts(json, name, key->units, key->description);
     bt_json_bool(json, "number", key->kind != BT_JSON_TEXT && key->kind != BT_JSON_GROUP &&
                  key->kind != BT_JSON_WRITTEN);
     bt_json_bool(json, "machine", key->machine);
-    bt_json_close(json, '}');
-}
-
-static void json_added(bt_json *json, const bt_quantity *quantity)
-{
-    bt_json_open(json, NULL, '{');
-    json_texts(json, quantity->summary, quantity->units, quantity->description);
-    bt_json_bool(json, "number", true);
-    bt_json_bool(json, "machine", false);
     bt_json_close(json, '}');
 }
 
@@ -123,12 +121,10 @@ void bt_quantities_list_json(void *stream)
     for (int k = 0; k < bt_n_series(); k++) json_series(&json, bt_series(k));
     bt_json_close(&json, ']');
     bt_json_open(&json, "summary", '[');
-    for (int t = 0, n; t < N_TABLES; t++) {
-        const bt_json_key *keys = table(t, &n);
-        for (const bt_json_key *key = keys; key < keys + n; key++)
-            if (key->kind != BT_JSON_ADDED) json_summary_key(&json, tables[t].prefix, key);
-    }
-    for (int k = 0; k < bt_n_added(); k++) json_added(&json, bt_added(k));
+    bt_json_key key;
+    char name[96];
+    for (int i = 0; summary_key(i, &key, name); i++)
+        if (key.kind != BT_JSON_ADDED) json_summary_key(&json, name, &key);
     bt_json_close(&json, ']');
     bt_json_open(&json, "estimates", '[');
     for (int k = 0; k < bt_n_estimates(); k++) json_estimate(&json, bt_estimate_of(k));

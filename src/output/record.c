@@ -8,10 +8,7 @@
 // until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "output/record.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "output/checkpoint.h"
@@ -39,7 +36,7 @@ static void create_series(bt_record *record)
     bt_h5_attr_int(&record->h5, "/series", "steps_per_sample", every > 1 ? every : 1);
     for (int k = 0; k < record->n_series; k++) {
         const bt_quantity *quantity = bt_series(k);
-        char *name = bt_file_join("/series", quantity->name);
+        const char *name = BT_PATH("/series", quantity->name);
         record->series[k] = bt_h5_growing(&record->h5, name, H5T_NATIVE_DOUBLE, 1, NULL,
                                           (hsize_t[]){BT_RECORD_BUFFER, 1}, false);
         bt_h5_describe(&record->h5, name, NULL, quantity->units, quantity->description);
@@ -50,13 +47,9 @@ static void create_series(bt_record *record)
         if (quantity->role != BT_ROLE_NONE) bt_h5_attr_text(&record->h5, name, "role", bt_role_names[quantity->role]);
         if (quantity->label) bt_h5_attr_text(&record->h5, name, "label", quantity->label);
         if (quantity->summary) bt_h5_attr_text(&record->h5, name, "summary", quantity->summary);
-        free(name);
     }
-    for (int k = 0; k < record->n_series; k++) { // when their time is there
-        char *name = bt_file_join("/series", bt_series(k)->name);
-        bt_h5_axes(&record->h5, name, "time");
-        free(name);
-    }
+    for (int k = 0; k < record->n_series; k++) // when their time is there
+        bt_h5_axes(&record->h5, BT_PATH("/series", bt_series(k)->name), "time");
 }
 
 static void create_events(bt_record *record)
@@ -117,18 +110,12 @@ static bt_status close_file(bt_record *record)
 
 bt_status bt_record_write_text(const bt_record *record, const char *name, const char *text, bt_errors *err)
 {
-    char *path = bt_file_join(record->dir, name);
-    const bt_status status = bt_file_write(path, text, err);
-    free(path);
-    return status;
+    return bt_file_write(BT_PATH(record->dir, name), text, err);
 }
 
 bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors *err)
 {
-    char *path = bt_file_join(record->dir, name);
-    const bt_status status = bt_file_remove(path, err);
-    free(path);
-    return status;
+    return bt_file_remove(BT_PATH(record->dir, name), err);
 }
 
 /// Prepare the folder. A resumed run removes only the unfinished file.
@@ -147,9 +134,9 @@ static bt_status prepare_dir(const bt_record *record, const char *resolved, cons
     return status;
 }
 
-static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *input,
-                             const bt_record_bodies *bodies, const char *command_line, const char *digests, bool fresh,
-                             bt_errors *err)
+bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *input,
+                         const bt_record_bodies *bodies, const char *command_line, const char *digests, bool fresh,
+                         bt_errors *err)
 {
     *out = NULL;
     bt_record *record = bt_alloc(1, sizeof *record);
@@ -168,7 +155,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     for (int k = 0; k < record->n_series; k++) record->series[k] = -1;
     for (int k = 0; k < 4; k++) record->events[k] = -1;
 
-    char *resolved = bt_case_resolved(input), *path = bt_file_join(dir, BT_RESULT_PART);
+    const char *path = BT_PATH(dir, BT_RESULT_PART);
+    char *resolved = bt_case_resolved(input);
     bt_status status = comm->rank == 0 ? bt_summary_check_added(err) : BT_OK;
     if (status == BT_OK && comm->rank == 0) status = prepare_dir(record, resolved, digests, fresh, err);
     const bool prepared = status == BT_OK && comm->rank == 0;
@@ -199,25 +187,12 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     if (status != BT_OK && prepared && fresh) bt_folder_put_back(dir);
     else if (status != BT_OK && prepared) unlink(path);
     free(resolved);
-    free(path);
     if (status != BT_OK) {
         record_free(record);
         return status;
     }
     *out = record;
     return BT_OK;
-}
-
-bt_status bt_record_open(bt_record **record, const bt_comm *comm, const char *dir, const bt_case *input,
-                         const bt_record_bodies *bodies, const char *command_line, const char *digests, bt_errors *err)
-{
-    return open_record(record, comm, dir, input, bodies, command_line, digests, true, err);
-}
-
-bt_status bt_record_reopen(bt_record **record, const bt_comm *comm, const char *dir, const bt_case *input,
-                           const bt_record_bodies *bodies, const char *command_line, bt_errors *err)
-{
-    return open_record(record, comm, dir, input, bodies, command_line, NULL, false, err);
 }
 
 bt_status bt_record_watch_splitting(bt_record *record, const struct bt_splitting *splitting,
@@ -353,17 +328,6 @@ static bt_status write_summary(const bt_record *record, const bt_run_totals *tot
     return status;
 }
 
-/// Give the closed file its final name.
-static bt_status hand_in(const bt_record *record, bt_errors *err)
-{
-    char *part = bt_file_join(record->dir, BT_RESULT_PART), *path = bt_file_join(record->dir, BT_RESULT_FILE);
-    bt_status status = bt_checksum_write(part, BT_CHECKSUM_RESULT, err);
-    if (status == BT_OK) status = bt_file_rename(part, path, err);
-    free(part);
-    free(path);
-    return status;
-}
-
 bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_snapshot *last, bool table, bt_errors *err)
 {
     const bool first = record->comm->rank == 0;
@@ -379,7 +343,9 @@ bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_sna
     bt_h5_sync_raw(&record->h5);
     bt_status status = bt_comm_agree(record->comm, close_file(record));
     // The result before the checkpoint, which refers to it; the summary last: if there is one, the rest is complete.
-    if (first && status == BT_OK) status = hand_in(record, err);
+    if (first && status == BT_OK)
+        status = bt_checksum_publish(BT_PATH(record->dir, BT_RESULT_PART), BT_PATH(record->dir, BT_RESULT_FILE),
+                                     BT_CHECKSUM_RESULT, err);
     if (first && status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
     if (first && status == BT_OK && last) status = bt_checkpoint_write(last, record->dir, BT_CHECKPOINT_FILE, err);
     if (first && status == BT_OK && totals) status = write_summary(record, totals, err);
@@ -396,9 +362,7 @@ void bt_record_abandon(bt_record *record)
 {
     bt_h5_give_up(&record->h5, BT_ERR_IO);
     close_file(record);
-    char *part = bt_file_join(record->dir, BT_RESULT_PART);
-    if (record->comm->rank == 0) unlink(part);
+    if (record->comm->rank == 0) unlink(BT_PATH(record->dir, BT_RESULT_PART));
     if (record->comm->rank == 0 && record->fresh) bt_folder_put_back(record->dir);
-    free(part);
     record_free(record);
 }

@@ -19,16 +19,14 @@ typedef struct bt_record bt_record;
 /// Collective. Open dir (made if missing), write case.resolved.yml and result.part.h5 with case, provenance and bodies;
 /// files of an earlier run in dir are removed. For result.h5 see bt_record_publish. `input` and comm must stay valid
 /// until the record is closed; `bodies` is copied. digests: of the files that the case names (case/case_files.h), or
-/// NULL; written to case.resolved.yml.
+/// NULL; written to case.resolved.yml. fresh: false for a run resumed from a checkpoint in dir: nothing is removed, and
+/// bt_record_load comes next.
 /// Errors: BT_ERR_IO on all ranks; the message, with path and remedy, on the rank concerned.
 bt_status bt_record_open(bt_record **record, const bt_comm *comm, const char *dir, const bt_case *input,
-                         const bt_record_bodies *bodies, const char *command_line, const char *digests, bt_errors *err);
+                         const bt_record_bodies *bodies, const char *command_line, const char *digests, bool fresh,
+                         bt_errors *err);
 
-/// Collective. The same for a run resumed from a checkpoint in dir, where nothing is removed. Call bt_record_load next.
-bt_status bt_record_reopen(bt_record **record, const bt_comm *comm, const char *dir, const bt_case *input,
-                           const bt_record_bodies *bodies, const char *command_line, bt_errors *err);
-
-/// After either: write the identity of the run (record_resume.c) to the file and to the checkpoints of this record.
+/// Then: write the identity of the run (record_resume.c) to the file and to the checkpoints of this record.
 /// identity: on rank 0. The status is that of rank 0: agree on it. Errors: BT_ERR_IO.
 bt_status bt_record_identify(bt_record *record, const char *identity, bt_errors *err);
 
@@ -42,7 +40,7 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err);
 
 /// Collective. Resume from the saved state: series, frames, collisions and panel loads up to it are copied from
 /// result.h5, which may hold more by now; events from `events`. Then case.resolved.yml is repaired if necessary, and
-/// the summary removed. After bt_record_reopen, bt_record_identify and bt_record_watch_impacts. Errors: BT_ERR_CASE
+/// the summary removed. After bt_record_open, bt_record_identify and bt_record_watch_impacts. Errors: BT_ERR_CASE
 /// (result.h5 is damaged, of another run, or too short), BT_ERR_IO.
 bt_status bt_record_load(bt_record *record, struct bt_snapshot *snap, const bt_events *events, bt_errors *err);
 

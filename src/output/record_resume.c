@@ -45,15 +45,13 @@ bt_status bt_record_identify(bt_record *record, const char *identity, bt_errors 
 static bool same_values(const bt_case *input, const char *text)
 {
     bt_case other;
-    bt_errors unheard = {0};
     const bool read = bt_case_read_kept(&other, input->path ? input->path : CASE_FILE, text, &input->water.table,
-                                        &input->air.table, &unheard) == BT_OK;
+                                        &input->air.table, NULL) == BT_OK;
     char *mine = bt_case_resolved(input), *its = read ? bt_case_resolved(&other) : NULL;
     const bool same = !strcmp(text, mine) || (its && !strcmp(its, mine));
     free(mine);
     free(its);
     bt_case_free(&other);
-    bt_errors_free(&unheard);
     return same;
 }
 
@@ -113,28 +111,23 @@ static void record_check_series(const bt_record *record, int k, const double *x,
 /// began. Errors: BT_ERR_IO.
 static bt_status record_keep_case(const bt_record *record, bt_errors *err)
 {
-    char *path = bt_file_join(record->dir, CASE_FILE), *text = NULL, *resolved = bt_case_resolved(record->c);
+    const char *path = BT_PATH(record->dir, CASE_FILE);
+    char *text = NULL, *resolved = bt_case_resolved(record->c);
     size_t size = 0;
-    bt_errors unheard = {0}, warnings = {0};
-    const bool read = bt_file_read(path, "a case", &text, &size, &unheard) == BT_OK;
+    const bool read = bt_file_read(path, "a case", &text, &size, NULL) == BT_OK;
     char *digests = read ? bt_case_digests_in(record->c, text) : NULL,
          *wanted = bt_case_with_digests(resolved, digests);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        if (!read || !same_values(record->c, text)) // otherwise only its comments have been edited
-            bt_errors_add(&warnings,
-                          "warning: %s: was not the case that the run began with; it is rewritten from the checkpoint",
-                          path);
         status = bt_record_write_text(record, CASE_FILE, wanted, err);
+        if (status == BT_OK && (!read || !same_values(record->c, text))) // otherwise only its comments have been edited
+            bt_errors_warn("warning: %s: was not the case that the run began with; it is rewritten from the "
+                           "checkpoint", path);
     }
-    if (status == BT_OK) bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
-    bt_errors_free(&unheard);
     free(text);
     free(resolved);
     free(digests);
     free(wanted);
-    free(path);
     return status;
 }
 
@@ -178,20 +171,15 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err)
     bt_status status = bt_comm_agree(record->comm, record->h5.status);
     if (status != BT_OK) return status;
     if (record->comm->rank == 0) {
-        char *part = bt_file_join(record->dir, BT_RESULT_PART),
-             *copy = bt_file_join(record->dir, BT_RESULT_FILE ".tmp"),
-             *path = bt_file_join(record->dir, BT_RESULT_FILE);
+        const char *copy = BT_PATH(record->dir, BT_RESULT_FILE ".tmp");
         bt_record_flush(record);
         status = record->h5.status;
-        if (status == BT_OK) status = bt_file_copy(part, copy, err);
-        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);
-        if (status == BT_OK) status = bt_file_rename(copy, path, err);
+        if (status == BT_OK) status = bt_file_copy(BT_PATH(record->dir, BT_RESULT_PART), copy, err);
+        if (status == BT_OK)
+            status = bt_checksum_publish(copy, BT_PATH(record->dir, BT_RESULT_FILE), BT_CHECKSUM_RESULT, err);
         char *xdmf = bt_record_xdmf(record);
         if (status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
         free(xdmf);
-        free(part);
-        free(copy);
-        free(path);
     }
     return bt_comm_agree(record->comm, status);
 }
@@ -276,13 +264,12 @@ static void load_series(bt_record *record, const bt_snapshot *snap, bt_h5_reader
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < record->n_series && old->status == BT_OK; k++) {
-        char *name = bt_file_join("/series", bt_series(k)->name);
+        const char *name = BT_PATH("/series", bt_series(k)->name);
         if (may_lack(k) && !bt_h5_there(old, name))
             for (int64_t i = 0; i < n; i++) x[i] = 0;
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) record_check_series(record, k, x, n, snap, old);
         if (old->status == BT_OK) bt_h5_append(&record->h5, record->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
-        free(name);
     }
     free(x);
     record->written = n;
@@ -353,7 +340,7 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
     bt_snapshot_want(snap, entries == step / every && record->n_merged == step % every, "record/entries", -1,
                      "does not fit the number of steps");
     if (record->n_merged > 0) load_merged(record, snap);
-    char *path = bt_file_join(record->dir, BT_RESULT_FILE);
+    const char *path = BT_PATH(record->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {
         load_history(&record->history, snap, step);
@@ -374,6 +361,5 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
     if (status == BT_OK && first) status = record_keep_case(record, err);
     // the summary is of an end that is no longer valid
     if (status == BT_OK && first) status = bt_record_remove(record, "summary.json", err);
-    free(path);
     return bt_comm_agree(record->comm, status);
 }

@@ -2,7 +2,6 @@
 // The state of a world as named arrays: bodies by id, cells, contacts, tow, window, collisions, events.
 #include "output/state.h"
 
-#include <assert.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>

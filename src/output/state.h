@@ -36,9 +36,8 @@ extern const bt_state_row bt_split_total_rows[];
 extern const int bt_n_split_total_rows;
 
 /// Save or load structs of the run outside the world, by their tables.
-void bt_state_save_lead(const bt_lead_stats *stats, bt_snapshot *snap);
+void bt_state_save_parts(const bt_lead_stats *stats, const bt_stall *stall, bt_snapshot *snap);
 void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap);
-void bt_state_save_stall(const bt_stall *stall, bt_snapshot *snap);
 void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 
 // --- rows of members (private to state.c and state_field.c) ----------------------------------------------------------

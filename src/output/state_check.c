@@ -11,7 +11,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "bergtow/contact.h"
 #include "contact/law.h"
@@ -66,8 +65,7 @@ void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_ve
     for (bt_idx i = 0; i < field->n && !snap->faulty; i++) {
         const int64_t first = field->offsets[i], n = field->offsets[i + 1] - first;
         bt_snapshot_want(snap, bt_state_finite(field->vertices + 2 * first, 2 * n) && is_floe(field, i),
-                         "field/offsets", i,
-                         "begins an outline that is no floe");
+                         "field/offsets", i, "begins an outline that is no floe");
         if (snap->faulty) return;
         const double *p = field->pose + 3 * (size_t)i;
         const bt_ice_floe floe = {(int)n, field->vertices + 2 * first, p[0], p[1], p[2], field->thickness[i],
@@ -125,8 +123,7 @@ static void check_cells(const bt_world *world, bt_snapshot *snap)
     check_direction(snap, &x, in_cells, world->par.period_x, cells->side_x, cells->wrap_x, cells->low_x, cells->n_x);
     check_direction(snap, &y, in_cells, world->par.period_y, cells->side_y, cells->wrap_y, cells->low_y, cells->n_y);
     bt_snapshot_want(snap, (double)cells->n_x * cells->n_y <= 4 * (double)(bodies->n_global - bodies->n_kept) + 1024,
-                     "cells/n_x", -1,
-                     "and n_y are more cells than are made for so many floes");
+                     "cells/n_x", -1, "and n_y are more cells than are made for so many floes");
     bt_snapshot_want(snap, cells->margin_max > 0 && isfinite(cells->margin_max), "cells/margin_max", -1,
                      "is not a margin");
     // Allow for rounding: another build may have computed the radii.
@@ -156,8 +153,7 @@ static void check_bodies(const bt_world *world, bt_snapshot *snap)
         bt_snapshot_want(snap, in_box(world->cells, bodies->cell[i]), "bodies/cell", g,
                          "is outside the box of the cells");
         bt_snapshot_want(snap, world->cells->relabel || bt_cells_outside(world, i) <= world->cells->allowance,
-                         "bodies/cell", g,
-                         "is too far from where the floe is");
+                         "bodies/cell", g, "is too far from where the floe is");
     }
 }
 
@@ -230,14 +226,12 @@ static void check_impacts(const bt_world *world, bt_snapshot *snap)
     for (int64_t k = 0; k < impacts->n_open && !snap->faulty; k++) {
         const bt_impact *impact = &impacts->open[k].so_far;
         bt_snapshot_want(snap, is_gid(impact->gid, n) && (k == 0 || impacts->open[k - 1].so_far.gid < impact->gid),
-                         "impacts/open", k,
-                         "is not a collision, or out of order");
+                         "impacts/open", k, "is not a collision, or out of order");
         const double real[] = {
             impact->time, impact->x, impact->y, impact->impulse, impact->approach, impact->mass, impact->thickness,
             impacts->open[k].rest, impacts->open[k].largest};
         bt_snapshot_want(snap, bt_state_finite(real, sizeof real / sizeof *real) && impact->impulse >= 0,
-                         "impacts/open", k,
-                         "is not finite");
+                         "impacts/open", k, "is not finite");
     }
 }
 
@@ -265,8 +259,7 @@ static void check_split(const bt_world *world, const bt_split_record *record, in
     if (snap->faulty) return;
     const bool piece = record->parent >= splitting->first && record->parent < splitting->first + splitting->reserve;
     bt_snapshot_want(snap, (record->corners[2] == 0) == piece && (record->generation == 1) == !piece,
-                     "splits/generation", k,
-                     "does not fit the floe");
+                     "splits/generation", k, "does not fit the floe");
     for (int i = 0; i < 3 && !snap->faulty && record->corners[i] > 0; v += 2 * record->corners[i++])
         bt_snapshot_want(snap, !bt_outline_fault((int)record->corners[i], v), "splits/vertices", k,
                          "are not the outline of a floe");

@@ -74,17 +74,14 @@ static const bt_state_row field_rows[] = {
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
 
-void bt_state_save_stall(const bt_stall *stall, bt_snapshot *snap)
+void bt_state_save_parts(const bt_lead_stats *stats, const bt_stall *stall, bt_snapshot *snap)
 {
+    bt_snapshot_add_rows(snap, "lead", lead_rows, BT_N_OF(lead_rows), stats);
     bt_snapshot_add_rows(snap, "stall", stall_rows, BT_N_OF(stall_rows), stall);
 }
 void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap)
 {
     bt_snapshot_take_rows(snap, "stall", stall_rows, BT_N_OF(stall_rows), stall);
-}
-void bt_state_save_lead(const bt_lead_stats *stats, bt_snapshot *snap)
-{
-    bt_snapshot_add_rows(snap, "lead", lead_rows, BT_N_OF(lead_rows), stats);
 }
 void bt_state_load_lead(bt_lead_stats *stats, bt_snapshot *snap)
 {

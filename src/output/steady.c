@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "geometry/path.h"
-#include "step/window.h"
 #include "case/case_tow.h"
 #include "case/track.h"
 #include "case/warning.h"
@@ -333,8 +332,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
                     "the last line parted at %g s, and nothing has towed the body since", event->time);
         else if (event->kind == BT_EVENT_LINE_BROKEN && event->time > steady->start)
             bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PARTED_IN_WINDOW,
-                    "a line parted at %g s, within the window: the means mix the time before and after",
-                    event->time);
+                    "a line parted at %g s, within the window: the means mix the time before and after", event->time);
     }
     if (!totals->window) return;
     const double places = (double)(totals->window->renewed + totals->window->missed);

@@ -185,8 +185,7 @@ static void warn_of_window(bt_summary *summary, const bt_case *input, const bt_r
     if (summary->window.verdict != BT_STEADY) {
         char *reasons = bt_warnings_text(&summary->window.reasons);
         bt_warn(&summary->warnings, summary->window.verdict == BT_TOO_SHORT ? BT_WARN_TOO_SHORT : BT_WARN_NOT_STEADY,
-                "%s: %s",
-                bt_verdict_names[summary->window.verdict], reasons);
+                "%s: %s", bt_verdict_names[summary->window.verdict], reasons);
         free(reasons);
     }
     bt_case_warn_start(input, &summary->warnings);

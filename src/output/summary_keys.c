@@ -6,7 +6,6 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "output/estimate_text.h"
@@ -183,16 +182,10 @@ static void write_events(bt_json *json, const char *key, const view *from, const
     bt_json_close(json, ']');
 }
 
-static void write_warnings(bt_json *json, const char *key, const view *from, const void *source)
+static void write_warnings(bt_json *json, const char *key, const view *from, const void *warnings)
 {
-    (void)source;
-    bt_warnings_json(json, key, &from->s->warnings);
-}
-
-static void write_reasons(bt_json *json, const char *key, const view *from, const void *source)
-{
-    (void)source;
-    bt_warnings_json(json, key, &from->s->window.reasons);
+    (void)from;
+    bt_warnings_json(json, key, warnings);
 }
 
 // --- the tables ------------------------------------------------------------------------------------------------------
@@ -217,6 +210,8 @@ static void write_reasons(bt_json *json, const char *key, const view *from, cons
 #define TEXT(key_, function, text_) {BY(TEXT, key_, "", text_), .text = function}
 #define GROUP(key_, when_, text_) {BY(GROUP, key_, "", text_), .when = when_}
 #define WRITTEN(key_, function, text_) {BY(WRITTEN, key_, "", text_), .write = function}
+#define WARNINGS(key_, member, text_) \
+    {BY(WRITTEN, key_, "", text_), .write = write_warnings, .offset = offsetof(bt_summary, member)}
 /// Mean with standard error and 95 % interval, N.
 #define MEAN(key_, member, text_) \
     OF_SUMMARY("mean_" key_ "_n", member.mean, "N", "mean over the window: " text_), \
@@ -322,7 +317,7 @@ static const bt_json_key rows[] = {
         "mean ice resistance less that by momentum, over the largest of the means"),
     GROUP("window", NULL, "the window that the means refer to"),
     TEXT("window.verdict", verdict, "steady, not steady or too short"),
-    WRITTEN("window.reasons", write_reasons, "reasons for a verdict other than steady: [{code, text, values}]"),
+    WARNINGS("window.reasons", window.reasons, "reasons for a verdict other than steady: [{code, text, values}]"),
     OF_SUMMARY("window.earliest_s", window.earliest, "s", "earliest time at which the window may begin"),
     OF_SUMMARY("window.start_s", window.start, "s", "end of the first step of the window"),
     OF_SUMMARY("window.end_s", window.end, "s", "end of its last step"),
@@ -445,7 +440,7 @@ static const bt_json_key rows[] = {
     OF_TOTALS("stopped", stopped, "", "why the run ended early"),
     WRITTEN("events", write_events, "what happened, the first 40; all are in result.h5"),
     COUNT("n_events", n_events, "1", "how many there were"),
-    WRITTEN("warnings", write_warnings, "doubts about the numbers: [{code, text, values}]"),
+    WARNINGS("warnings", warnings, "doubts about the numbers: [{code, text, values}]"),
 };
 
 /// Add keys for saved members.

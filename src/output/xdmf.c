@@ -19,7 +19,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/elementary.h"
 #include "field/map_crs.h"
 
 // --- axes ------------------------------------------------------------------------------------------------------------

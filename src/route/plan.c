@@ -3,6 +3,7 @@
 #include "bergtow/route.h"
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "route/lattice.h"
 
 #include <math.h>
@@ -440,16 +441,10 @@ static int fault_of_end(const bt_planner *planner, int end, const double at[2], 
                                                                            : BT_ROUTE_OK;
 }
 
-static int descending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x < y) - (x > y);
-}
-
 static void begin(bt_planner *planner, const bt_route_task *task)
 {
     *planner = (bt_planner){.task = *task, .penalty = 1};
-    qsort(planner->task.speed, (size_t)task->n_speeds, sizeof *task->speed, descending);
+    qsort(planner->task.speed, (size_t)task->n_speeds, sizeof *task->speed, bt_descending);
     for (int a = 0; a < 2; a++) planner->water[a] = task->water[a] - task->drift[a];
     bt_no_go_make(&planner->no_go, &planner->task);
 }

@@ -3,7 +3,6 @@
 #include "route/swath.h"
 
 #include "base/elementary.h"
-#include "bergtow/outline.h"
 
 #include <math.h>
 #include <stdlib.h>

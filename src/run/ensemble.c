@@ -9,7 +9,6 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -57,14 +56,12 @@ static void complete_journal(const bt_ensemble *ensemble)
 /// end, and the next call tries it again.
 static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status status, const bt_errors *why)
 {
-    bt_errors unrecorded = {0};
     entry->settled = true;
-    if (bt_member_record_failure(entry->folder, status, why, &unrecorded) != BT_OK &&
+    if (bt_member_record_failure(entry->folder, status, why, NULL) != BT_OK &&
         ensemble->lost++ < BT_MOST_REPORTED)
         bt_errors_add(ensemble->err,
                       "member %s failed (%d): %s; this could not be recorded, so the next call tries it again",
                       entry->m.name, (int)status, why->n ? why->text[0] : "no reason given");
-    bt_errors_free(&unrecorded);
 }
 
 /// May this group run suspects? A suspect that ends the program would also end another member run beside it, at every
@@ -156,16 +153,14 @@ static bt_status run_or_go_on(const bt_comm *group, const bt_case *input, const 
 static bt_status gather(bt_ensemble *ensemble, bool wait)
 {
     bt_status status = BT_OK;
-    bt_errors unheard = {0};
     const double t0 = bt_clock();
     const int fd = bt_member_open(ensemble->o->dir, "lock", O_RDWR | O_CREAT);
     if (fd < 0 && wait) status = bt_file_fail(ensemble->o->dir, "open the lock in the folder", errno, ensemble->err);
     else if (fd >= 0 && bt_member_take_lock(fd, wait))
         status = bt_ensemble_gather(ensemble->s, ensemble->o->dir, &ensemble->records, &ensemble->warnings,
-                                    wait ? ensemble->err : &unheard);
+                                    wait ? ensemble->err : NULL);
     if (fd >= 0 && wait) complete_journal(ensemble);
     if (fd >= 0) close(fd);
-    bt_errors_free(&unheard);
     ensemble->gathered = bt_clock();
     ensemble->gathering = ensemble->gathered - t0;
     return status;
@@ -325,7 +320,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                           bt_errors *err)
 {
     bt_status status = bt_study_fits(study, comm->size, err);
-    bt_member_records records;
     char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;
@@ -335,7 +329,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     status = bt_comm_agree(comm, status);
     if (status != BT_OK) return status;
     bt_comm_bcast(comm, digest, sizeof digest);
-    bt_member_records_begin(&records, study, digest);
 
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)study->ranks, &group);
@@ -350,9 +343,9 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                          .err = err,
                          .n_groups = comm->size / (int)study->ranks,
                          .of_group = comm->rank / (int)study->ranks,
+                         .threads = threads,
                          .alone = -1};
-    ensemble.threads = threads;
-    ensemble.records = records;
+    bt_member_records_begin(&ensemble.records, study, digest);
     if (group.rank == 0) bt_study_files_find(&ensemble.files, study);
     bt_ensemble_list(&ensemble);
     if (options->retry && comm->rank == 0) forget_failures(&ensemble);

@@ -24,7 +24,6 @@
 // or the new file. Only members whose files match their record (ensemble_record.h) are included. Members are written in
 // their order, columns in the order of their first appearance, so the file depends on the set of finished members
 // alone.
-#include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
@@ -145,7 +144,8 @@ static bt_status take_summary(table *t, int64_t m, const char *folder, bt_errors
 static hsize_t read_column(bt_h5 *h5, const char *folder, const char *group, const char *column_name, double **out)
 {
     *out = NULL;
-    char *path = bt_file_join(folder, "result.h5"), name[64];
+    const char *path = BT_PATH(folder, "result.h5");
+    char name[64];
     snprintf(name, sizeof name, "%s/%s", group, column_name);
     hsize_t n = 0;
     int errnum = 0;
@@ -162,7 +162,6 @@ static hsize_t read_column(bt_h5 *h5, const char *folder, const char *group, con
     }
     if (file >= 0) H5Fclose(file);
     if (errnum && h5->status == BT_OK) bt_h5_give_up(h5, bt_file_fail(path, "read the file", errnum, h5->err));
-    free(path);
     return n;
 }
 
@@ -171,34 +170,31 @@ static void write_series(bt_h5 *h5, const table *t, const char *dir)
     hsize_t most = 0;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
-        char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+        const char *folder = BT_PATH(BT_PATH(dir, "members"), t->name[m]);
         double *x;
         const hsize_t n = read_column(h5, folder, "/series", series[0], &x);
         if (n > most) most = n;
         free(x);
-        free(folder);
     }
     bt_h5_group(h5, "/series");
     for (int k = 0; k < N_SERIES; k++) {
-        char *name = bt_file_join("/series", series[k]);
+        const char *name = BT_PATH("/series", series[k]);
         hid_t set =
             bt_h5_growing(h5, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
         double *row = bt_alloc(most, sizeof *row);
         for (int64_t m = 0; m < t->n; m++) {
-            char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+            const char *folder = BT_PATH(BT_PATH(dir, "members"), t->name[m]);
             double *x;
             const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_column(h5, folder, "/series", series[k], &x)
                                                                     : (x = NULL, 0);
             for (hsize_t i = 0; i < most; i++) row[i] = i < n ? x[i] : (double)NAN;
             bt_h5_append(h5, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
             free(x);
-            free(folder);
         }
         free(row);
         if (set >= 0) H5Dclose(set);
         bt_h5_describe(h5, name, "member sample", bt_series_find(series[k])->units,
                        bt_series_find(series[k])->description);
-        free(name);
     }
 }
 
@@ -211,7 +207,7 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
     int64_t *member = NULL;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
-        char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
+        const char *folder = BT_PATH(BT_PATH(dir, "members"), t->name[m]);
         double *x[N_NAMES];
         hsize_t n = read_column(h5, folder, "/events", names[TIME], &x[TIME]);
         for (int k = KIND; k < N_NAMES; k++) {
@@ -225,7 +221,6 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
             bt_events_add(&all, x[TIME][i], (bt_event_kind)x[KIND][i], (int64_t)x[SUBJECT][i], x[VALUE][i]);
         }
         for (int k = 0; k < N_NAMES; k++) free(x[k]);
-        free(folder);
     }
     const hsize_t n = (hsize_t)all.n;
     double *time = bt_alloc(n, sizeof *time), *value = bt_alloc(n, sizeof *value);
@@ -271,7 +266,7 @@ static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
         bt_case_free(&input);
         bt_member_free(&member);
     }
-    char *name = bt_file_join("/parameters", parameter->name);
+    const char *name = BT_PATH("/parameters", parameter->name);
     if (number) bt_h5_write(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, value);
     else bt_h5_write_names(h5, name, (hsize_t)n, (const char *const *)text);
     const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
@@ -282,7 +277,6 @@ static void write_parameter(bt_h5 *h5, const bt_study *study, int p, int64_t n)
     bt_h5_attr_text(h5, name, "distribution", distribution);
     bt_h5_attr_text(h5, name, "source", parameter->source ? parameter->source : "");
     free(distribution);
-    free(name);
     for (int64_t m = 0; m < n; m++) free(text[m]);
     free(text);
     free(value);
@@ -314,7 +308,7 @@ static void fill(table *t, const bt_study *study, const char *dir, bt_member_rec
     for (int64_t m = 0; m < t->n; m++) {
         bt_member member;
         bt_study_member(study, m, &member);
-        char *folder = bt_text_of("%s/members/%s", dir, member.name);
+        const char *folder = BT_PATH(BT_PATH(dir, "members"), member.name);
         t->id[m] = m + 1;
         t->condition[m] = member.condition;
         t->repeat[m] = member.repeat;
@@ -326,7 +320,6 @@ static void fill(table *t, const bt_study *study, const char *dir, bt_member_rec
         if (!t->hole[m]) put_text(&t->hole[m], t->status[m] == BT_MEMBER_FAILED ? "failed" : died ? "died" : "");
         if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
         if (!t->reason[m]) t->reason[m] = bt_text_copy("");
-        free(folder);
         bt_member_free(&member);
     }
 }
@@ -393,10 +386,9 @@ static void write_all(bt_h5 *h5, const table *t, const bt_study *study, const ch
     for (int p = 0; p < study->n_parameters; p++) write_parameter(h5, study, p, t->n);
     bt_h5_group(h5, "/summary");
     for (int k = 0; k < t->n_columns; k++) {
-        char *name = bt_file_join("/summary", t->column[k].name);
+        const char *name = BT_PATH("/summary", t->column[k].name);
         bt_h5_write(h5, name, H5T_NATIVE_DOUBLE, (hsize_t)t->n, 0, t->column[k].value);
         describe(h5, name, t->column[k].key, k);
-        free(name);
     }
     write_series(h5, t, dir);
     write_events(h5, t, dir);
@@ -405,14 +397,11 @@ static void write_all(bt_h5 *h5, const table *t, const bt_study *study, const ch
     bt_warning_codes_write(h5);
     bt_h5_put_text(h5, "/study", study->text, "the study file as it was given");
     bt_h5_describe_file(h5, study->title);
-    char *path = bt_file_join(dir, "study.resolved.yml"), *resolved;
+    char *resolved;
     size_t size;
-    bt_errors unheard = {0};
-    if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK)
+    if (bt_file_read(BT_PATH(dir, "study.resolved.yml"), "a study", &resolved, &size, NULL) == BT_OK)
         bt_h5_put_text(h5, "/study_resolved", resolved, "what the members are, and the base case with every key");
-    bt_errors_free(&unheard);
     free(resolved);
-    free(path);
     bt_h5_attr_text(h5, "/", "program", "bergtow " BT_VERSION);
     bt_h5_attr_int(h5, "/", "n_members", t->n);
     bt_h5_attr_int(h5, "/", "n_finished", finished);
@@ -425,14 +414,13 @@ bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_r
 {
     table t = {0};
     fill(&t, study, dir, records);
-    char *path = bt_file_join(dir, "ensemble.h5"), *part = bt_text_of("%s.tmp", path);
+    const char *path = BT_PATH(dir, "ensemble.h5"), *part = BT_PATH(dir, "ensemble.h5.tmp");
     bt_h5 h5;
     bt_status status = bt_h5_create(&h5, part, err);
     if (status == BT_OK) {
         write_all(&h5, &t, study, dir);
         status = bt_h5_close(&h5);
-        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_ENSEMBLE, err);
-        if (status == BT_OK) status = bt_file_rename(part, path, err);
+        if (status == BT_OK) status = bt_checksum_publish(part, path, BT_CHECKSUM_ENSEMBLE, err);
         if (status != BT_OK) unlink(part);
     }
     if (status == BT_OK && t.unread)
@@ -443,8 +431,6 @@ bt_status bt_ensemble_gather(const bt_study *study, const char *dir, bt_member_r
     bt_member_notes_free(warnings);
     *warnings = t.warnings;
     t.warnings = (bt_member_notes){0};
-    free(part);
-    free(path);
     release(&t);
     return status;
 }

@@ -87,7 +87,8 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
 static bt_status keep_resolved(const char *dir, const char *text, bool *old, char digest[BT_DIGEST_TEXT],
                                bt_errors *err)
 {
-    char *path = bt_file_join(dir, "study.resolved.yml"), *before = NULL;
+    const char *path = BT_PATH(dir, "study.resolved.yml");
+    char *before = NULL;
     size_t size;
     *old = access(path, F_OK) == 0;
     bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
@@ -101,7 +102,6 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
     const char *kept = *old ? before : text;
     if (status == BT_OK) bt_checksum_digest_text(kept, strlen(kept), digest);
     free(before);
-    free(path);
     return status;
 }
 
@@ -110,23 +110,17 @@ bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_op
 {
     char *text = bt_study_resolved(study, err);
     if (!text) return BT_ERR_CASE;
-    char *members = bt_file_join(options->dir, "members"), *copy = bt_file_join(options->dir, "study.yml");
     bt_study_files files;
-    bt_errors warnings = {0};
     bool old = false;
     bt_study_files_find(&files, study);
-    bt_status status = bt_file_make_dir(members, err);
+    bt_status status = bt_file_make_dir(BT_PATH(options->dir, "members"), err);
     const int fd = status == BT_OK ? bt_member_open(options->dir, "lock", O_RDWR | O_CREAT) : -1;
     if (fd >= 0) bt_member_take_lock(fd, true); // for calls that begin together
     if (status == BT_OK) status = keep_resolved(options->dir, text, &old, digest, err);
-    if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, &warnings, err);
-    if (status == BT_OK) status = bt_file_write(copy, study->text, err);
+    if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, err);
+    if (status == BT_OK) status = bt_file_write(BT_PATH(options->dir, "study.yml"), study->text, err);
     if (fd >= 0) close(fd);
-    bt_errors_print(&warnings);
-    bt_errors_free(&warnings);
     bt_study_files_free(&files);
-    free(members);
-    free(copy);
     free(text);
     return status;
 }
@@ -161,14 +155,12 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
     bt_status status = bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &why);
     if (status == BT_ERR_CASE) {
         const int fd = bt_member_open(entry->folder, "lock", O_RDWR | O_CREAT);
-        bt_errors again = {0};
         bool busy = false; // with a single run, as by `bergtow resume`
         const int run =
-            fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(entry->folder, &busy, &again) : -1;
-        bt_errors_free(&again);
+            fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(entry->folder, &busy, NULL) : -1;
         if (run < 0 || bt_ensemble_state(entry->folder, NULL, NULL, NULL) != BT_MEMBER_FINISHED) {
             bt_errors_free(&why); // another process has found this too, or works on it
-        } else if (bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &again) ==
+        } else if (bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, NULL) ==
                    BT_OK) {
             bt_errors_free(&why); // another process has repaired it meanwhile
             status = BT_OK;
@@ -176,7 +168,6 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
             status = bt_member_record_forget(entry->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
             bt_ensemble_journal(ensemble, BT_EVENT_UNSOUND, &entry->m, 0, (int)status);
         }
-        bt_errors_free(&again);
         bt_lock_drop(entry->folder, run);
         if (fd >= 0) close(fd);
     }
@@ -263,9 +254,8 @@ void bt_ensemble_list(bt_ensemble *ensemble)
         // fields of one condition cost the same; an unreadable case fails when its turn comes
         if (entry->m.condition != priced) {
             bt_case input;
-            bt_errors unheard = {0};
             priced = entry->m.condition;
-            const bool read = bt_member_case(ensemble->s, &entry->m, &input, &unheard) == BT_OK;
+            const bool read = bt_member_case(ensemble->s, &entry->m, &input, NULL) == BT_OK;
             cost = read ? bt_cost_seconds(&input) : 0;
             alike = read && !bt_case_ice_is_random(&input);
             ensemble->fixed += alike;
@@ -275,7 +265,6 @@ void bt_ensemble_list(bt_ensemble *ensemble)
                 ice[n_ice++].member = i;
             }
             bt_case_free(&input);
-            bt_errors_free(&unheard);
         }
         entry->cost = cost;
         entry->shares = alike && ensemble->s->repeats > 1;

@@ -16,10 +16,7 @@
 
 int bt_member_open(const char *folder, const char *name, int flags)
 {
-    char *path = bt_file_join(folder, name);
-    const int fd = bt_file_descriptor(path, flags);
-    free(path);
-    return fd;
+    return bt_file_descriptor(BT_PATH(folder, name), flags);
 }
 
 bool bt_member_take_lock(int fd, bool wait)
@@ -44,15 +41,12 @@ bool bt_member_held(const char *folder)
 
 int bt_member_attempts(const char *folder)
 {
-    char *path = bt_file_join(folder, "attempts"), *checkpoint = bt_file_join(folder, BT_CHECKPOINT_FILE);
     struct stat st, last;
-    int n = stat(path, &st) == 0 ? (int)bt_min((double)st.st_size, BT_MAX_ATTEMPTS) : 0;
-    if (n > 0 && stat(checkpoint, &last) == 0 &&
+    int n = stat(BT_PATH(folder, "attempts"), &st) == 0 ? (int)bt_min((double)st.st_size, BT_MAX_ATTEMPTS) : 0;
+    if (n > 0 && stat(BT_PATH(folder, BT_CHECKPOINT_FILE), &last) == 0 &&
         (last.st_mtim.tv_sec > st.st_mtim.tv_sec ||
          (last.st_mtim.tv_sec == st.st_mtim.tv_sec && last.st_mtim.tv_nsec > st.st_mtim.tv_nsec)))
         n = 0;
-    free(path);
-    free(checkpoint);
     return n;
 }
 
@@ -66,18 +60,13 @@ void bt_member_note_attempt(const char *folder)
 
 void bt_member_forget_attempts(const char *folder)
 {
-    char *path = bt_file_join(folder, "attempts");
-    unlink(path);
-    free(path);
+    unlink(BT_PATH(folder, "attempts"));
 }
 
 // --- failures --------------------------------------------------------------------------------------------------------
 
-/// Names of the record in the folder (0) and beside it (1); the caller frees it.
-static char *record_path(const char *folder, int which)
-{
-    return bt_text_of("%s%s", folder, which ? ".failed.txt" : "/failed.txt");
-}
+/// The record is in the folder, or beside it.
+static const char *const records[] = {"/failed.txt", ".failed.txt"};
 
 bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
 {
@@ -90,33 +79,24 @@ bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_
     for (size_t i = 0; i < why->n; i++) fprintf(lines.out, "%s\n", why->text[i]);
     char *text = bt_text_end(&lines);
     bt_status status = BT_ERR_IO;
-    for (int k = 0; k < 2 && status != BT_OK; k++) {
-        char *path = record_path(folder, k);
-        bt_errors unheard = {0};
-        status = bt_file_write(path, text, k ? err : &unheard);
-        bt_errors_free(&unheard);
-        free(path);
-    }
+    for (int k = 0; k < 2 && status != BT_OK; k++)
+        status = bt_file_write(BT_BESIDE(folder, records[k]), text, k ? err : NULL);
     free(text);
     return status;
 }
 
 void bt_member_forget_failure(const char *folder)
 {
-    for (int k = 0; k < 2; k++) {
-        char *path = record_path(folder, k);
-        unlink(path);
-        free(path);
-    }
+    for (int k = 0; k < 2; k++) unlink(BT_BESIDE(folder, records[k]));
 }
 
 static bool read_failure(const char *folder, int which, int *code, char **failure, char **why)
 {
-    char *path = record_path(folder, which), *text = NULL;
+    const char *path = BT_BESIDE(folder, records[which]);
+    char *text = NULL;
     size_t size;
-    bt_errors none = {0};
     const bool there = access(path, F_OK) == 0;
-    if (there && bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
+    if (there && bt_file_read(path, "a record", &text, &size, NULL) == BT_OK) {
         char *rest = strchr(text, '\n'), *end;
         const long number = strtol(text, &end, 10);
         if (code) *code = (int)number;
@@ -124,8 +104,6 @@ static bool read_failure(const char *folder, int which, int *code, char **failur
         if (failure && *end == ' ') *failure = bt_text_of("%.*s", (int)strcspn(end + 1, "\n"), end + 1);
     }
     free(text);
-    free(path);
-    bt_errors_free(&none);
     return there;
 }
 

@@ -2,7 +2,6 @@
 // The record of a finished member; reasons in ensemble_record.h.
 #include "run/ensemble_record.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
@@ -54,9 +53,7 @@ void bt_member_notes_take(bt_member_notes *notes, int64_t member, const json_t *
 static void write_texts(bt_h5 *h5, const char *group, const char *name, const char *axis, int64_t n,
                         const char *const *texts, const char *meaning)
 {
-    char *path = bt_file_join(group, name);
-    bt_h5_put_names(h5, path, (hsize_t)n, texts, axis, meaning);
-    free(path);
+    bt_h5_put_names(h5, BT_PATH(group, name), (hsize_t)n, texts, axis, meaning);
 }
 
 void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *group, const char *axis,
@@ -64,10 +61,8 @@ void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *
 {
     if (notes->n == 0) return;
     bt_h5_group(h5, group);
-    char *path = bt_file_join(group, "member");
-    bt_h5_put(h5, path, H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member, axis, "1",
+    bt_h5_put(h5, BT_PATH(group, "member"), H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member, axis, "1",
               "number of the member in the study, from 1");
-    free(path);
     write_texts(h5, group, "code", axis, notes->n, (const char *const *)notes->code, what);
     write_texts(h5, group, "text", axis, notes->n, (const char *const *)notes->text, "the same for readers");
     write_texts(h5, group, "values", axis, notes->n, (const char *const *)notes->values, "values in it, as JSON");
@@ -125,11 +120,8 @@ static uint64_t stamp(const char *folder)
     uint64_t part[N_FILES + 1][6];
     memset(part, 0, sizeof part);
     for (int k = 0; k <= N_FILES; k++) {
-        char *path = bt_file_join(folder, k < N_FILES ? files[k] : RECORD);
         struct stat st;
-        const bool there = stat(path, &st) == 0;
-        free(path);
-        if (!there) return 0;
+        if (stat(BT_PATH(folder, k < N_FILES ? files[k] : RECORD), &st) != 0) return 0;
         const uint64_t of[6] = {(uint64_t)st.st_ino,         (uint64_t)st.st_size,
                                 (uint64_t)st.st_mtim.tv_sec, (uint64_t)st.st_mtim.tv_nsec,
                                 (uint64_t)st.st_ctim.tv_sec, (uint64_t)st.st_ctim.tv_nsec};
@@ -145,10 +137,9 @@ static bt_status make(const bt_member_records *records, const char *name, const 
 {
     int n = snprintf(text, MOST_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, records->study);
     for (int k = 0; k < N_FILES; k++) {
-        char *path = bt_file_join(folder, files[k]), digest[BT_CHECKSUM_DIGEST];
+        char digest[BT_CHECKSUM_DIGEST];
         int64_t bytes;
-        const bt_status status = bt_checksum_digest_file(path, digest, &bytes, err);
-        free(path);
+        const bt_status status = bt_checksum_digest_file(BT_PATH(folder, files[k]), digest, &bytes, err);
         if (status != BT_OK) return status;
         n += snprintf(text + n, (size_t)(MOST_TEXT - n), "%s: %" PRId64 " bytes, xxh128 %s\n", files[k], bytes, digest);
     }
@@ -157,7 +148,8 @@ static bt_status make(const bt_member_records *records, const char *name, const 
 
 bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
 {
-    char *path = bt_file_join(folder, "summary.json"), *text;
+    const char *path = BT_PATH(folder, "summary.json");
+    char *text;
     size_t size;
     json_error_t why = {0};
     *root = NULL;
@@ -170,7 +162,6 @@ bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
                          "%s: cannot be read as JSON: line %d: %s; check the disk", path, why.line, why.text);
     }
     free(text);
-    free(path);
     return status;
 }
 
@@ -180,7 +171,7 @@ static bt_status check_summary(const char *folder, bt_errors *err)
     static const char *const numbers[] = {"n_steps", "n_floes", "sim_time_s", NULL};
     json_t *root;
     if (bt_member_summary(folder, &root, err) != BT_OK) return BT_ERR_IO;
-    char *path = bt_file_join(folder, "summary.json");
+    const char *path = BT_PATH(folder, "summary.json");
     const char *missing = json_is_string(json_object_get(root, "state_hash")) ? NULL : "state_hash";
     for (int k = 0; numbers[k] && !missing; k++)
         if (!json_is_number(json_object_get(root, numbers[k]))) missing = numbers[k];
@@ -189,32 +180,27 @@ static bt_status check_summary(const char *folder, bt_errors *err)
     else if (stopped) bt_errors_add(err, "%s: is of a run that was stopped", path);
     const bt_status status = !missing && !stopped ? BT_OK : BT_ERR_IO;
     json_decref(root);
-    free(path);
     return status;
 }
 
 bool bt_member_is_whole(const char *folder, int64_t n_steps)
 {
-    bt_errors unheard = {0};
     json_t *root;
-    const bool whole = bt_member_summary(folder, &root, &unheard) == BT_OK &&
+    const bool whole = bt_member_summary(folder, &root, NULL) == BT_OK &&
                        json_integer_value(json_object_get(root, "n_steps")) >= n_steps;
     json_decref(root);
-    bt_errors_free(&unheard);
     return whole;
 }
 
 bt_status bt_member_record_write(bt_member_records *records, int64_t m, const char *name, const char *folder,
                                  bt_errors *err)
 {
-    char text[MOST_TEXT], *result = bt_file_join(folder, "result.h5"), *path = bt_file_join(folder, RECORD);
-    bt_status status = bt_checksum_check(result, BT_CHECKSUM_RESULT, NULL, err);
+    char text[MOST_TEXT];
+    bt_status status = bt_checksum_check(BT_PATH(folder, "result.h5"), BT_CHECKSUM_RESULT, NULL, err);
     if (status == BT_OK) status = check_summary(folder, err);
     if (status == BT_OK) status = make(records, name, folder, text, err);
-    if (status == BT_OK) status = bt_file_write(path, text, err);
+    if (status == BT_OK) status = bt_file_write(BT_PATH(folder, RECORD), text, err);
     if (status == BT_OK) records->seen[m] = stamp(folder);
-    free(path);
-    free(result);
     return status == BT_OK ? BT_OK : BT_ERR_IO;
 }
 
@@ -256,7 +242,8 @@ bt_status bt_member_record_check(bt_member_records *records, int64_t m, const ch
 {
     const uint64_t now = stamp(folder);
     if (now && records->seen[m] == now) return BT_OK;
-    char text[MOST_TEXT], digest[BT_CHECKSUM_DIGEST], *path = bt_file_join(folder, RECORD), *kept = NULL;
+    const char *path = BT_PATH(folder, RECORD);
+    char text[MOST_TEXT], digest[BT_CHECKSUM_DIGEST], *kept = NULL;
     size_t size = 0;
     int64_t bytes;
     bt_errors why = {0};
@@ -270,23 +257,15 @@ bt_status bt_member_record_check(bt_member_records *records, int64_t m, const ch
     records->seen[m] = status == BT_OK ? now : 0;
     bt_errors_move(err, &why);
     free(kept);
-    free(path);
     return status;
 }
 
 bt_status bt_member_record_forget(const char *folder, bt_errors *err)
 {
-    char *path = bt_file_join(folder, RECORD); // first: without it the member is waiting, whatever else is left
-    const bt_status status = bt_file_remove(path, err);
-    free(path);
+    // first: without it the member is waiting, whatever else is left
+    const bt_status status = bt_file_remove(BT_PATH(folder, RECORD), err);
     if (status != BT_OK) return status;
-    bt_errors unheard = {0}; // a new run replaces these files anyway
-    for (int k = 0; k < N_FILES; k++) {
-        path = bt_file_join(folder, files[k]);
-        bt_file_remove(path, &unheard);
-        free(path);
-    }
-    bt_errors_free(&unheard);
+    for (int k = 0; k < N_FILES; k++) bt_file_remove(BT_PATH(folder, files[k]), NULL); // a new run replaces them anyway
     bt_checkpoint_remove(folder);
     return BT_OK;
 }

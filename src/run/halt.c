@@ -4,7 +4,6 @@
 
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <unistd.h>
 
 #include "base/fileio.h"
@@ -94,10 +93,7 @@ void bt_halt_describe(const bt_halt *halt, uint64_t bits, int64_t step, char out
     if (signals) snprintf(out, 96, "signal %d after step %" PRId64, __builtin_ctzll(signals), step);
     else if (bits & by_file) snprintf(out, 96, "the file %s after step %" PRId64, STOP_FILE, step);
     else snprintf(out, 96, "the limit of %g s of wall time after step %" PRId64, halt->max_wall, step);
-    if (!(bits & by_file) || !halt->first) return;
-    char *path = bt_file_join(halt->dir, STOP_FILE);
-    unlink(path);
-    free(path);
+    if (bits & by_file && halt->first) unlink(BT_PATH(halt->dir, STOP_FILE));
 }
 
 void bt_halt_block(sigset_t *before)

@@ -63,14 +63,13 @@ static bt_status check_itself(const char *path, const char *dir, bt_errors *err)
 /// Collective. Read the case with which the run began, at time zero, and check the files that it names.
 static bt_status start_again(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
-    char *path = bt_file_join(options->dir, "case.resolved.yml");
+    const char *path = BT_PATH(options->dir, "case.resolved.yml");
     bt_status status = bt_comm_agree(comm, comm->rank == 0 ? check_itself(path, options->dir, err) : BT_OK);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_case_read(&resume->c, path, NULL, 0, err));
     if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&resume->c, options->dir, err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK && comm->rank == 0 && !options->quiet)
         printf("%s holds no checkpoint: the run starts at time zero\n", options->dir);
-    free(path);
     return status;
 }
 

@@ -4,10 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "output/checkpoint.h"
-#include "partition/domain.h"
 #include "base/checksum.h"
 #include "base/largest.h"
 #include "revision.h"
@@ -90,8 +88,7 @@ bt_status bt_running_save(bt_running *running, bt_snapshot *snap, const char *na
     // the same on all ranks so far
     if (status == BT_OK) status = bt_state_save_field(&running->field, running->w, running->comm, snap, err);
     if (running->comm->rank == 0) {
-        bt_state_save_lead(&running->totals.lead, snap);
-        bt_state_save_stall(&running->totals.stall, snap);
+        bt_state_save_parts(&running->totals.lead, &running->totals.stall, snap);
         bt_snapshot_add_int(snap, "run/frames_due", running->frames_due);
         bt_snapshot_add_int(snap, "run/unconverged_in_a_row", running->guard.in_a_row);
         bt_snapshot_add_int(snap, "run/locked_steps", running->guard.locked);
@@ -185,8 +182,7 @@ static void check_counters(const bt_running *running, bt_snapshot *snap)
 #undef ADD
     check_frames(running, snap);
     bt_snapshot_want(snap, running->guard.in_a_row >= 0 && running->guard.in_a_row <= BT_MOST_STEPS,
-                     "run/unconverged_in_a_row", -1,
-                     "is not a number of steps");
+                     "run/unconverged_in_a_row", -1, "is not a number of steps");
     bt_snapshot_want(snap, running->guard.locked >= 0 && running->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
                      "is not a number of steps");
     bt_snapshot_want(snap, !(running->guard.energy < 0), "run/energy_limit", -1, "is not an energy");

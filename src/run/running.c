@@ -8,9 +8,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <omp.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <time.h>
 
@@ -74,12 +72,9 @@ static bt_status open_record(run *running, bt_snapshot *kept, bt_errors *err)
     if (status != BT_OK) return status;
     bodies.outlines = &running->totals.outlines;
     // repeated steps must not replace the existing result
-    const bool again = kept || running->until >= 0;
-    status =
-        again ? bt_record_reopen(&running->record, running->comm, running->o->dir, running->c, &bodies,
-                                 running->o->command_line, err)
-              : bt_record_open(&running->record, running->comm, running->o->dir, running->c, &bodies,
-                               running->o->command_line, running->digests, err);
+    const bool fresh = !kept && running->until < 0;
+    status = bt_record_open(&running->record, running->comm, running->o->dir, running->c, &bodies,
+                            running->o->command_line, running->digests, fresh, err);
     bt_gather_free(&bodies);
     free(running->roster.thickness); // result.h5 has it
     running->roster.thickness = NULL;
@@ -511,9 +506,8 @@ static bt_status close_steps(run *running, bt_status status, bt_errors *err)
     } else if (status == BT_OK) {
         status = running->record ? finish(running, err) : look_last(running, err);
     } else if (running->record) {
-        bt_errors more = {0}; // after a failed write further errors say nothing new
-        bt_record_close(running->record, NULL, NULL, false, status == BT_ERR_IO ? &more : err);
-        bt_errors_free(&more);
+        // after a failed write further errors say nothing new
+        bt_record_close(running->record, NULL, NULL, false, status == BT_ERR_IO ? NULL : err);
     }
     if (status == BT_ERR_NUMERIC && running->w->step > running->first_step) running->failed = running->w->step;
     bt_halt_end(&running->halt);

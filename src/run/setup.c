@@ -4,7 +4,6 @@
 #include "base/inside.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -361,14 +360,12 @@ void bt_setup_drift(const bt_case *input, double size, double thickness, double 
     bt_world *world = one_floe(input, size, thickness, concentration);
     double thicknesses[2];
     bt_roster alone = {.n_floes = 1, .n_free = 1, .thickness = thicknesses};
-    bt_errors unfound = {0}; // NaN reports it
     if (input->body.shape != BT_BODY_ABSENT) add_towed_body(input, world, &alone);
-    if (begin_drift(input, world, &alone, &unfound)) {
+    if (begin_drift(input, world, &alone, NULL)) { // NaN reports it
         floe[0] = world->bodies.vel[0].x, floe[1] = world->bodies.vel[0].y;
         if (input->body.shape != BT_BODY_ABSENT && begins_adrift(input, world, 1, &alone))
             body[0] = world->bodies.vel[1].x, body[1] = world->bodies.vel[1].y;
     }
-    bt_errors_free(&unfound);
     bt_world_free(world);
 }
 
@@ -391,10 +388,8 @@ bt_track bt_setup_track(const bt_case *input, double size, double thickness, dou
     coarse.run.dt = input->run.duration / (POINTS - 1);
     bt_world *world = one_floe(&coarse, size, thickness, concentration);
     world->environment = bt_environment_create(&coarse);
-    bt_errors unfound = {0};
     // if not found, from rest; undisturbed ice continues from there
-    begin_drift(&coarse, world, &(bt_roster){.n_floes = 1, .n_free = 1}, &unfound);
-    bt_errors_free(&unfound);
+    begin_drift(&coarse, world, &(bt_roster){.n_floes = 1, .n_free = 1}, NULL);
     bool held[2];
     held_ice(input, concentration, held);
     bt_undisturbed_create(world, 1, held);
@@ -423,11 +418,9 @@ void bt_setup_track_free(bt_track *track)
     *track = (bt_track){0};
 }
 
-static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
-
 /// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners. A pair of
 /// bodies touches at one image only: along a period a wall extends as far as any body reaches beyond the seam.
-static int add_walls(const bt_case *input, bt_world *world, const char *names[4])
+static void add_walls(const bt_case *input, bt_world *world, const char **names)
 {
     double thick = bt_max(0.1 * bt_max(input->domain.length, input->domain.width), 5 * world->par.size);
     for (bt_idx i = 0; i < world->bodies.n && (world->par.period_x > 0 || world->par.period_y > 0); i++)
@@ -435,22 +428,18 @@ static int add_walls(const bt_case *input, bt_world *world, const char *names[4]
     const double x0 = input->domain.x0, x1 = x0 + input->domain.length, y0 = input->domain.y0,
                  y1 = y0 + input->domain.width;
     const double mid_x = 0.5 * (x0 + x1), mid_y = 0.5 * (y0 + y1), h = 0.5 * thick;
-    int n = 0;
     if (input->domain.ends == BT_BOUND_WALL) {
         const double half = 0.5 * input->domain.width + thick, s = input->domain.ends_closing;
         add_wall(input, world, x0 - h, mid_y, h, half, s, 0);
         add_wall(input, world, x1 + h, mid_y, h, half, -s, 0);
-        names[n++] = wall_names[0];
-        names[n++] = wall_names[1];
+        *names++ = "wall x low", *names++ = "wall x high";
     }
     if (input->domain.sides == BT_BOUND_WALL) {
         const double half = 0.5 * input->domain.length + thick, s = input->domain.sides_closing;
         add_wall(input, world, mid_x, y0 - h, half, h, 0, s);
         add_wall(input, world, mid_x, y1 + h, half, h, 0, -s);
-        names[n++] = wall_names[2];
-        names[n++] = wall_names[3];
+        *names++ = "wall y low", *names++ = "wall y high";
     }
-    return n;
 }
 
 /// Number of ids reserved for pieces of floes: each split adds one floe and takes two new ids.

@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "body/bodies.h"
 #include "case/case_derived.h"
@@ -222,8 +221,7 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
                           "%s: domain.%s: the period of %g m has no room for the largest body, as it turns, beside "
                           "floes[%d], which is fixed, and its image, %.4g m; cut that floe in two: fixed floes that "
                           "lie flush act as one",
-                          bt_case_name(input), k ? "width" : "length", periods[k],
-                          (int)(longest[k] - n_field), beside);
+                          bt_case_name(input), k ? "width" : "length", periods[k], (int)(longest[k] - n_field), beside);
             sound = false;
         }
         if (periods[k] > 0 && need >= periods[k]) {

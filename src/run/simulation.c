@@ -482,9 +482,8 @@ char *bt_case_unused(const char *text)
 {
     double row[2][3] = {{0}, {1e300}}; // replaces tables that the text names
     const bt_table table = {.n = 2, .row = row[0]};
-    bt_errors unheard = {0};
     bt_case input;
-    bt_case_read_kept(&input, "case", text, &table, &table, &unheard);
+    bt_case_read_kept(&input, "case", text, &table, &table, NULL);
     bt_json json = {0};
     bt_json_open(&json, NULL, '{');
     for (int k = 0; k < bt_n_case_keys; k++) {
@@ -493,7 +492,6 @@ char *bt_case_unused(const char *text)
     }
     bt_json_close(&json, '}');
     bt_case_free(&input);
-    bt_errors_free(&unheard);
     return json.text;
 }
 

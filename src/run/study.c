@@ -296,9 +296,8 @@ static void look_at_condition(const bt_study *study, int64_t condition, verdict 
 {
     bt_member member;
     bt_case input;
-    bt_errors unheard = {0};
     bt_study_member(study, condition * study->repeats, &member);
-    const bool read = bt_member_case(study, &member, &input, &unheard) == BT_OK;
+    const bool read = bt_member_case(study, &member, &input, NULL) == BT_OK;
     v->fixed = v->fixed && read && !bt_case_ice_is_random(&input);
     for (int i = 0; i < v->n; i++) {
         char key[96];
@@ -307,7 +306,6 @@ static void look_at_condition(const bt_study *study, int64_t condition, verdict 
     }
     bt_case_free(&input);
     bt_member_free(&member);
-    bt_errors_free(&unheard);
 }
 
 void bt_study_check_ice(const bt_study *study, bt_errors *err)
@@ -347,16 +345,14 @@ void bt_study_check_ice(const bt_study *study, bt_errors *err)
 static void add(bt_study_files *files, char *path)
 {
     bt_named_file file = {.path = path};
-    bt_errors unheard = {0};
     bool wanted = path && stat(path, &file.seen) == 0;
     for (int i = 0; i < files->n && wanted; i++) wanted = strcmp(files->list[i].path, path) != 0;
-    if (wanted && bt_checksum_digest_file(path, file.digest, &file.bytes, &unheard) == BT_OK) {
+    if (wanted && bt_checksum_digest_file(path, file.digest, &file.bytes, NULL) == BT_OK) {
         files->list = bt_realloc(files->list, (size_t)files->n + 1, sizeof *files->list);
         files->list[files->n++] = file;
     } else {
         free(path);
     }
-    bt_errors_free(&unheard);
 }
 
 static char *text_of(const bt_key *key, const bt_case *input)
@@ -400,12 +396,10 @@ void bt_study_files_find(bt_study_files *files, const bt_study *study)
 {
     *files = (bt_study_files){0};
     bt_case input;
-    bt_errors unheard = {0};
-    if (bt_study_base_case(study, &input, &unheard) == BT_OK)
+    if (bt_study_base_case(study, &input, NULL) == BT_OK)
         for (int k = 0; k < bt_n_case_keys; k++)
             add(files, text_of(&bt_case_keys[k], &input));
     bt_case_free(&input);
-    bt_errors_free(&unheard);
     add_of_axes(files, study);
 }
 
@@ -416,10 +410,10 @@ void bt_study_files_free(bt_study_files *files)
     *files = (bt_study_files){0};
 }
 
-bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *warnings,
-                              bt_errors *err)
+bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *err)
 {
-    char *path = bt_file_join(dir, "study.files"), *kept = NULL;
+    const char *path = BT_PATH(dir, "study.files");
+    char *kept = NULL;
     size_t size;
     bt_status status = BT_OK;
     if (access(path, F_OK) == 0)
@@ -443,14 +437,13 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         fprintf(text.out, "%s: %s", file->path, line);
         added++;
         if (old)
-            bt_errors_add(warnings, "warning: %s: nothing in %s records what it held when members were made with it; "
-                                    "it is used as it is now", file->path, dir);
+            bt_errors_warn("warning: %s: nothing in %s records what it held when members were made with "
+                           "it; it is used as it is now", file->path, dir);
     }
     char *now = bt_text_end(&text);
     if (status == BT_OK && added) status = bt_file_write(path, now, err);
     free(now);
     free(kept);
-    free(path);
     return status;
 }
 
@@ -465,12 +458,9 @@ bt_status bt_study_files_same(bt_study_files *files, bt_errors *err)
 {
     for (int i = 0; i < files->n; i++) {
         bt_named_file *file = &files->list[i], now = {0};
-        bt_errors unheard = {0};
         // a missing file is reported by a member
         if (stat(file->path, &now.seen) != 0 || same_stat(&file->seen, &now.seen)) continue;
-        const bool read = bt_checksum_digest_file(file->path, now.digest, &now.bytes, &unheard) == BT_OK;
-        bt_errors_free(&unheard);
-        if (!read) continue;
+        if (bt_checksum_digest_file(file->path, now.digest, &now.bytes, NULL) != BT_OK) continue;
         if (strcmp(now.digest, file->digest))
             return bt_fail(err, BT_ERR_CASE,
                            "%s: has changed while the members of a study were made with it: restore it and call "

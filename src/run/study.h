@@ -62,8 +62,7 @@ void bt_study_files_free(bt_study_files *files);
 
 /// Compare with DIR/study.files, and add missing entries; the caller holds DIR/lock. old: DIR has had members before,
 /// and a warning names files whose previous contents are unknown. Errors: BT_ERR_CASE, a file has changed; BT_ERR_IO.
-bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *warnings,
-                              bt_errors *err);
+bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *err);
 
 /// Are the files unchanged since they were found? They are read again only if the system reports a change. Errors:
 /// BT_ERR_CASE.

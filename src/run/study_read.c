@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "base/fileio.h"
-#include "base/largest.h"
 #include "base/name.h"
 #include "base/tree.h"
 #include "case/case_base.h"
@@ -241,16 +240,6 @@ static void count_conditions(const bt_study_reader *reader)
                       study->path);
 }
 
-static const bt_node *entry(const bt_node *root, const char *word, int *line)
-{
-    for (int i = 0; i < root->n; i++)
-        if (!strcmp(root->key[i], word)) {
-            *line = root->key_line[i];
-            return root->item[i];
-        }
-    return NULL;
-}
-
 static const bt_key *row_of(const char *key)
 {
     return &bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, key)];
@@ -260,7 +249,7 @@ static const bt_key *row_of(const char *key)
 static bool read_number(const bt_study_reader *reader, const bt_node *root, const char *key, int64_t *out)
 {
     int line;
-    const bt_node *node = entry(root, key, &line);
+    const bt_node *node = bt_tree_find(root, key, &line);
     bt_range range;
     if (!node || !bt_value_range(row_of(key), &range)) return false;
     bt_study_read_whole(reader, node, line, key, (int64_t)range.lo, (int64_t)range.hi, out);
@@ -271,7 +260,7 @@ static bool read_number(const bt_study_reader *reader, const bt_node *root, cons
 static int read_choice(const bt_study_reader *reader, const bt_node *root, const char *key)
 {
     int line;
-    const bt_node *node = entry(root, key, &line);
+    const bt_node *node = bt_tree_find(root, key, &line);
     const char *const *list = row_of(key)->choices;
     if (!node || !bt_study_is_scalar(reader, node, line, key)) return 0;
     for (int k = 0; list[k]; k++)
@@ -297,9 +286,9 @@ static void read_entries(const bt_study_reader *reader, const bt_node *root)
     bt_study *study = reader->s;
     int line = 1;
     check_words(reader, root);
-    const bt_node *node = entry(root, "title", &line);
+    const bt_node *node = bt_tree_find(root, "title", &line);
     if (node && bt_study_is_scalar(reader, node, line, "title")) study->title = bt_text_copy(node->text);
-    if ((node = entry(root, "base", &line)) && bt_study_is_scalar(reader, node, line, "base")) {
+    if ((node = bt_tree_find(root, "base", &line)) && bt_study_is_scalar(reader, node, line, "base")) {
         const char *slash = strrchr(study->path, '/');
         study->base_name = bt_text_copy(node->text);
         study->base = slash && node->text[0] != '/'
@@ -310,12 +299,12 @@ static void read_entries(const bt_study_reader *reader, const bt_node *root)
                       study->path);
     }
     study->sampling = (bt_sampling)read_choice(reader, root, "sampling"); // the reading of values depends on it
-    if ((node = entry(root, "set", &line)))
+    if ((node = bt_tree_find(root, "set", &line)))
         read_set(reader, node, line, "set", &study->set, &study->set_at, &study->n_set);
-    if ((node = entry(root, "report", &line))) read_report(reader, node, line);
-    if ((node = entry(root, "parameters", &line))) read_parameters(reader, node, line);
-    if ((node = entry(root, "variants", &line))) read_variants(reader, node, line);
-    if ((node = entry(root, "with", &line))) read_with(reader, node, line);
+    if ((node = bt_tree_find(root, "report", &line))) read_report(reader, node, line);
+    if ((node = bt_tree_find(root, "parameters", &line))) read_parameters(reader, node, line);
+    if ((node = bt_tree_find(root, "variants", &line))) read_variants(reader, node, line);
+    if ((node = bt_tree_find(root, "with", &line))) read_with(reader, node, line);
     study->fields = (bt_study_fields)read_choice(reader, root, "fields");
     for (int i = 0; i < study->n_parameters && study->sampling == BT_SAMPLING_GRID; i++)
         if (study->parameter[i].distribution != BT_UNIFORM)

@@ -2,8 +2,6 @@
 // The cut of an outline along a section (cut.h).
 #include "split/cut.h"
 
-#include <math.h>
-#include <string.h>
 
 enum { ROOM = 2 * (BT_MAX_VERTICES + 2) };
 

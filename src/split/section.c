@@ -3,7 +3,6 @@
 #include "split/section.h"
 #include "base/elementary.h"
 
-#include <assert.h>
 #include <math.h>
 #include <string.h>
 

@@ -118,8 +118,7 @@ bt_status bt_edit_place(bt_world *world, bt_gid gid, const double to[3], bt_erro
     if (!may_change(world, gid, to, err)) return BT_ERR_USAGE;
     if (gid == world->towed && world->tow && world->tow->mode != BT_TOW_NONE)
         return bt_fail(err, BT_ERR_USAGE,
-                       "body %lld: is towed, and its line or course begins where it is; move it by body.x, body.y",
-                       id);
+                       "body %lld: is towed, and its line or course begins where it is; move it by body.x, body.y", id);
     const double obstacle = obstacle_at(world, gid, to);
     if (obstacle >= 0)
         return bt_fail(err, BT_ERR_USAGE,

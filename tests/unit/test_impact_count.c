@@ -233,7 +233,7 @@ TEST(every_row_of_the_file_is_counted)
     bt_errors err = {0};
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &k.c, &b, "", NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &k.c, &b, "", NULL, true, &err), BT_OK);
     assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
     go_on(&k, r, 0, STEPS, &err);
     check_end(&k, r, in_folder("rows"), &err);
@@ -259,7 +259,7 @@ TEST(a_record_that_goes_on_counts_the_same)
         bt_record *r;
         char dir[200];
         snprintf(dir, sizeof dir, "%s", in_folder(all[i].dir));
-        assert_int_equal(bt_record_open(&r, &bt_comm_alone, dir, &k.c, &b, "", NULL, &err), BT_OK);
+        assert_int_equal(bt_record_open(&r, &bt_comm_alone, dir, &k.c, &b, "", NULL, true, &err), BT_OK);
         assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
         go_on(&k, r, 0, all[i].at - 1, &err);
         const bt_sample s = sample(all[i].at - 1); // as the others, but for one number
@@ -276,7 +276,7 @@ TEST(a_record_that_goes_on_counts_the_same)
         assert_int_equal(bt_record_publish(r, &err), BT_OK);
         bt_record_abandon(r);
         assert_int_equal(err.n, 0);
-        assert_int_equal(bt_record_reopen(&r, &bt_comm_alone, dir, &k.c, &b, "", &err), BT_OK);
+        assert_int_equal(bt_record_open(&r, &bt_comm_alone, dir, &k.c, &b, "", NULL, false, &err), BT_OK);
         assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
         const bt_status status = bt_record_load(r, &kept, &none, &err);
         if (all[i].name) {

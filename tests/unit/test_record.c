@@ -148,7 +148,7 @@ TEST(samples_merge_by_the_rule_of_their_field)
     c.output.sample_every = 4;
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("merge"), &c, &b, NULL, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("merge"), &c, &b, NULL, NULL, true, &err), BT_OK);
     for (int i = 0; i < 10; i++) { // 4 + 4 + 2
         bt_sample s = sample(i);
         s.ice_resistance = i;
@@ -239,7 +239,7 @@ TEST(an_empty_field_can_be_recorded)
                                 .names = names,
                                 .towed = 0};
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, NULL, true, &err), BT_OK);
     const bt_frame_row row = {.x = 1, .y = 2, .yaw = 3, .speed = 1};
     assert_int_equal(bt_record_frame(r, 0, &row, NULL, NULL, 0, &err), BT_OK);
     const bt_run_totals t = totals(0);
@@ -274,7 +274,7 @@ TEST(many_floes_are_packed)
                                 .area = ones,
                                 .towed = -1};
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, NULL, true, &err), BT_OK);
     assert_int_equal(bt_record_frame(r, 0, rows, NULL, NULL, 0, &err), BT_OK);
     const bt_run_totals t = totals(0);
     assert_int_equal(bt_record_close(r, &t, NULL, false, &err), BT_OK);

@@ -20,7 +20,7 @@ TEST(a_failed_run_leaves_no_old_summary)
     assert_int_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("again"), &c, &b, NULL, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("again"), &c, &b, NULL, NULL, true, &err), BT_OK);
     assert_int_not_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const bt_sample s = sample(0);
     bt_record_sample(r, &s, &err);
@@ -53,7 +53,7 @@ static void check_killed(bool frames)
         const bt_case c = made_up_case();
         const bt_record_bodies b = bodies();
         bt_record *r;
-        if (bt_record_open(&r, &bt_comm_alone, in_folder("killed"), &c, &b, NULL, NULL, &err) != BT_OK) _exit(1);
+        if (bt_record_open(&r, &bt_comm_alone, in_folder("killed"), &c, &b, NULL, NULL, true, &err) != BT_OK) _exit(1);
         for (int i = 0; i < 700; i++) {
             const bt_sample s = sample(i);
             bt_record_sample(r, &s, &err);

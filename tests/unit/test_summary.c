@@ -78,7 +78,7 @@ static char *summary_of(bt_case *c, int steps, const bt_run_totals *t, bt_idx to
     bt_record_bodies b = bodies();
     b.towed = towed;
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("s"), c, &b, "", NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("s"), c, &b, "", NULL, true, &err), BT_OK);
     for (int i = 0; i < steps; i++) {
         bt_sample s = sample(i);
         if (spoil) spoil(&s, i);
