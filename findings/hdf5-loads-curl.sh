@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The HDF5 library of Debian 12 can read from object storage. So each program that only writes a local file also loads an
-# HTTP client with Kerberos, LDAP and two TLS libraries: a cost at each start of a program that runs by the thousand.
+# The HDF5 library of Debian 12 can read from object storage. So each program that only writes a local file also loads
+# an HTTP client with Kerberos, LDAP and two TLS libraries: a cost at each start of a program that runs by the thousand.
 # shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
 fetch libhdf5-103-1=1.10.8+repack1-1

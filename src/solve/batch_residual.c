@@ -141,13 +141,13 @@ static bool sheets_are_on(look *o, const bt_contact *contact, const bt_mass *m, 
     return contact->ln[0] + contact->ln[1] > 0 || contact->lt != 0 || r > 0;
 }
 
-/// Marks of contacts. UNSEEN: in no batch. LEAVES: in a batch, but no longer to be swept. LISTED: to be swept, as a lane
+/// Marks of contacts. UNSEEN: in no batch. LEAVES: in a batch, but no longer to be swept. LISTED: to be swept; a lane
 /// of a mask.
 enum { UNSEEN = 0, LEAVES = 1, LISTED = -1 };
 
 /// Residuals of contacts index[n] of the cell. Returns which are to be swept.
-BT_INLINE bt_mask look_at_records(look *o, const bt_cell *cell, bool bounded, const bt_contact *const contact[BT_LANES],
-                                  const bt_idx index[BT_LANES], int n)
+BT_INLINE bt_mask look_at_records(look *o, const bt_cell *cell, bool bounded,
+                                  const bt_contact *const contact[BT_LANES], const bt_idx index[BT_LANES], int n)
 {
     const bt_limit *limit[BT_LANES];
     for (int l = 0; bounded && l < BT_LANES; l++) limit[l] = &cell->laws->limits[index[l]];
