@@ -443,7 +443,7 @@ static void add_candidate(const bt_world *world, const bt_bodies *bodies, bt_idx
                      size = round[axis] ? INFINITY : bodies->radius[i];
         new.low[axis] = d - size, new.high[axis] = d + size;
     }
-    BT_MAKE_ROOM(room->candidate, room->n_candidates, room->cap_candidates, 64);
+    BT_MAKE_ROOM(room->candidate, room->n_candidates, room->cap_candidates, 1024); // most cells have several hundred
     room->candidate[room->n_candidates++] = new;
 }
 
