@@ -61,7 +61,7 @@ def _within(text, number, fits, words):
 
 def between(least, most, kind=float):
     """Argparse type for a number of a kind in a closed interval."""
-    words = f"no {'whole ' * (kind is int)}number from {least:g} to {most:g}"
+    words = f"not a {'whole ' * (kind is int)}number from {least:g} to {most:g}"
     return lambda text: _within(text, kind, lambda x: least <= x <= most, words)
 
 

@@ -193,8 +193,8 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
         return script("capability", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
     for words, wrong in ((("--resolution", "0"), "--resolution 0: is not above 0 and at most the range"),
                          (("--resolution", "1 m"), "--resolution 1 m: \"m\" after the number; give a plain number"),
-                         (("--speed", "0 m/s"), "--speed 0 m/s: is not above 0"),
-                         (("--speed", "3 m"), "--speed 3 m: m is the unit of")):
+                         (("--speed", "0 m/s"), "--speed: 0 m/s is not above zero"),
+                         (("--speed", "3 m"), "--speed: 3 m: m is the unit of")):
         done = said(*words)
         assert done.returncode == 2 and wrong in done.stderr, done.stderr
     done = said("--search", "ice.size", "--from", "0.4 m", "--to", "0.8 m", "--resolution", "5 cm", "--speed", "0.1 kn",

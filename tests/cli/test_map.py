@@ -475,5 +475,5 @@ def test_the_scale_of_a_projection_is_said(tmp_path, crs, north, along, across):
     case = changed(FRAMES["geographic"], ice__origin_east=east, ice__origin_north=north)
     r = call("check", write_case(tmp_path, case))
     assert r.returncode == DONE, r.stderr
-    said = re.search(r"scale factor, at x = y = 0 ([\d.]+) along the meridian and ([\d.]+) across", r.stdout)
+    said = re.search(r"scale factor \(at x = y = 0 ([\d.]+) along the meridian and ([\d.]+) across", r.stdout)
     assert (float(said[1]), float(said[2])) == pytest.approx((along, across), abs=1e-3)

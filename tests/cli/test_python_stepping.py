@@ -444,7 +444,7 @@ def test_bodies_are_changed_by_hand_within_limits():
         assert np.allclose(sim.positions[1], (*free, 0.5), atol=1e-3)
         for refused, match in (((2, *free, 0), "would lie over body 1"), ((2, 99, 0, 0), "outside the domain"),
                                ((2, math.nan, 0, 0), "finite"), ((sim.towed, 5, 0, 0), "prescribed"),
-                               ((99999, 5, 0, 0), "there is none")):
+                               ((99999, 5, 0, 0), "does not exist")):
             before = sim.state_hash
             with pytest.raises(bergtow.BergtowError, match=match):
                 sim.set_position(*refused)
