@@ -34,7 +34,7 @@ static const struct {
            "find out how a result depends on the computation: width, length, time step, tolerance, start"),
     PYTHON("budget",
            "find out how much of the scatter comes from the fields, each assumed value, and the computation"),
-    PYTHON("capability", "find out how fast a vessel tows in which ice, and what ice stops it"),
+    PYTHON("capability", "find out how fast a vessel can tow in given ice, and what ice stops it"),
     PYTHON("design", "write the report of the design tow force of a case or a study, as a page and as PDF"),
     PYTHON("route", "plan the path and the speed of a tow through known ice, and verify them by simulated tows"),
     PYTHON("outlines", "convert a map of the ice (outlines or an image of labels) into floes for ice.outlines"),

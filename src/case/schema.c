@@ -291,7 +291,7 @@ bt_key bt_case_keys[] = {
     REAL("tow.ramp", tow.ramp, TIME,
          "= the longer of 2 periods of the body on its line and the time to tow it by its own size at "
          "tow.speed", "[0, 1e7]",
-         "time in which the speed rises linearly from 0, assumed; with a programme, the time at which it reaches its "
+         "time over which the speed rises linearly from 0, assumed; with a programme, the time at which it reaches its "
          "largest speed"),
     {.name = "tow.programme",
      .type = BT_KEY_POINTS,

@@ -23,7 +23,7 @@ COMMANDS = {
                  "tolerance, start"),
     "budget": ("study.budget", "find out how much of the scatter comes from the fields, each assumed value, and the "
                "computation"),
-    "capability": ("study.capability", "find out how fast a vessel tows in which ice, and what ice stops it"),
+    "capability": ("study.capability", "find out how fast a vessel can tow in given ice, and what ice stops it"),
     "route": ("routing.route",
               "plan the path and the speed of a tow through known ice, and verify them by simulated tows"),
     "outlines": ("maps.outlines",
