@@ -78,14 +78,13 @@ static void warn(const bt_total_value *total, double size, bt_errors *warnings)
             depth, 100 * depth / size);
 }
 
-/// Thickness that is crushed when a and b are pressed together, m; 0 = neither is ice.
-static double thickness_of(const bt_bodies *bodies, bt_idx a, bt_idx b)
+double bt_crush_thickness(const bt_bodies *bodies, bt_idx a, bt_idx b)
 {
     const double ha = bodies->thickness[a], hb = bodies->thickness[b];
     return ha > 0 && hb > 0 ? bt_min(ha, hb) : bt_max(ha, hb);
 }
 
-static bool applies(const bt_world *world, bt_idx a, bt_idx b) { return thickness_of(&world->bodies, a, b) > 0; }
+static bool applies(const bt_world *world, bt_idx a, bt_idx b) { return bt_crush_thickness(&world->bodies, a, b) > 0; }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
@@ -248,7 +247,7 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     const bt_contact *contact = &cell->contacts[j];
     bt_gaps *gaps = &cell->gaps[j];
     bt_limit *limit = &cell->laws->limits[j];
-    const double h = thickness_of(bodies, manifold->a, manifold->b), dt = world->par.dt,
+    const double h = bt_crush_thickness(bodies, manifold->a, manifold->b), dt = world->par.dt,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, slop = world->par.slop;
     const bt_mass mass = bt_mass_of(contact, bodies->inv);

@@ -63,4 +63,7 @@
 /// Its parameters from the case: p, Pa, 0 = contacts are rigid; least length of a contact / ice thickness.
 enum { BT_CRUSH_PRESSURE, BT_CRUSH_LEAST };
 
+/// Thickness that is crushed when bodies a and b are pressed together, m: that of the thinner ice; 0 = neither is ice.
+double bt_crush_thickness(const bt_bodies *bodies, bt_idx a, bt_idx b);
+
 #endif

@@ -92,7 +92,7 @@ static centre centre_of(const bt_world *world, const bt_cell *cell, bt_idx j)
         c.length = (2 * bt_min(s0, s1) + is_raft_edge(world, cell, j)) * fabs(contact->ran[1] - contact->ran[0]);
     const bt_bodies *bodies = &world->bodies;
     const double pressure = world->par.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE],
-                 h = bt_max(bodies->thickness[contact->a], bodies->thickness[contact->b]);
+                 h = bt_crush_thickness(bodies, contact->a, contact->b);
     if (pressure > 0) c.length = bt_max(c.length, total / world->par.dt / (pressure * h));
     return c;
 }
@@ -110,12 +110,12 @@ static bool is_collision(const bt_world *world, const bt_collision *collision)
     return rule->conversion != BT_IMPACT_NONE && collision->impulse > 0 && collision->approach >= rule->least_speed;
 }
 
-/// Peak force of a collision, N; the thinner ice is crushed.
+/// Peak force of a collision, N.
 static double peak_of(const bt_world *world, const bt_contact *contact, const bt_collision *collision, double corner)
 {
-    const double a = world->bodies.thickness[contact->a], b = world->bodies.thickness[contact->b];
     bt_impact impact = {.impulse = collision->impulse, .approach = collision->approach, .mass = collision->mass,
-                        .corner = corner, .thickness = a > 0 && b > 0 ? bt_min(a, b) : bt_max(a, b)};
+                        .corner = corner,
+                        .thickness = bt_crush_thickness(&world->bodies, contact->a, contact->b)};
     bt_impact_convert(&world->splitting->rule, &impact);
     return impact.peak;
 }

@@ -5,6 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from shapely.geometry import Polygon
 
 from harness import CASE, TOW, call, changed, run, write_case
 
@@ -102,6 +103,38 @@ def test_what_a_blunt_corner_or_a_face_does(tmp_path):
 
 def test_a_vertex_that_cannot_go_in_opens_nothing(tmp_path):
     assert len(hit(tmp_path, 30.0, np.radians(30), 1.5, ice__crushing={})[1]["parent"]) == 0
+
+
+def squeezed(thickness, toughness):
+    """A floe of 1 m between two round ones of this thickness and always the same mass, one of them fixed: what it bears
+    is what 1 m of ice bears before it crushes."""
+    a, radius = np.radians(np.arange(-40, 41, 8)), 15.0
+    arc = np.column_stack([radius * (np.cos(a) - 1), radius * np.sin(a)])
+    segment = Polygon(arc)
+    length = (1200 / thickness - segment.area) / (2 * arc[-1, 1])
+    ring = np.vstack([arc, arc[[-1, 0]] - [length, 0]])
+    tip = -Polygon(ring).centroid.x
+    ring[:, 0] += tip
+    return {
+        "run": {"dt": 0.02, "duration": 2.0},
+        "domain": {"length": 400, "width": 200, "x0": -200, "y0": -100},
+        "ice": {"concentration": 0, "size": 30, "thickness": 1, "friction": 0,
+                "drag": {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0},
+                "crushing": {"pressure": 0.15e6, "least_length": 0}, "splitting": {"toughness": toughness}},
+        "body": {"shape": "none"}, "impact": {"conversion": "none"}, "output": {"frame_interval": -1},
+        "floes": [square(30.0, vx=0.0, vy=0.0, thickness=1.0),
+                  polygon(ring, -15.001 - tip, thickness=thickness, vx=1.9, vy=0.0),
+                  polygon(-ring, 15.001 + tip, thickness=thickness, fixed=True)]}
+
+
+def test_a_thicker_neighbour_bears_on_no_shorter_length(tmp_path):
+    """The thinner ice is crushed, so that force and bearing length do not depend on the thickness of the other."""
+    first = []
+    for thickness in (1.0, 4.0):
+        assert len(read(run(tmp_path / f"strong{thickness}", squeezed(thickness, 100e3)).dir)["parent"]) == 0
+        made = read(run(tmp_path / f"weak{thickness}", squeezed(thickness, 60e3)).dir)
+        first.append((made["time"][0], made["mode"][0], made["parent"][0], made["ratio"][0]))
+    assert first[0][:3] == first[1][:3] and first[0][3] == pytest.approx(first[1][3], rel=0.03)
 
 
 def test_a_split_keeps_area_momentum_and_energy(tmp_path):
