@@ -130,11 +130,13 @@ static void advance(bt_world *world)
 enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOLVED, ENERGY, POINTS, ACTIVE,
        N_BALANCE };
 
-/// Momentum gained by bodies, and impulses received from bodies of infinite mass, separately.
+/// Momentum gained by bodies, and impulses received from bodies of infinite mass, separately. An energy with which the
+/// total might exceed what a sum holds is not a number.
 static void balance_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
     const bt_bodies *bodies = &world->bodies;
+    const double most = 0x1p62 / bodies->n_global;
     const bt_cells *ts = world->cells;
     const bt_cell *cell = &ts->cell[k];
     if (!cell->own) return;
@@ -150,8 +152,8 @@ static void balance_cell(bt_world *world, bt_idx k, const void *context, bt_tota
         }
         if (v->x == 0 && v->y == 0 && v->w == 0) continue;
         bt_sum_add(&totals->sum[CARRIED], bodies->mass[i] * (fabs(v->x) + fabs(v->y)));
-        bt_sum_add(&totals->sum[ENERGY],
-                   0.5 * (bodies->mass[i] * (v->x * v->x + v->y * v->y) + bodies->inertia[i] * v->w * v->w));
+        const double energy = 0.5 * (bodies->mass[i] * (v->x * v->x + v->y * v->y) + bodies->inertia[i] * v->w * v->w);
+        bt_sum_add(&totals->sum[ENERGY], energy < most ? energy : NAN);
     }
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];

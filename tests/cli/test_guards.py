@@ -44,8 +44,17 @@ def test_floes_beyond_walls_end_the_run_at_the_step_they_pass(tmp_path):
     assert said[0] in call("resume", r.dir / "failure.h5", "--quiet").stderr
 
 
-def test_energy_that_overflows_ends_the_run(tmp_path):
-    r = run(tmp_path, HEAVY, "--quiet", code=NUMERIC)
+#: floes each of whose energies fits into a sum, but not the four together
+FOUR = {"run": {"dt": 1, "duration": 5},
+        "domain": {"length": 2e6, "width": 2e6, "x0": -1e6, "y0": -1e6},
+        "ice": {"concentration": 0, "thickness": 100, "start": "rest"}, "body": {"shape": "none"},
+        "tow": {"mode": "none"},
+        "floes": [{"shape": "square", "length": 9e4, "x": x, "y": 0, "vx": 95} for x in (-4e5, -2e5, 2e5, 4e5)]}
+
+
+@pytest.mark.parametrize("case", [HEAVY, FOUR])
+def test_energy_that_overflows_ends_the_run(tmp_path, case):
+    r = run(tmp_path, case, "--quiet", code=NUMERIC)
     said = (r"step 1: kinetic_energy \(kinetic energy of all dynamic bodies.*\) is not a number, "
             r"or a sum of numbers too large")
     assert re.search(said, r.result.stderr), r.result.stderr
