@@ -338,6 +338,17 @@ def test_a_body_that_does_not_come_on_is_no_steady_tow(tmp_path):
     assert r.summary["window"]["verdict"] == "not steady" and "it makes no headway" in r.reason, r.reason
 
 
+@pytest.mark.parametrize("direction", [0, 180])
+def test_where_the_tow_asks_for_no_way_there_is_none_to_miss(tmp_path, direction):
+    """A free body has no direction: it may drift either way."""
+    case = {"run": {"dt": 1, "duration": 600}, "domain": {
+        "frame": "geographic", "length": 4000, "width": 2000, "ends": "open", "sides": "open"},
+            "ice": {"concentration": 0, "thickness": 1}, "body": {"length": 100, "x": 2000, "draft": 50},
+            "water": {"current_x": -0.3}, "tow": {"mode": "none", "direction": direction}}
+    r = run(tmp_path, case, "--quiet")
+    assert "headway" not in json.dumps(r.summary["window"]), r.summary["window"]
+
+
 def test_the_step_is_held_against_the_speed_of_the_ice(tmp_path):
     """Red at the 0.02 m/s of the tow: the ice comes at 0.5."""
     case = changed(ROUND, domain__ends="moving", tow__speed=0.02, water={"current_x": -0.48}, run__dt=10,
