@@ -20,7 +20,9 @@ BERGTOW = os.path.abspath(os.environ.get("BERGTOW", ROOT / "build/release/bergto
 # Assertions, checks of the division among ranks, threads in every parallel loop, and sanitizers: make CONFIG=asan.
 VALIDATE = os.path.abspath(os.environ.get("BERGTOW_VALIDATE", ROOT / "build/asan/bergtow"))
 FAULT = pathlib.Path(BERGTOW).parent / "tests/fault/fault.so"  # tests/fault/fault.c
-# How ranks are started; for a build with MPICH: MPIRUN=mpirun.mpich.
+# How ranks are started; for a build with MPICH: MPIRUN=mpirun.mpich. Open MPI looks for the networks of clusters for
+# 0.2 s of every start unless it is told which component passes the messages.
+os.environ.setdefault("OMPI_MCA_pml", "ob1")
 MPIRUN = shlex.split(os.environ.get("MPIRUN", "mpirun --oversubscribe"))
 RANK = "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"  # in a shell that the launcher starts
 DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6

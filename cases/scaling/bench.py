@@ -45,7 +45,7 @@ COLUMNS = [
     "ns_per_floe_step",
     PHASE_SHARE, "mean_sweeps", "contacts", "contact_sweeps_per_s", "speedup", "step_speedup", "efficiency",
     "weak_efficiency", "weak_solve_efficiency", "imbalance", "edge_cut", "halo_share", "bytes_per_floe", "sweep_gb_s",
-    "triad_gb_s", "sweep_of_triad", "unconverged", "state_hash"
+    "triad_gb_s", "sweep_of_triad", "round_trip_ns", "unconverged", "state_hash"
 ]
 #: passed on from summary.json where it has them
 FROM_SUMMARY = {
@@ -176,13 +176,23 @@ def triad_size():
     return max(16, min(mib, memory // 10))
 
 
-def triad(threads, o):
-    """GB/s of STREAM's triad, the best of 15 as STREAM reports it."""
+def triad_says(o, *words):
+    """What triad prints, as numbers."""
     env = dict(os.environ, OMP_PROC_BIND="true", OMP_PLACES="cores")
-    done = subprocess.run([o.triad, str(threads), str(o.triad_mib)], env=env, capture_output=True, text=True)
+    done = subprocess.run([o.triad, *map(str, words)], env=env, capture_output=True, text=True)
     if done.returncode:
         fail(f"{o.triad}: {done.stderr.strip() or done.returncode}")
-    return float(done.stdout.split()[2])
+    return [float(x) for x in done.stdout.split()]
+
+
+def triad(threads, o):
+    """GB/s of STREAM's triad, the best of 15 as STREAM reports it."""
+    return triad_says(o, threads, o.triad_mib)[2]
+
+
+def round_trip(cores, o):
+    """Time in which a cache line goes from one core to another and back, ns; None on one core."""
+    return triad_says(o, 2, 1, 1)[4] if cores > 1 else None
 
 
 def describe_machine(o, load_before, triads, ranks_reason):
@@ -254,6 +264,7 @@ def tables(records, triads):
                              if sweep and row["contact_sweeps_per_s"] else None)
         row["triad_gb_s"] = median(triads.get(cores, []))
         row["sweep_of_triad"] = ratio(row["sweep_gb_s"], row["triad_gb_s"])
+        row["round_trip_ns"] = median([r.get("round_trip") for r in runs])
         row.update({"unconverged": first["unconverged"], "state_hash": first["hash"]})
         rows.append(row)
     return rows
@@ -337,9 +348,11 @@ def measure(o, with_ranks):
             group = []
             for _ in range(repeats):
                 for ranks, threads in configs:
+                    trip = round_trip(ranks * threads, o)
                     r = run_once(scene, n, ranks, threads, steps, o)
                     if isinstance(r, str):
                         fail(r)
+                    r["round_trip"] = trip
                     if (r["ranks"], r["threads"]) != (ranks, threads):
                         fail(f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × "
                              f"{r['threads']}")

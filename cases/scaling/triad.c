@@ -2,12 +2,19 @@
 // STREAM's triad a[i] = b[i] + s c[i]: the memory bandwidth that this machine gives to a loop (McCalpin 1995, IEEE
 // TCCA).
 //
-//     triad THREADS MIB [REPEATS]      arrays of MIB mebibytes each; prints "threads mib best_gb_s median_gb_s"
+//     triad THREADS MIB [REPEATS]      arrays of MIB mebibytes each; prints
+//                                      "threads mib best_gb_s median_gb_s round_trip_ns"
+//
+// The last number, 0 for one thread, is the time in which a cache line goes from one core to another and back: what two
+// threads pay for every floe that both of them move. On a virtual machine it may change fivefold within minutes, with
+// the places where the host runs its cores.
 //
 // Counted as STREAM counts: 24 bytes an element, without the read that a store of a whole cache line may cost. Arrays
 // four times the last cache, as STREAM asks; each thread touches its own part first.
 #include <errno.h>
 #include <omp.h>
+#include <sched.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -28,6 +35,26 @@ static long number(const char *name, const char *text, long lo, long hi)
         exit(2);
     }
     return v;
+}
+
+/// Time of one exchange of a cache line between two threads and back, ns; 0 if there are no two.
+static double round_trip(void)
+{
+    enum { TRIPS = 20000, SPINS = 2000 };
+    static _Atomic long turn;
+    double time = 0;
+#pragma omp parallel num_threads(2)
+    if (omp_get_num_threads() == 2) {
+        const int me = omp_get_thread_num();
+        const double t0 = omp_get_wtime();
+        for (long i = 0; i < TRIPS; i++) {
+            for (long n = 0; atomic_load_explicit(&turn, memory_order_acquire) != 2 * i + me; n++)
+                if (n > SPINS) sched_yield();
+            atomic_store_explicit(&turn, 2 * i + me + 1, memory_order_release);
+        }
+        if (me == 1) time = 1e9 * (omp_get_wtime() - t0) / TRIPS;
+    }
+    return time;
 }
 
 int main(int argc, char **argv)
@@ -69,7 +96,8 @@ int main(int argc, char **argv)
         }
     }
     qsort(rate, (size_t)repeats, sizeof *rate, ascending);
-    printf("%d %ld %.3f %.3f\n", threads, mib, rate[repeats - 1], rate[repeats / 2]);
+    printf("%d %ld %.3f %.3f %.0f\n", threads, mib, rate[repeats - 1], rate[repeats / 2],
+           threads > 1 ? round_trip() : 0);
     free(a);
     free(b);
     free(c);

@@ -56,6 +56,7 @@ def test_rows_are_the_runs(small):
         shares = [float(r[name]) for name in r if name.endswith("_share") and name != "halo_share"]
         assert 0 < sum(shares) <= 1.001 and float(r["solve_share"]) > 0
         assert float(r["triad_gb_s"]) > 0.1
+        assert (float(r["round_trip_ns"]) > 10) if int(r["ranks"]) * int(r["threads"]) > 1 else r["round_trip_ns"] == ""
         if int(r["ranks"]) == 1:
             assert 300 < float(r["bytes_per_floe"]) < 1e6
     hashes = {(r["scene"], r["asked"]): r["state_hash"] for r in rows}

@@ -265,7 +265,9 @@ def test_cases_are_valid_with_what_a_call_sets(path):
 def test_the_manual_has_every_command():
     """Or postproc/README.md has it. And the commands of this test are the program's."""
     text = "".join((ROOT / page).read_text() for page in ("docs/manual.md", "postproc/README.md"))
-    assert set(re.findall(r"^  ([a-z][a-z-]*) +", help_of(), re.M)) == COMMANDS
+    listed = dict(re.findall(r"^  ([a-z][a-z-]*) +(.*)$", help_of(), re.M))
+    assert set(listed) == COMMANDS
+    assert {name: listed[name] for name in cli.COMMANDS} == {name: about for name, (_, about) in cli.COMMANDS.items()}
     assert {words[0] for _, words in calls(text)} >= COMMANDS
 
 

@@ -182,8 +182,9 @@ def test_one_rank_may_do_it_all(alone, name, ranks):
 
 
 def test_a_field_is_divided_while_that_pays(tmp_path):
-    """Walls close on 9,000 floes: at first next to none touch, and one rank has all; then sharing pays."""
-    case = changed(PRESS, domain__length=200, domain__width=40, ice__concentration=0.8, run__duration=6,
+    """Walls close on 9,000 floes: at first next to none touch, and one rank has all; then sharing pays, as the first
+    look after 20 steps tells."""
+    case = changed(PRESS, domain__length=200, domain__width=40, ice__concentration=0.8, run__duration=2.6,
                    solver__max_sweeps=None, domain__ends_closing=2, domain__sides_closing=0)
     one = run(tmp_path, case, "--threads", 1, "--quiet")
     r = many(tmp_path, 2, 1, name="two", env=environment(OMP_NUM_THREADS=1, BERGTOW_DIVIDE=""))

@@ -77,17 +77,9 @@ def arguments(name, *words):
 def perform(name, *words):
     """Run a command in this process. Raises the same errors as arguments()."""
     a = arguments(name, *words)
-    with _look():
+    style = sys.modules.get("bergtow.plot.style")  # a command that need not draw loads it when it does
+    with style.look() if style else nullcontext():
         a.perform(a)
-
-
-def _look():
-    """The style of pictures. Without matplotlib no style is needed: the command draws nothing."""
-    try:
-        from bergtow.plot import style
-    except ModuleNotFoundError:
-        return nullcontext()
-    return style.look()
 
 
 def main():

@@ -14,6 +14,7 @@ def rings(geometries):
     return [np.asarray(p.exterior.coords)[:, :2] for g in geometries for p in parts_of(g)]
 
 
+@style.look()
 def draw(found, floes, rules, plane, path, force):
     """Left: the map in the plane. Right: the floes on the map, with the parts left out or cut away in red."""
     x0, y0, x1, y1 = bounds_of([s.geometry for s in found.shapes])

@@ -283,13 +283,15 @@ def numbers(found):
     return out
 
 
-def draw(found, plan, some, s, goal, bold):
+def draw(found, plan, some, s, goal, bold, path, force):
     from bergtow.plot import route as picture
+    from bergtow.plot import style
     shown = [c for c in some
              if not np.isfinite(c.speed) or c.speed == max(x.speed for x in some if np.isfinite(x.speed))]
     e = plan.cover_extent
-    return picture.figure(f"{found['title']}: routes", words.answer(found), s.place, s.extent, plan.cover,
-                          e, s.ice.outlines, s.no_go, shown, bold, goal)
+    with style.look():
+        writing.save(picture.figure(f"{found['title']}: routes", words.answer(found), s.place, s.extent, plan.cover,
+                                    e, s.ice.outlines, s.no_go, shown, bold, goal), path, force)
 
 
 class Files:
@@ -304,8 +306,7 @@ class Files:
         output.geojson(self.some, place, numbers(found), folder / "routes.geojson", self.force)
         if picture:
             bold = (found.get("verdict") or {}).get("recommended") or (found.get("verdict") or {}).get("straight")
-            writing.save(draw(writing.plain(found), self.plan, self.some, self.s, self.goal, bold),
-                         folder / "route.png", self.force)
+            draw(writing.plain(found), self.plan, self.some, self.s, self.goal, bold, folder / "route.png", self.force)
 
     def write_plan(self):
         for c in self.some:

@@ -57,7 +57,9 @@ def keep(name, found, folder, force):
     print(written(words.content(found)))
     print()
     for picture in pictures:
-        writing.save(words.figure(found), picture, force)
+        from bergtow.plot import style
+        with style.look():
+            writing.save(words.figure(found), picture, force)
     print(data)
 
 
