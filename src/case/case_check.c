@@ -419,6 +419,8 @@ static void check_floe(const bt_check *check, int index)
         bt_errors_add(check->err, "%s: the outline is refused: %s", where, why);
         return;
     }
+    if (floe->fixed && (floe->vx != 0 || floe->vy != 0 || floe->yaw_rate != 0))
+        bt_errors_add(check->err, "%s: is fixed and has a velocity; remove vx, vy and yaw_rate, or fixed", where);
     if (isnan(floe->thickness)) return; // the thickness of the ice, which is asked for elsewhere
     char text[BT_ICE_WHY];
     const bt_moments moments = bt_shape_moments(n, v);

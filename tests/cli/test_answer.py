@@ -459,6 +459,11 @@ def test_speeds_of_one_call(made):
     assert (slow["speed_m_s"], fast["speed_m_s"]) == (0.13, 0.2) and fast["needs_n"] > slow["needs_n"]
     assert {s["feasible"] for s in made["speeds"]} == {"no"} and made["feasible"]["verdict"] == "no"
     assert made["feasible"]["reason"] == "no_speed_is_feasible"
+    # the design value is that of the case's speed, also where a faster tow has borne more: the sentence says so
+    at = f" at {words.speed(made['asked']['speed_m_s'])} as a mean over "
+    assert at in words.sentence(made)
+    alone = made | {"conditions": [c for c in made["conditions"] if c["speed_m_s"] == made["asked"]["speed_m_s"]]}
+    assert at not in words.sentence(alone) and " as a mean over " in words.sentence(alone)
 
 
 def test_the_fall_back_is_named(made):

@@ -60,6 +60,8 @@ TEXTS = {
     "infinity": (GOOD + "tow: {speed: .inf}\n", 'bad.yml:5: tow.speed: ".inf" is not a number'),
     "overflow": (GOOD + "tow: {speed: 1e999}\n", "bad.yml:5: tow.speed: 1e999 is too large"),
     "underflow": (GOOD + "tow: {speed: 1e-400}\n", "bad.yml:5: tow.speed: 1e-400 is too small"),
+    "fixed floe that moves": (GOOD + "floes: [{length: 1, x: 9, y: 2, fixed: true, vy: 0.1}]\n",
+                              "bad.yml:5: floes[0]: is fixed and has a velocity; remove vx, vy and yaw_rate, or fixed"),
     "tide of seconds": (GOOD + "water: {tide: {major: 0.1, period: 1.9}}\n",
                         "bad.yml:5: water.tide.period: 1.9 s is less than the time of 20 steps, 2 s"),
     "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"),

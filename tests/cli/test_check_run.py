@@ -94,6 +94,28 @@ def test_floes_given_by_hand_take_their_room(tmp_path):
     assert abs(about - 1 - made) < 0.06 * made
 
 
+def test_floes_given_by_hand_are_in_the_means(tmp_path):
+    """Red with the default size of a basin, which none of them has. A field of made floes counts beside them."""
+    floes = [{"shape": "square", "length": 1, "x": 9, "y": 0, "thickness": 0.02},
+             {"shape": "square", "length": 2, "x": 12, "y": 0, "thickness": 0.06}]
+    path = write_case(tmp_path, changed(TOW, ice__concentration=0, floes=floes))
+    ice = json.loads(call("check", path, "--json").stdout)["ice"]
+    size = np.sqrt(4 / np.pi) * 1.5
+    assert ice["mean_size_m"] == pytest.approx(size) and ice["mean_thickness_m"] == pytest.approx(0.04)
+    assert run(tmp_path, path, "--quiet", "--steps", 1).summary["mean_size_m"] == pytest.approx(size)
+    assert json.loads(call("check", write_case(tmp_path, changed(TOW, floes=floes)),
+                           "--json").stdout)["ice"]["mean_size_m"] < 0.72
+
+
+def test_whole_steps_take_longer(tmp_path):
+    path = write_case(tmp_path, changed(TOW, run__dt=0.7, run__duration=10, tow__ramp=0))
+    assert "15 of 0.7 s = 10.5 s, run.duration rounded up to whole steps" in call("check", path).stdout
+    assert json.loads(call("check", path, "--json").stdout)["run"]["duration_s"] == 10.5
+    r = run(tmp_path, path, "--quiet")
+    assert r.summary["sim_time_s"] == 10.5
+    assert "300 of 0.1 s = 30 s\n" in call("check", write_case(tmp_path, TOW)).stdout
+
+
 def test_lines_and_json_have_the_same_numbers(tmp_path):
     """One row gives both (src/app/check_numbers.c). A printed number that is not in the JSON, or has another value
     there, was written apart."""

@@ -84,8 +84,11 @@ def percent(x):
 
 
 def _over(a):
+    """The time scale of a value, and its speed if other speeds were simulated, too: the design value is not theirs."""
     scale = next((c["time_scale_s"] for c in a["conditions"] if known(c["time_scale_s"])), a["asked"]["time_scale_s"])
-    return f"as a mean over {short(scale, 2)} s"
+    asked = a["asked"]["speed_m_s"]
+    at = any(known(c["speed_m_s"]) and abs(c["speed_m_s"] - asked) > 1e-6 * asked for c in a["conditions"])
+    return f"{f'at {speed(asked)} ' if at else ''}as a mean over {short(scale, 2)} s"
 
 
 def _in_case(v, a):
