@@ -165,7 +165,7 @@ def test_an_infinite_strength_leaves_every_bit(tmp_path):
 
 def weak(**keys):
     """Dense ice whose floes split again and again."""
-    return changed(TOW, ice__concentration=0.8, ice__size=0.9, ice__crushing={"pressure": 1e5},
+    return changed(TOW, run__duration=12, ice__concentration=0.8, ice__size=0.9, ice__crushing={"pressure": 1e5},
                    ice__splitting={"toughness": 100.0, "strength": 200.0, "least_size": 0.1, **keys})
 
 
@@ -260,7 +260,7 @@ def test_force_chains_go_through_pieces(tmp_path):
     from bergtow.result.run import Run
     dump = tmp_path / "step.h5"
     case = changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)])
-    r = run(tmp_path, case, "--dump-contacts", f"300:{dump}")
+    r = run(tmp_path, case, "--dump-contacts", f"120:{dump}")
     read_as = chains.read(dump)
     with Run(r.dir) as folder:
         c = chains.joined(folder, read_as)
