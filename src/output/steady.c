@@ -384,7 +384,8 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
                 "the towed body stood still for %.3g s of %.3g s, held by the ice: the mean depends on how often it "
                 "jams",
                 totals->stall.time, steady->end);
-    else if (asked > 0 && way < BT_STALL_SHARE * asked && !steady->turns) { // with turns the body may be on the previous leg
+    // with turns the body may be on the previous leg
+    else if (asked > 0 && way < BT_STALL_SHARE * asked && !steady->turns) {
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NO_HEADWAY,
                 "the tow asked for %.4g m within the window, %g to %g s, but the body has %s %.3g m over ground: it "
                 "makes no headway",

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Number of working threads of a run: fewer than assigned while these do as much.
 //
-// Threads wait for each other in every pass, some hundred times per step. A pass around a berg in open pack is too short
-// for two: what they wait, and fetch from each other's caches, takes longer than they save. And when other programs want
-// the cores, the system may suspend the thread that all wait for, for milliseconds each time; a run with two threads
-// then took ten times as long as with one. No way of waiting helps, since the awaited thread is not running.
+// Threads wait for each other in every pass, some hundred times per step. A pass around a berg in open pack is too
+// short for two: to wait, and to fetch from each other's caches, takes longer than they save. And when other programs
+// want the cores, the system may suspend the thread that all wait for, for milliseconds each time; a run with two
+// threads then took ten times as long as with one. No way of waiting helps, since the awaited thread is not running.
 //
 // So the number of threads is tried out: half of them work for a moment, and continue so if they do as much work per
-// second of wall time; later twice as many are tried. Failed trials make the next ones rarer. The result does not depend
-// on the number of threads (docs/architecture.md), so the clock may decide.
+// second of wall time; later twice as many are tried. Failed trials make the next ones rarer. The result does not
+// depend on the number of threads (docs/architecture.md), so the clock may decide.
 //
-// Rejected: to try fewer only when the threads get too little processor time, as on idle cores they may pay nothing, too;
-// the load average, which is a minute late and counts processes of lower priority.
+// Rejected: to try fewer only when the threads get too little processor time, since on idle cores, too, they may gain
+// nothing; the load average, which is a minute late and counts processes of lower priority.
 #include "run/pace.h"
 
 static const double window = 0.1; // s of wall time for a rate

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Threads of a run on machines that are made up: idle, shared with others, shared for a while; and with too little work.
+// Threads of a run on machines that are made up: idle, shared with others, shared for a while; with too little work.
 #include "test.h"
 #include "run/pace.h"
 
