@@ -575,6 +575,23 @@ def test_a_thickness_by_another_name(tmp_path, capsys, name, read):
     assert (f"not read as the thickness: {name}" in said) == ("thickness: no floe has one" in said) == (not read)
 
 
+@pytest.mark.parametrize("values", [{"Thickness": None, "thickness": 2.0}, {"thickness": 2.0, "Thickness": None},
+                                    {"THICKNESS": None, "Thickness": 2.0}, {"Thickness": "thick", "thickness": 2.0}])
+def test_columns_that_differ_in_case(tmp_path, capsys, values):
+    """One is read, and the other is named. Red: looked for in one column and read from the other."""
+    path = write(tmp_path / "map.geojson", [places(r) for r in RINGS[:4]])
+    root = json.loads(path.read_text())
+    alone = {name: value for name, value in values.items() if value == 2.0}
+    other, = values.keys() - alone.keys()
+    for k, feature in enumerate(root["features"]):
+        feature["properties"] = values if k % 2 == 0 else alone
+    path.write_text(json.dumps(root))
+    words = ("--thickness", *alone) if "thickness" not in alone else ()
+    record = outlines(path, *words)[1]["floes"]
+    assert (record["with_thickness"], record["mean_thickness_m"]) == (4, 2.0)
+    assert (f"not read as the thickness: {other};" in capsys.readouterr().out) == (words == ())
+
+
 # ---- maps as the world has them
 
 

@@ -157,10 +157,12 @@ def from_layer(path, source, how):
     try:
         if how.where:
             layer.SetAttributeFilter(how.where)
-        column = how.thickness or thickness_column(layer, columns)
-        if not column:
+        name = how.thickness or thickness_column(layer, columns)
+        column = columns.index(name) if name else None  # GDAL takes a name for that of any column that differs in case
+        if not how.thickness:
             near = _library.library().bt_outline_near_thickness
-            found.near = [name for name in columns if near(name.encode(errors="replace"))]
+            found.near = [other for other in columns if other != name and (
+                other.lower() == name.lower() if name else near(other.encode(errors="replace")))]
         for feature in layer:
             add_feature(found, feature, column)
     except RuntimeError as error:
@@ -191,7 +193,8 @@ def thickness_column(layer, columns):
     """The thickness column if the caller names none, or None. Only the exact name counts: a column with a similar name
     may hold anything, such as remarks, texts with units, or 0 for floes that were not measured."""
     def sound(name):
-        values = (f.GetField(name) for f in layer if f.IsFieldSetAndNotNull(name))
+        column = columns.index(name)
+        values = (f.GetField(column) for f in layer if f.IsFieldSetAndNotNull(column))
         return all(positive(value) is not None for value in values)
     if "thickness" in columns:
         return "thickness"
@@ -201,11 +204,12 @@ def thickness_column(layer, columns):
 def add_feature(found, feature, column):
     name, geometry = f"feature {feature.GetFID()}", feature.GetGeometryRef()
     thickness = None
-    if column and feature.IsFieldSetAndNotNull(column):
-        thickness = positive(feature.GetField(column))
+    if column is not None and feature.IsFieldSetAndNotNull(column):
+        value = feature.GetField(column)
+        thickness = positive(value)
         if thickness is None:
-            raise RunError(found.path, f"{name}: {column} = {feature.GetField(column)} is not a thickness in metres",
-                           "correct it, or leave the column empty")
+            raise RunError(found.path, f"{name}: {feature.GetFieldDefnRef(column).GetName()} = {value} is not a "
+                           "thickness in metres", "correct it, or leave the column empty")
     if geometry is None or geometry.IsEmpty():
         found.skipped.setdefault("empty", []).append(name)
         return
