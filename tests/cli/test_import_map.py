@@ -251,16 +251,37 @@ def test_the_program_has_the_same_middle_over_the_180th_meridian(tmp_path, lat):
 
 
 def test_the_180th_meridian_ends_no_map(tmp_path):
-    """Two floes that a file parts there are whole; two on the edge of a map elsewhere are cut by it."""
-    def square(x, y):
-        return [[x, y], [x + 0.01, y], [x + 0.01, y + 0.002], [x, y + 0.002], [x, y]]
-    def dropped_and_kept(at):
-        whole = [[[square(at - 0.01, y)]] + [[square(-180, y)]] * (at == 180) for y in (70, 70.01)]
+    """Two floes that a file parts there are whole, also where the other halves are in another file; two on the edge of
+    a map elsewhere are cut by it."""
+    def square(x, y, length=0.01):
+        return [[x, y], [x + length, y], [x + length, y + 0.002], [x, y + 0.002], [x, y]]
+    def dropped_and_kept(at, halves=1):
+        whole = [[[square(at - 0.01, y)]] + [[square(-180, y, y - 69.99)]] * (halves == 2) for y in (70, 70.01)]
         places = [{"type": "MultiPolygon", "coordinates": parts} for parts in [*whole, [[square(at - 0.04, 70.005)]]]]
         record = outlines(write(tmp_path / "map.geojson", places), "--cut", "drop")[1]
         return counted(record).get("cut", 0), record["floes"]["floes"]
-    assert dropped_and_kept(at=180) == (0, 3)
+    assert dropped_and_kept(at=180) == dropped_and_kept(at=180, halves=2) == (0, 3)
     assert dropped_and_kept(at=170) == (2, 1)
+
+
+@pytest.mark.parametrize("middle", [100, 180, -179.999, 360])
+@pytest.mark.parametrize("low", [0, -180])
+def test_the_edge_of_an_image_over_the_180th_meridian(tmp_path, middle, low):
+    """Wherever longitudes begin, also if a floe crosses that place. Red: floes inside, on the longitude where the
+    numbers begin, or none of those on the edge."""
+    def square(i, j):
+        x, y = middle + 0.003 * (i - 2.6), 70 + 0.001 * (j - 2)
+        ring = np.round([[x, y], [x + 0.002, y], [x + 0.002, y + 0.0006], [x, y + 0.0006]], 6)
+        return np.c_[(ring[:, 0] - low) % 360 + low, ring[:, 1]]
+    map_ = write(tmp_path / "map.geojson", [square(i, j) for i in range(6) for j in range(6)])
+    assert {k: n for k, n in counted(outlines(map_, "--cut", "drop")[1]).items() if "cut" in k} == {"cut": 20}
+
+
+def test_a_ring_of_latitude_about_a_pole_is_no_edge(tmp_path):
+    """Red: all floes cut by it."""
+    floes = [[[x, 89.997], [x, 89.996], [x + 10, 89.996], [x + 10, 89.997]] for x in range(-180, 180, 30)]
+    record = outlines(write(tmp_path / "map.geojson", floes), "--cut", "drop")[1]
+    assert record["floes"]["floes"] == len(floes) and "cut" not in counted(record)
 
 
 def test_a_part_of_a_large_map(tmp_path):

@@ -285,12 +285,16 @@ def about_of(path, source, layer=None):
 def mark_cut(found, degrees):
     """Mark outlines that the edge of an image has cut. A vector file has no image: if edges of several outlines lie on
     one side of the bounding box of all, that side is taken for the edge of an image. The 180th meridian, where files in
-    degrees divide floes (RFC 7946), does not count as an edge."""
+    degrees divide floes (RFC 7946), does not count as an edge. Longitudes all around a pole have no box."""
     if found.seen is not None:
         return
     drawn = [s.pixels or s.geometry for s in found.shapes]
+    if degrees:
+        drawn = unwrapped(drawn)
     bounds = np.array([g.bounds for g in drawn])
     sides = np.r_[bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)]
+    if degrees and sides[2] - sides[0] > 180:
+        return
     near = 1e-9 * max(sides[2] - sides[0], sides[3] - sides[1])
     for k in range(4):
         if degrees and k % 2 == 0 and abs(abs(sides[k]) - 180) <= near:
@@ -299,6 +303,15 @@ def mark_cut(found, degrees):
                  if abs(b[k] - sides[k]) <= near and lies_on(g, k % 2, sides[k], near)]
         for shape in lying if len(lying) > 1 else []:
             shape.cut = True
+
+
+def unwrapped(geometries):
+    """The same with each longitude within 180° of the mean direction."""
+    longitudes = np.concatenate([np.asarray(p.exterior.coords)[:, 0] for g in geometries
+                                 for p in getattr(g, "geoms", [g])])
+    middle = np.angle(np.exp(1j * np.radians(longitudes)).mean(), deg=True)
+    return [moved(g, lambda p: p - np.c_[360 * np.rint((p[:, 0] - middle) / 360), np.zeros(len(p))])
+            for g in geometries]
 
 
 def lies_on(geometry, axis, value, near):
