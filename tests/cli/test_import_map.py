@@ -596,6 +596,29 @@ def test_a_thickness_by_another_name(tmp_path, capsys, name, read):
     assert (f"not read as the thickness: {name}" in said) == ("thickness: no floe has one" in said) == (not read)
 
 
+@pytest.mark.parametrize("value", [150, 1e-7, -1, 0])
+def test_a_thickness_that_no_case_accepts(tmp_path, value):
+    """As in the case that reads the floes. Red: written, and refused there."""
+    path = write(tmp_path / "map.geojson", [places(r) for r in RINGS[:2]])
+    root = json.loads(path.read_text())
+    root["features"][1]["properties"] = {"thickness": value}
+    path.write_text(json.dumps(root))
+    said = outlines(path, code=IO)
+    assert f"map.geojson: feature 1: thickness = {value} is not a thickness in metres, from 1e-06 to 100" in said
+    np.save(tmp_path / "map.npy", np.pad(np.ones((5, 5)), 2))
+    said = outlines(tmp_path / "map.npy", "--pixel", "1", "--thickness", f"1={value}", code=IO)
+    assert "in metres, from 1e-06 to 100; write for example 1=0.5" in said
+
+
+@pytest.mark.parametrize("value", [100, 1e-6])
+def test_a_thickness_at_an_end_of_its_range(tmp_path, value):
+    np.save(tmp_path / "map.npy", np.pad(np.ones((5, 5)), 2))
+    _, record = outlines(tmp_path / "map.npy", "--pixel", "30", "--thickness", f"1={value}", "--heading", "0")
+    assert record["floes"]["mean_thickness_m"] == value
+    case = changed(FRAMES["basin"], ice={"outlines": "out.geojson"})
+    assert field(tmp_path, case)[1].tolist() == [value]
+
+
 @pytest.mark.parametrize("values", [{"Thickness": None, "thickness": 2.0}, {"thickness": 2.0, "Thickness": None},
                                     {"THICKNESS": None, "Thickness": 2.0}, {"Thickness": "thick", "thickness": 2.0}])
 def test_columns_that_differ_in_case(tmp_path, capsys, values):

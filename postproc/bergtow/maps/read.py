@@ -195,7 +195,7 @@ def thickness_column(layer, columns):
     def sound(name):
         column = columns.index(name)
         values = (f.GetField(column) for f in layer if f.IsFieldSetAndNotNull(column))
-        return all(positive(value) is not None for value in values)
+        return all(metres_of(value) is not None for value in values)
     if "thickness" in columns:
         return "thickness"
     return next((name for name in columns if name.lower() == "thickness" and sound(name)), None)
@@ -206,10 +206,11 @@ def add_feature(found, feature, column):
     thickness = None
     if column is not None and feature.IsFieldSetAndNotNull(column):
         value = feature.GetField(column)
-        thickness = positive(value)
+        thickness = metres_of(value)
         if thickness is None:
             raise RunError(found.path, f"{name}: {feature.GetFieldDefnRef(column).GetName()} = {value} is not a "
-                           "thickness in metres", "correct it, or leave the column empty")
+                           f"thickness in metres, from {thickness_range()}",
+                           "correct it (it may be in centimetres), or leave the column empty")
     if geometry is None or geometry.IsEmpty():
         found.skipped.setdefault("empty", []).append(name)
         return
@@ -241,12 +242,18 @@ def polygons_of(geometry):
     return [p for some, _ in parts for p in some], next((why for _, why in parts if why), None)
 
 
-def positive(value):
+def metres_of(value):
+    """A thickness that a case accepts, or None."""
+    least, most = _library.limit("thickness_m")
     try:
         number = float(value)
     except (TypeError, ValueError):
         return None
-    return number if 0 < number < np.inf else None
+    return number if least <= number <= most else None
+
+
+def thickness_range():
+    return "{:g} to {:g}".format(*_library.limit("thickness_m"))
 
 
 def crs_of_layer(path, source, layer):
@@ -496,11 +503,12 @@ def numbered(labels, ice):
 def thickness_by_value(path, text):
     pairs = [pair.split("=") for pair in (text or "").split(",") if pair]
     try:
-        out = {int(value): positive(metres) for value, metres in pairs}
+        out = {int(value): metres_of(metres) for value, metres in pairs}
     except ValueError:
         out = {0: None}
     if None in out.values():
-        raise RunError(path, f"--thickness {text} is not a list VALUE=M,...", "write for example 1=0.5,2=1.2")
+        raise RunError(path, f"--thickness {text} is not a list VALUE=M,... of thicknesses in metres, "
+                       f"from {thickness_range()}", "write for example 1=0.5,2=1.2")
     return out
 
 
