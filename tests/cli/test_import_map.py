@@ -775,7 +775,7 @@ def labelled(path, labels):
 
 
 def test_negative_labels(tmp_path):
-    """-1 is what is in no group. Red: one floe of the whole image, the others "lie in another, left out"."""
+    """-1 is what is in no group. Red: one floe of the whole image, the others "within another, left out"."""
     labels = GRID.astype(np.int16) - 1
     map_ = labelled(tmp_path / "map.npy", labels)
     said = outlines(map_, "--pixel", "2", "--water", "0", code=IO, name="no.geojson")
@@ -896,6 +896,22 @@ def test_every_change_is_counted(tmp_path):
     # by name, also of the other of two
     assert found["overlaps"]["first"] == ["feature 7 (feature 8)"] and found["clear"]["first"] == [
         "feature 12"]
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_parts_that_are_no_polygons(tmp_path, capsys, n):
+    """The polygon beside them is a floe. Red: the whole feature was said to be left out, and "1 features"."""
+    ring = places(RINGS[0]).tolist()
+    mixed = {"type": "GeometryCollection", "geometries": [
+        {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}, {"type": "Point", "coordinates": [LON, LAT]}]}
+    map_ = write(tmp_path / "map.geojson", [mixed, *[places(r) for r in RINGS[1:4]], *[POINT] * n, *[mixed] * (n - 1)])
+    rings, record = outlines(map_)
+    assert len(rings) == 4 and {k: c for k, c in counted(record).items() if k != "twice"} == {
+        "other parts": n, "no polygon": n}
+    plural = "s" * (n - 1)
+    said = capsys.readouterr().out
+    assert f" {n}  feature{plural} with parts that are not polygons, these left out\n" in said
+    assert f" {n}  feature{plural} without a polygon, left out\n" in said
 
 
 def test_too_many_vertices(tmp_path):

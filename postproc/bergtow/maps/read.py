@@ -172,7 +172,7 @@ def from_layer(path, source, how):
         retrace(found.shapes)
     if not found.shapes:
         others = sum(len(names) for names in found.skipped.values())
-        raise RunError(path, f"holds no polygons ({others} of its features are not polygons)" if others else
+        raise RunError(path, f"holds no polygons ({others} of its features without one)" if others else
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
     return found
 
@@ -222,7 +222,7 @@ def add_feature(found, feature, column):
         if not np.isfinite(np.asarray(ring.coords)).all():
             raise RunError(found.path, f"{name} has a vertex that is not a finite number", "correct it or remove it")
     if others:
-        found.skipped.setdefault(others, []).append(name)
+        found.skipped.setdefault("other parts" if polygons and others == "no polygon" else others, []).append(name)
     if polygons:
         whole = polygons[0] if len(polygons) == 1 else MultiPolygon(polygons)
         found.shapes.append(Shape(name, whole, thickness))
