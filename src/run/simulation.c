@@ -17,6 +17,7 @@
 #include "case/arch.h"
 #include "case/case_base.h"
 #include "case/constraints.h"
+#include "case/ice_bounds.h"
 #include "case/schema.h"
 #include "field/map_crs.h"
 #include "output/checkpoint.h"
@@ -555,6 +556,8 @@ bt_status bt_folder_lock(const char *dir, int *lock)
 static char *limits_json(void)
 {
     bt_json json = {0};
+    double thickness[2];
+    bt_ice_thickness_range(&thickness[0], &thickness[1]);
     bt_json_open(&json, NULL, '{');
     bt_json_open(&json, "verdicts", '[');
     for (int k = 0; k <= BT_TOO_SHORT; k++) bt_json_string(&json, NULL, bt_verdict_names[k]);
@@ -569,6 +572,7 @@ static char *limits_json(void)
     bt_json_string(&json, "map_local_crs", BT_MAP_LOCAL_NAME);
     bt_json_numbers(&json, "map_ice_free_deg", 2, (const double[]){BT_MAP_FREE_SOUTH, BT_MAP_FREE_NORTH});
     bt_json_int(&json, "outline_vertices", BT_MAX_VERTICES);
+    bt_json_numbers(&json, "thickness_m", 2, thickness);
     bt_json_close(&json, '}');
     return json.text;
 }

@@ -134,6 +134,20 @@ def test_a_geopackage_has_layers_in_the_crs_of_the_map(tmp_path):
     assert again.returncode == DONE, again.stderr
 
 
+def test_layers_of_the_series_need_no_frames(tmp_path):
+    """Members of ensembles have none. The same features as with frames. Red: "holds no frames"."""
+    whole, bare = (towed(tmp_path / str(interval), output__frame_interval=interval) for interval in (5, -1))
+    for layer, features in ("tracks", 2), ("loads", 60):
+        texts = []
+        for there in whole, bare:
+            bergtow.export(there, tmp_path / "map.geojson", layer=layer, force=True)
+            texts.append((tmp_path / "map.geojson").read_text())
+        assert texts[0] == texts[1] and len(json.loads(texts[1])["features"]) == features
+    for words in ("--layer", "floes"), ("--layer", "loads", "--time", "10"):
+        done = call("export", bare, "-o", tmp_path / "none.geojson", *words)
+        assert done.returncode == IO and "holds no frames" in done.stderr
+
+
 def test_a_shapefile_says_what_it_renamed_and_spares_files_of_others(tmp_path):
     there = towed(tmp_path)
     done = call("export", there, "-o", tmp_path / "loads.shp", "--layer", "loads")

@@ -251,16 +251,37 @@ def test_the_program_has_the_same_middle_over_the_180th_meridian(tmp_path, lat):
 
 
 def test_the_180th_meridian_ends_no_map(tmp_path):
-    """Two floes that a file parts there are whole; two on the edge of a map elsewhere are cut by it."""
-    def square(x, y):
-        return [[x, y], [x + 0.01, y], [x + 0.01, y + 0.002], [x, y + 0.002], [x, y]]
-    def dropped_and_kept(at):
-        whole = [[[square(at - 0.01, y)]] + [[square(-180, y)]] * (at == 180) for y in (70, 70.01)]
+    """Two floes that a file parts there are whole, also where the other halves are in another file; two on the edge of
+    a map elsewhere are cut by it."""
+    def square(x, y, length=0.01):
+        return [[x, y], [x + length, y], [x + length, y + 0.002], [x, y + 0.002], [x, y]]
+    def dropped_and_kept(at, halves=1):
+        whole = [[[square(at - 0.01, y)]] + [[square(-180, y, y - 69.99)]] * (halves == 2) for y in (70, 70.01)]
         places = [{"type": "MultiPolygon", "coordinates": parts} for parts in [*whole, [[square(at - 0.04, 70.005)]]]]
         record = outlines(write(tmp_path / "map.geojson", places), "--cut", "drop")[1]
         return counted(record).get("cut", 0), record["floes"]["floes"]
-    assert dropped_and_kept(at=180) == (0, 3)
+    assert dropped_and_kept(at=180) == dropped_and_kept(at=180, halves=2) == (0, 3)
     assert dropped_and_kept(at=170) == (2, 1)
+
+
+@pytest.mark.parametrize("middle", [100, 180, -179.999, 360])
+@pytest.mark.parametrize("low", [0, -180])
+def test_the_edge_of_an_image_over_the_180th_meridian(tmp_path, middle, low):
+    """Wherever longitudes begin, also if a floe crosses that place. Red: floes inside, on the longitude where the
+    numbers begin, or none of those on the edge."""
+    def square(i, j):
+        x, y = middle + 0.003 * (i - 2.6), 70 + 0.001 * (j - 2)
+        ring = np.round([[x, y], [x + 0.002, y], [x + 0.002, y + 0.0006], [x, y + 0.0006]], 6)
+        return np.c_[(ring[:, 0] - low) % 360 + low, ring[:, 1]]
+    map_ = write(tmp_path / "map.geojson", [square(i, j) for i in range(6) for j in range(6)])
+    assert {k: n for k, n in counted(outlines(map_, "--cut", "drop")[1]).items() if "cut" in k} == {"cut": 20}
+
+
+def test_a_ring_of_latitude_about_a_pole_is_no_edge(tmp_path):
+    """Red: all floes cut by it."""
+    floes = [[[x, 89.997], [x, 89.996], [x + 10, 89.996], [x + 10, 89.997]] for x in range(-180, 180, 30)]
+    record = outlines(write(tmp_path / "map.geojson", floes), "--cut", "drop")[1]
+    assert record["floes"]["floes"] == len(floes) and "cut" not in counted(record)
 
 
 def test_a_part_of_a_large_map(tmp_path):
@@ -575,6 +596,46 @@ def test_a_thickness_by_another_name(tmp_path, capsys, name, read):
     assert (f"not read as the thickness: {name}" in said) == ("thickness: no floe has one" in said) == (not read)
 
 
+@pytest.mark.parametrize("value", [150, 1e-7, -1, 0])
+def test_a_thickness_that_no_case_accepts(tmp_path, value):
+    """As in the case that reads the floes. Red: written, and refused there."""
+    path = write(tmp_path / "map.geojson", [places(r) for r in RINGS[:2]])
+    root = json.loads(path.read_text())
+    root["features"][1]["properties"] = {"thickness": value}
+    path.write_text(json.dumps(root))
+    said = outlines(path, code=IO)
+    assert f"map.geojson: feature 1: thickness = {value} is not a thickness in metres, from 1e-06 to 100" in said
+    np.save(tmp_path / "map.npy", np.pad(np.ones((5, 5)), 2))
+    said = outlines(tmp_path / "map.npy", "--pixel", "1", "--thickness", f"1={value}", code=IO)
+    assert "in metres, from 1e-06 to 100; write for example 1=0.5" in said
+
+
+@pytest.mark.parametrize("value", [100, 1e-6])
+def test_a_thickness_at_an_end_of_its_range(tmp_path, value):
+    np.save(tmp_path / "map.npy", np.pad(np.ones((5, 5)), 2))
+    _, record = outlines(tmp_path / "map.npy", "--pixel", "30", "--thickness", f"1={value}", "--heading", "0")
+    assert record["floes"]["mean_thickness_m"] == value
+    case = changed(FRAMES["basin"], ice={"outlines": "out.geojson"})
+    assert field(tmp_path, case)[1].tolist() == [value]
+
+
+@pytest.mark.parametrize("values", [{"Thickness": None, "thickness": 2.0}, {"thickness": 2.0, "Thickness": None},
+                                    {"THICKNESS": None, "Thickness": 2.0}, {"Thickness": "thick", "thickness": 2.0}])
+def test_columns_that_differ_in_case(tmp_path, capsys, values):
+    """One is read, and the other is named. Red: looked for in one column and read from the other."""
+    path = write(tmp_path / "map.geojson", [places(r) for r in RINGS[:4]])
+    root = json.loads(path.read_text())
+    alone = {name: value for name, value in values.items() if value == 2.0}
+    other, = values.keys() - alone.keys()
+    for k, feature in enumerate(root["features"]):
+        feature["properties"] = values if k % 2 == 0 else alone
+    path.write_text(json.dumps(root))
+    words = ("--thickness", *alone) if "thickness" not in alone else ()
+    record = outlines(path, *words)[1]["floes"]
+    assert (record["with_thickness"], record["mean_thickness_m"]) == (4, 2.0)
+    assert (f"not read as the thickness: {other};" in capsys.readouterr().out) == (words == ())
+
+
 # ---- maps as the world has them
 
 
@@ -714,7 +775,7 @@ def labelled(path, labels):
 
 
 def test_negative_labels(tmp_path):
-    """-1 is what is in no group. Red: one floe of the whole image, the others "lie in another, left out"."""
+    """-1 is what is in no group. Red: one floe of the whole image, the others "within another, left out"."""
     labels = GRID.astype(np.int16) - 1
     map_ = labelled(tmp_path / "map.npy", labels)
     said = outlines(map_, "--pixel", "2", "--water", "0", code=IO, name="no.geojson")
@@ -835,6 +896,22 @@ def test_every_change_is_counted(tmp_path):
     # by name, also of the other of two
     assert found["overlaps"]["first"] == ["feature 7 (feature 8)"] and found["clear"]["first"] == [
         "feature 12"]
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_parts_that_are_no_polygons(tmp_path, capsys, n):
+    """The polygon beside them is a floe. Red: the whole feature was said to be left out, and "1 features"."""
+    ring = places(RINGS[0]).tolist()
+    mixed = {"type": "GeometryCollection", "geometries": [
+        {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}, {"type": "Point", "coordinates": [LON, LAT]}]}
+    map_ = write(tmp_path / "map.geojson", [mixed, *[places(r) for r in RINGS[1:4]], *[POINT] * n, *[mixed] * (n - 1)])
+    rings, record = outlines(map_)
+    assert len(rings) == 4 and {k: c for k, c in counted(record).items() if k != "twice"} == {
+        "other parts": n, "no polygon": n}
+    plural = "s" * (n - 1)
+    said = capsys.readouterr().out
+    assert f" {n}  feature{plural} with parts that are not polygons, these left out\n" in said
+    assert f" {n}  feature{plural} without a polygon, left out\n" in said
 
 
 def test_too_many_vertices(tmp_path):

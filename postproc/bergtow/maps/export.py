@@ -32,6 +32,7 @@ from bergtow.result.run import Run
 import numpy as np
 
 LAYERS = ("floes", "bodies", "tracks", "loads")
+FRAMED = {"floes", "bodies"}  #: layers of frames; the others hold the series, which members of ensembles have, too
 #: layers written if --layer is not given
 DEFAULT = {".gpkg": LAYERS, ".geojson": ("floes",), ".json": ("floes",), ".shp": ("floes",), ".csv": (), ".nc": ()}
 TRAJECTORIES = (".csv", ".nc")
@@ -454,7 +455,9 @@ def perform(a):
         map_read.need()
     with Run(a.run) as run:
         place = Place.of(run)
-        frames = frames_of(run, a.time or ("all" if trajectories else "last"))
+        names = (a.layer,) if a.layer else DEFAULT[kind]
+        framed = trajectories or a.time or not FRAMED.isdisjoint(names)
+        frames = frames_of(run, a.time or ("all" if trajectories else "last")) if framed else []
         if trajectories:
             t = Trajectories.of(run, frames)
             if kind == ".csv":
@@ -465,13 +468,13 @@ def perform(a):
             if kind == ".nc" and not a.start:
                 print("time: seconds since 1970, assumed: the case gives no date; give it with --start")
         else:
-            layers = [MAKE[name](run, frames) for name in ([a.layer] if a.layer else DEFAULT[kind])]
+            layers = [MAKE[name](run, frames) for name in names]
             layers = [layer for layer in layers if layer.places]
             if not layers:
                 raise RunError(run.result, f"has no {a.layer or 'floes'}", "choose another --layer")
             _write(layers, place, path, kind, a.force)
             print(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
-            if any(layer.name in ("floes", "bodies") for layer in layers):
+            if any(layer.name in FRAMED for layer in layers):
                 at = run.frame_times[frames]
                 print(f"frame: t = {at[0]:.6g} s" if len(at) == 1 else
                       f"frames: {len(at)}, t = {at[0]:.6g} to {at[-1]:.6g} s")

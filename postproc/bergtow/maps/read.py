@@ -157,10 +157,12 @@ def from_layer(path, source, how):
     try:
         if how.where:
             layer.SetAttributeFilter(how.where)
-        column = how.thickness or thickness_column(layer, columns)
-        if not column:
+        name = how.thickness or thickness_column(layer, columns)
+        column = columns.index(name) if name else None  # GDAL takes a name for that of any column that differs in case
+        if not how.thickness:
             near = _library.library().bt_outline_near_thickness
-            found.near = [name for name in columns if near(name.encode(errors="replace"))]
+            found.near = [other for other in columns if other != name and (
+                other.lower() == name.lower() if name else near(other.encode(errors="replace")))]
         for feature in layer:
             add_feature(found, feature, column)
     except RuntimeError as error:
@@ -170,7 +172,7 @@ def from_layer(path, source, how):
         retrace(found.shapes)
     if not found.shapes:
         others = sum(len(names) for names in found.skipped.values())
-        raise RunError(path, f"holds no polygons ({others} of its features are not polygons)" if others else
+        raise RunError(path, f"holds no polygons ({others} of its features without one)" if others else
                        "holds no features" + (" of --where" if how.where else ""), "name a layer of floe outlines")
     return found
 
@@ -191,8 +193,9 @@ def thickness_column(layer, columns):
     """The thickness column if the caller names none, or None. Only the exact name counts: a column with a similar name
     may hold anything, such as remarks, texts with units, or 0 for floes that were not measured."""
     def sound(name):
-        values = (f.GetField(name) for f in layer if f.IsFieldSetAndNotNull(name))
-        return all(positive(value) is not None for value in values)
+        column = columns.index(name)
+        values = (f.GetField(column) for f in layer if f.IsFieldSetAndNotNull(column))
+        return all(metres_of(value) is not None for value in values)
     if "thickness" in columns:
         return "thickness"
     return next((name for name in columns if name.lower() == "thickness" and sound(name)), None)
@@ -201,11 +204,13 @@ def thickness_column(layer, columns):
 def add_feature(found, feature, column):
     name, geometry = f"feature {feature.GetFID()}", feature.GetGeometryRef()
     thickness = None
-    if column and feature.IsFieldSetAndNotNull(column):
-        thickness = positive(feature.GetField(column))
+    if column is not None and feature.IsFieldSetAndNotNull(column):
+        value = feature.GetField(column)
+        thickness = metres_of(value)
         if thickness is None:
-            raise RunError(found.path, f"{name}: {column} = {feature.GetField(column)} is not a thickness in metres",
-                           "correct it, or leave the column empty")
+            raise RunError(found.path, f"{name}: {feature.GetFieldDefnRef(column).GetName()} = {value} is not a "
+                           f"thickness in metres, from {thickness_range()}",
+                           "correct it (it may be in centimetres), or leave the column empty")
     if geometry is None or geometry.IsEmpty():
         found.skipped.setdefault("empty", []).append(name)
         return
@@ -217,7 +222,7 @@ def add_feature(found, feature, column):
         if not np.isfinite(np.asarray(ring.coords)).all():
             raise RunError(found.path, f"{name} has a vertex that is not a finite number", "correct it or remove it")
     if others:
-        found.skipped.setdefault(others, []).append(name)
+        found.skipped.setdefault("other parts" if polygons and others == "no polygon" else others, []).append(name)
     if polygons:
         whole = polygons[0] if len(polygons) == 1 else MultiPolygon(polygons)
         found.shapes.append(Shape(name, whole, thickness))
@@ -237,12 +242,18 @@ def polygons_of(geometry):
     return [p for some, _ in parts for p in some], next((why for _, why in parts if why), None)
 
 
-def positive(value):
+def metres_of(value):
+    """A thickness that a case accepts, or None."""
+    least, most = _library.limit("thickness_m")
     try:
         number = float(value)
     except (TypeError, ValueError):
         return None
-    return number if 0 < number < np.inf else None
+    return number if least <= number <= most else None
+
+
+def thickness_range():
+    return "{:g} to {:g}".format(*_library.limit("thickness_m"))
 
 
 def crs_of_layer(path, source, layer):
@@ -281,12 +292,16 @@ def about_of(path, source, layer=None):
 def mark_cut(found, degrees):
     """Mark outlines that the edge of an image has cut. A vector file has no image: if edges of several outlines lie on
     one side of the bounding box of all, that side is taken for the edge of an image. The 180th meridian, where files in
-    degrees divide floes (RFC 7946), does not count as an edge."""
+    degrees divide floes (RFC 7946), does not count as an edge. Longitudes all around a pole have no box."""
     if found.seen is not None:
         return
     drawn = [s.pixels or s.geometry for s in found.shapes]
+    if degrees:
+        drawn = unwrapped(drawn)
     bounds = np.array([g.bounds for g in drawn])
     sides = np.r_[bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)]
+    if degrees and sides[2] - sides[0] > 180:
+        return
     near = 1e-9 * max(sides[2] - sides[0], sides[3] - sides[1])
     for k in range(4):
         if degrees and k % 2 == 0 and abs(abs(sides[k]) - 180) <= near:
@@ -295,6 +310,15 @@ def mark_cut(found, degrees):
                  if abs(b[k] - sides[k]) <= near and lies_on(g, k % 2, sides[k], near)]
         for shape in lying if len(lying) > 1 else []:
             shape.cut = True
+
+
+def unwrapped(geometries):
+    """The same with each longitude within 180° of the mean direction."""
+    longitudes = np.concatenate([np.asarray(p.exterior.coords)[:, 0] for g in geometries
+                                 for p in getattr(g, "geoms", [g])])
+    middle = np.angle(np.exp(1j * np.radians(longitudes)).mean(), deg=True)
+    return [moved(g, lambda p: p - np.c_[360 * np.rint((p[:, 0] - middle) / 360), np.zeros(len(p))])
+            for g in geometries]
 
 
 def lies_on(geometry, axis, value, near):
@@ -479,11 +503,12 @@ def numbered(labels, ice):
 def thickness_by_value(path, text):
     pairs = [pair.split("=") for pair in (text or "").split(",") if pair]
     try:
-        out = {int(value): positive(metres) for value, metres in pairs}
+        out = {int(value): metres_of(metres) for value, metres in pairs}
     except ValueError:
         out = {0: None}
     if None in out.values():
-        raise RunError(path, f"--thickness {text} is not a list VALUE=M,...", "write for example 1=0.5,2=1.2")
+        raise RunError(path, f"--thickness {text} is not a list VALUE=M,... of thicknesses in metres, "
+                       f"from {thickness_range()}", "write for example 1=0.5,2=1.2")
     return out
 
 

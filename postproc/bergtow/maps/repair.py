@@ -43,25 +43,26 @@ GAP = 2e-5               # passes of `apart`, and after how many the cuts get wi
 PASSES, PATIENCE = 40, 8
 NAMED = 20               # at most so many floes are named in the record
 
-#: kinds of change, in the order of the report
+#: kinds of change, in the order of the report; without the s of its first word each is that of a single one
 KINDS = {
     "empty": "features without a geometry, left out",
-    "no polygon": "features that are not polygons, left out",
+    "no polygon": "features without a polygon, left out",
+    "other parts": "features with parts that are not polygons, these left out",
     "fewer than 3 vertices": "rings of fewer than 3 vertices, left out",
-    "crossing": "outlines that crossed or touched themselves, repaired",
+    "crossing": "outlines with edges that cross or touch, repaired",
     "joined": "features in pieces that meet (as at the 180th meridian), joined",
     "several": "features of several polygons, each now a floe",
     "holes": "floes with holes, filled",
-    "outside": "floes with their middle outside the box, left out",
+    "outside": "floes with the middle outside the box, left out",
     "clear": "floes in the clear circle, left out",
     "stairs": "staircases of pixels straightened",
     "simplified": "outlines simplified to the tolerance",
     "slivers": "slivers narrower than the tolerance, left out",
     "small": "floes smaller than --least, left out",
     "cut": "floes cut by the edge of the image, left out",
-    "cut kept": "floes cut by the edge of the image, kept as they are",
-    "twice": "floes traced twice, one of them left out",
-    "within": "floes that lie in another, left out",
+    "cut kept": "floes cut by the edge of the image, kept unchanged",
+    "twice": "floes traced twice, left out once",
+    "within": "floes within another, left out",
     "overlaps": "overlaps of two floes, taken from the larger",
     "touching": "floes that touched another, drawn back from it",
     "split": "floes cut in pieces by that",

@@ -63,7 +63,7 @@ def change_lines(book):
     lines = []
     for kind in (k for k in KINDS if k in book):
         c = book[kind]
-        text = f"{c.count:6d}  {KINDS[kind]}"
+        text = f"{c.count:6d}  {KINDS[kind] if c.count > 1 else KINDS[kind].replace('s ', ' ', 1)}"
         if c.before and c.after and c.before != c.after:
             ratio = c.after / c.before - 1
             text += f": {area(c.before)} to {area(c.after)}" + (f" ({100 * ratio:+.3g} %" + (
