@@ -1072,8 +1072,8 @@ def test_the_how_to(tmp_path):
     assert "SYNTHETIC" in json.loads((out / "floes.geojson").read_text())["description"]
     summary = json.loads((out / "mosaic-tow/summary.json").read_text())
     # which vertices stay differs between releases of GEOS, and with them the largest overlap and the last digit of a
-    # concentration of some 70 %, from which on the width shows
-    assert {w["code"] for w in summary["warnings"]} <= {"overlap", "narrow_domain"}, summary["warnings"]
+    # concentration of some 70 %, from which on the width shows; ten minutes hold few stretches of contact
+    assert {w["code"] for w in summary["warnings"]} <= {"overlap", "narrow_domain", "too_short"}, summary["warnings"]
     assert summary["max_overlap_relative"] < 0.02 and 0.65 < summary["concentration"] < 0.72  # of parts in the region
     assert "SYNTHETIC" in summary["title"] and summary["n_floes"] > 200
     assert (out / "floes.png").exists() and (out / "mosaic-tow/field.png").exists()
