@@ -391,12 +391,7 @@ static int32_t span(int32_t c, int rings, int32_t wrap, int32_t *first)
     return wrap > 0 && n >= wrap ? wrap : n;
 }
 
-static int by_cell(const void *a, const void *b)
-{
-    const placed *p = a, *q = b;
-    if (p->cell[1] != q->cell[1]) return p->cell[1] < q->cell[1] ? -1 : 1;
-    return (p->cell[0] > q->cell[0]) - (p->cell[0] < q->cell[0]);
-}
+BT_ASCENDING_BY(by_cell, placed, cell[1], cell[0])
 
 /// Copies of floes in cell (x, y): [first, end).
 static void find_copies(const surroundings *around, int32_t x, int32_t y, bt_idx *first, bt_idx *end)
