@@ -5,6 +5,7 @@
 
 #include <stdlib.h>
 
+#include "base/inside.h"
 #include "bergtow/base.h"
 
 typedef struct key {
@@ -12,12 +13,7 @@ typedef struct key {
     int vertex;
 } key;
 
-static int by_position(const void *a, const void *b)
-{
-    const key *p = a, *q = b;
-    if (p->x != q->x) return p->x < q->x ? -1 : 1;
-    return (p->vertex > q->vertex) - (p->vertex < q->vertex);
-}
+BT_ASCENDING_BY(by_position, key, x, vertex)
 
 static int longer_side(const bt_graph *graph, int n, const key *k)
 {

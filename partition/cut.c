@@ -18,6 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/inside.h"
 #include "bergtow/base.h"
 
 static const double KEEP = 1.25;  // factor by which the old labels may be worse
@@ -238,12 +239,7 @@ typedef struct overlap {
     int new, old;
 } overlap;
 
-static int by_parts(const void *a, const void *b)
-{
-    const overlap *p = a, *q = b;
-    if (p->new != q->new) return p->new < q->new ? -1 : 1;
-    return (p->old > q->old) - (p->old < q->old);
-}
+BT_ASCENDING_BY(by_parts, overlap, new, old)
 
 static int largest_first(const void *a, const void *b)
 {

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/inside.h"
 #include "tow/tow.h"
 #include "partition/division.h"
 #include "partition/domain.h"
@@ -103,12 +104,7 @@ void bt_domain_largest(const bt_world *world, double *x)
 /// An island here and a body that may join it to an island elsewhere.
 typedef struct { bt_gid body, name; } membership;
 
-static int by_body(const void *p, const void *q)
-{
-    const membership *a = p, *b = q;
-    if (a->body != b->body) return a->body < b->body ? -1 : 1;
-    return (a->name > b->name) - (a->name < b->name);
-}
+BT_ASCENDING_BY(by_body, membership, body, name)
 
 static int by_gid(const void *p, const void *q)
 {
@@ -260,12 +256,7 @@ void bt_domain_check(bt_world *world)
 
 typedef struct { bt_gid gid; int64_t sharers; uint64_t state; } copy;
 
-static int by_copy(const void *p, const void *q)
-{
-    const copy *a = p, *b = q;
-    if (a->gid != b->gid) return a->gid < b->gid ? -1 : 1;
-    return (a->state > b->state) - (a->state < b->state);
-}
+BT_ASCENDING_BY(by_copy, copy, gid, state)
 
 /// Least gid of a body here in the wrong cell or under the wrong name; INT64_MAX = none.
 static bt_gid misplaced(const bt_world *world)

@@ -226,7 +226,7 @@ static void tow_line(sink *to, const bt_case *input)
     flag(to, "line.starts_slowly", bt_case_start_is_slow(input), ": ok", ": TOO SHORT: the start jerks the line");
     if (input->tow.mode != BT_TOW_THRUST) return;
     double current[2]; // if it changes, its mean over the run
-    bt_environment_mean(input, true, current);
+    bt_environment_mean(input, current);
     const double through = input->tow.speed - current[0] * bt_cos(input->tow.direction) -
                            current[1] * bt_sin(input->tow.direction),
                  r = bt_min(bt_max(through, 0) / input->tow.vessel.free_speed, 1);

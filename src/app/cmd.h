@@ -36,8 +36,8 @@ extern const struct argp_child bt_cmd_with_case[];
 /// The argp parser of --threads, --steps, --max-wall and --quiet. Its input is a bt_run_options.
 extern const struct argp bt_cmd_steps_argp;
 
-/// A whole number in [lo, hi] from an option's text; anything else ends the program with code 2.
-int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi);
+/// A whole number from 1 to `most` in an option's text; anything else ends the program with code 2.
+int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t most);
 
 /// out/NAME for path/NAME.yml; the caller frees it.
 char *bt_cmd_default_folder(const char *path);

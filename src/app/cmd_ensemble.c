@@ -117,7 +117,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
         opt->run.dir = arg;
         return 0;
-    case 'j': opt->run.jobs = (int)bt_cmd_number(state, "--jobs", arg, 1, BT_MAX_JOBS); return 0;
+    case 'j': opt->run.jobs = (int)bt_cmd_number(state, "--jobs", arg, BT_MAX_JOBS); return 0;
     case KEY_RETRY: opt->run.retry = true; return 0;
     case KEY_LEAVE: opt->run.leave = true; return 0;
     default: return ARGP_ERR_UNKNOWN;

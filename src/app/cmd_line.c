@@ -107,13 +107,13 @@ static const struct argp_option case_options[] = {
 const struct argp bt_cmd_case_argp = {.options = case_options, .parser = parse_case};
 const struct argp_child bt_cmd_with_case[] = {{.argp = &bt_cmd_case_argp}, {0}};
 
-int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi)
+int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t most)
 {
     char *end;
     errno = 0;
     long long v = strtoll(text, &end, 10);
-    if (end == text || *end || errno || v < lo || v > hi)
-        argp_error(state, "%s %s: give a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
+    if (end == text || *end || errno || v < 1 || v > most)
+        argp_error(state, "%s %s: give a whole number from 1 to %lld", option, text, (long long)most);
     return v;
 }
 
@@ -133,9 +133,9 @@ static error_t parse_steps(int key, char *arg, struct argp_state *state)
 {
     bt_run_options *run = state->input;
     switch (key) {
-    case 't': run->threads = (int)bt_cmd_number(state, "--threads", arg, 1, BT_MOST_THREADS); return 0;
+    case 't': run->threads = (int)bt_cmd_number(state, "--threads", arg, BT_MOST_THREADS); return 0;
     case 'q': run->quiet = true; return 0;
-    case KEY_STEPS: run->max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_STEPS: run->max_steps = bt_cmd_number(state, "--steps", arg, 1000000000); return 0;
     case KEY_WALL: run->max_wall = duration(state, "--max-wall", arg); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }

@@ -29,7 +29,7 @@ static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
         return;
     }
     *colon = 0;
-    run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, 1, INT64_MAX);
+    run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, INT64_MAX);
     run->dump_path = colon + 1;
 }
 

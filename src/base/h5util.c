@@ -57,14 +57,14 @@ static bt_deflater *create(void)
     return NULL;
 }
 
-/// Bytes of a sample compressed by method w; n if zlib fails.
-static size_t tried(z_stream *z, way w, const unsigned char *sample, size_t n)
+/// Bytes of a sample compressed by method w; SAMPLE if zlib fails.
+static size_t tried(z_stream *z, way w, const unsigned char *sample)
 {
     unsigned char out[2 * SAMPLE];
-    if (deflateReset(z) != Z_OK || deflateParams(z, w.level, w.strategy) != Z_OK) return n;
-    z->next_in = (unsigned char *)sample, z->avail_in = (unsigned)n;
+    if (deflateReset(z) != Z_OK || deflateParams(z, w.level, w.strategy) != Z_OK) return SAMPLE;
+    z->next_in = (unsigned char *)sample, z->avail_in = SAMPLE;
     z->next_out = out, z->avail_out = sizeof out;
-    return deflate(z, Z_FINISH) == Z_STREAM_END ? (size_t)z->total_out : n;
+    return deflate(z, Z_FINISH) == Z_STREAM_END ? (size_t)z->total_out : SAMPLE;
 }
 
 static way way_of(z_stream *trial, const unsigned char *plane, size_t n)
@@ -73,7 +73,7 @@ static way way_of(z_stream *trial, const unsigned char *plane, size_t n)
     unsigned char sample[SAMPLE];
     const size_t piece = SAMPLE / PIECES, step = (n - piece) / (PIECES - 1);
     for (size_t k = 0; k < PIECES; k++) memcpy(sample + k * piece, plane + k * step, piece);
-    const size_t bytes = tried(trial, BY_BYTES, sample, SAMPLE), repeats = tried(trial, BY_REPEATS, sample, SAMPLE),
+    const size_t bytes = tried(trial, BY_BYTES, sample), repeats = tried(trial, BY_REPEATS, sample),
                  least = bytes < repeats ? bytes : repeats;
     if ((double)least > (1 - GAIN) * SAMPLE) return STORED;
     return bytes < repeats ? BY_BYTES : BY_REPEATS;

@@ -25,7 +25,7 @@ void bt_leave_by(void (*by)(int code));
         if ((n) == (cap)) (list) = bt_realloc(list, (size_t)((cap) = (cap) ? 2 * (cap) : (first)), sizeof *(list));    \
     } while (0)
 
-// Ascending order of doubles, for qsort.
+// Order of doubles, for qsort.
 
 static inline int bt_ascending(const void *a, const void *b)
 {
@@ -33,6 +33,15 @@ static inline int bt_ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 static inline int bt_descending(const void *a, const void *b) { return bt_ascending(b, a); }
+
+/// Define an order of structs, for qsort: by one number of theirs, and where that is the same by another.
+#define BT_ASCENDING_BY(name, type, first, second)                                                                     \
+    static int name(const void *p, const void *q)                                                                      \
+    {                                                                                                                  \
+        const type *a = p, *b = q;                                                                                     \
+        if (a->first != b->first) return a->first < b->first ? -1 : 1;                                                 \
+        return (a->second > b->second) - (a->second < b->second);                                                      \
+    }
 
 // Functions that take most of the time, compiled for the processor in use, on which no bit of their results depends.
 

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/inside.h"
 #include "contact/overlap.h"
 #include "body/bodies.h"
 #include "contact/row.h"
@@ -103,12 +104,7 @@ static double count(const bt_world *world, const bt_memory *memory, bt_sum *numb
     return depth_of(memory);
 }
 
-static int by_bodies(const void *p, const void *q)
-{
-    const bt_memory *a = p, *b = q;
-    if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    return a->b < b->b ? -1 : a->b > b->b;
-}
+BT_ASCENDING_BY(by_bodies, bt_memory, a, b)
 
 /// Depth of each point from the earlier crushing of the two bodies, in these parts or in others: contact that moves
 /// from part to part is sliding. So is a point that is found again: meanwhile they may have crushed each other deeper

@@ -91,11 +91,7 @@ static void unite(const bt_world *world, const touch *t, size_t n)
             if (t[i].n_points == 2 && t[j].n_points == 2) settle(world, &t[i], &t[j]);
 }
 
-static int by_body(const void *p, const void *q)
-{
-    const touch *a = p, *b = q;
-    return a->body != b->body ? (a->body < b->body ? -1 : 1) : a->place < b->place ? -1 : a->place > b->place;
-}
+BT_ASCENDING_BY(by_body, touch, body, place)
 
 void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n)
 {

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/polygons.h"
+
 #define ALONG 0.98 // cosine between edges that may lie on each other, as for reference edges (manifold.c)
 
 static int count_of(const bt_bodies *bodies, bt_idx i, int part)
@@ -16,33 +18,6 @@ static int count_of(const bt_bodies *bodies, bt_idx i, int part)
 static const double *outline_of(const bt_bodies *bodies, bt_idx i, int part)
 {
     return bodies->outline + 2 * (bodies->offset[i] + part);
-}
-
-/// Keep the part to the left of the line from (x0, y0) along (ex, ey), an edge of b.
-static void cut(bt_overlap *overlap, double x0, double y0, double ex, double ey)
-{
-    const double *in = overlap->v[overlap->now], *last = in + 2 * (overlap->n - 1);
-    const uint8_t *of = overlap->of_b[overlap->now];
-    double *out = overlap->v[1 - overlap->now], before = ex * (last[1] - y0) - ey * (last[0] - x0);
-    uint8_t *mark = overlap->of_b[1 - overlap->now], last_of = of[overlap->n - 1];
-    int kept = 0;
-    for (int k = 0; k < overlap->n; k++) {
-        const double *now = in + 2 * k, inside = ex * (now[1] - y0) - ey * (now[0] - x0);
-        if ((inside >= 0) != (before >= 0)) {
-            const double f = before / (before - inside);
-            out[2 * kept] = last[0] + f * (now[0] - last[0]);
-            out[2 * kept + 1] = last[1] + f * (now[1] - last[1]);
-            mark[kept++] = inside >= 0 ? last_of : 1;
-        }
-        if (inside >= 0) {
-            out[2 * kept] = now[0];
-            out[2 * kept + 1] = now[1];
-            mark[kept++] = of[k];
-        }
-        last = now, before = inside, last_of = of[k];
-    }
-    overlap->n = kept;
-    overlap->now = 1 - overlap->now;
 }
 
 void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double dx, double dy,
@@ -60,24 +35,20 @@ void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t p
     memset(overlap->of_b[0], 0, (size_t)overlap->n);
     for (int e = 0; e < n_b && overlap->n > 0; e++) {
         const double *p0 = q + 2 * e, *p1 = q + 2 * (e + 1 < n_b ? e + 1 : 0);
-        cut(overlap, p0[0] + off[0], p0[1] + off[1], p1[0] - p0[0], p1[1] - p0[1]);
+        const double at[2] = {p0[0] + off[0], p0[1] + off[1]}, along[2] = {p1[0] - p0[0], p1[1] - p0[1]};
+        const int now = overlap->now, next = 1 - now;
+        overlap->n = (int)bt_polygon_cut(overlap->n, overlap->v[now], overlap->of_b[now], at, along, overlap->v[next],
+                                         overlap->of_b[next]);
+        overlap->now = next;
     }
 }
 
 double bt_overlap_area(const bt_overlap *overlap, double centroid[2])
 {
-    const double *v = overlap->v[overlap->now];
-    double twice = 0, x = 0, y = 0;
-    for (int k = 1; k + 1 < overlap->n; k++) { // triangles about the first vertex
-        const double px = v[2 * k] - v[0], py = v[2 * k + 1] - v[1], qx = v[2 * k + 2] - v[0], qy = v[2 * k + 3] - v[1];
-        const double c = px * qy - py * qx;
-        twice += c;
-        x += c * (px + qx);
-        y += c * (py + qy);
-    }
-    centroid[0] = twice > 0 ? v[0] + x / (3 * twice) : 0;
-    centroid[1] = twice > 0 ? v[1] + y / (3 * twice) : 0;
-    return bt_max(0, 0.5 * twice);
+    const bt_moments moments = bt_shape_centroid(overlap->n, overlap->v[overlap->now]);
+    centroid[0] = moments.area > 0 ? moments.cx : 0;
+    centroid[1] = moments.area > 0 ? moments.cy : 0;
+    return bt_max(0, moments.area);
 }
 
 /// Depth of point p inside an outline placed at (x, y), from the nearest edge that faces along (nx, ny); INFINITY if

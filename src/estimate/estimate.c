@@ -253,7 +253,7 @@ void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_
     in->width = bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead));
     if (input->tow.mode == BT_TOW_NONE) return;
     double current[2]; // if it changes, its mean over the run
-    bt_environment_mean(input, true, current);
+    bt_environment_mean(input, current);
     const double *drift = isnan(ice[0]) ? current : ice;
     const double rx = input->tow.speed * ux - current[0], ry = input->tow.speed * uy - current[1],
                  ix = input->tow.speed * ux - drift[0], iy = input->tow.speed * uy - drift[1];

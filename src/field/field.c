@@ -8,6 +8,7 @@
 
 #include "bergtow/shape.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "field/field_make.h"
 
 // --- as blocks of memory ---------------------------------------------------------------------------------------------
@@ -177,12 +178,7 @@ static uint64_t spread_bits(uint64_t x)
 
 typedef struct key { uint64_t code; bt_idx i; } key;
 
-static int by_code(const void *a, const void *b)
-{
-    const key *p = a, *q = b;
-    if (p->code != q->code) return p->code < q->code ? -1 : 1;
-    return (p->i > q->i) - (p->i < q->i);
-}
+BT_ASCENDING_BY(by_code, key, code, i)
 
 void bt_field_sort(bt_field *f, const bt_region *region)
 {

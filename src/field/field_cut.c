@@ -134,14 +134,13 @@ static double to_cut(const axis axes[2], const double *at)
     return least;
 }
 
-/// Factors by which all floes may be scaled at the same time so that no two touch and no area exceeds (1 + change)
-/// times the original one, `first`.
-static void room_of(const bt_region *region, const bt_field *field, const double *first, double change,
-                    double *clearance)
+/// Factors by which all floes may be scaled at the same time so that no two touch and no area exceeds 1 +
+/// LAST_CHANGE times the original one, `first`.
+static void room_of(const bt_region *region, const bt_field *field, const double *first, double *clearance)
 {
-    bt_field_growth(region, field, sqrt(1 + change), clearance);
+    bt_field_growth(region, field, sqrt(1 + LAST_CHANGE), clearance);
     for (bt_idx i = 0; i < field->n; i++)
-        clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + change) * first[i] / field->area[i]));
+        clearance[i] = bt_min(TOUCH * clearance[i], sqrt((1 + LAST_CHANGE) * first[i] / field->area[i]));
 }
 
 /// Scale the floes of the strip; returns the area reached, m².
@@ -154,7 +153,7 @@ static double scale_strip(const bt_region *region, const axis axes[2], const boo
     memcpy(first, field->area, (size_t)field->n * sizeof *first);
     for (int k = 0; k < 2; k++)
         if (axes[k].at_low || axes[k].at_high) widest = bt_min(widest, WIDEST * (axes[k].high - axes[k].low));
-    room_of(region, field, first, LAST_CHANGE, clearance);
+    room_of(region, field, first, clearance);
     for (field->strip = bt_min(size, widest);; field->strip = bt_min(field->strip + size, widest)) {
         for (bt_idx i = 0; i < field->n; i++)
             held[i] = !parted[i] && !(to_cut(axes, field->pose + 3 * i) < field->strip);
@@ -168,7 +167,7 @@ static double scale_strip(const bt_region *region, const axis axes[2], const boo
     }
     // Room in a gap that one neighbour does not use is available to the other.
     for (int pass = 0; pass < MORE_PASSES && area < (1 - ROUND_OFF) * wanted; pass++) {
-        room_of(region, field, first, LAST_CHANGE, clearance);
+        room_of(region, field, first, clearance);
         area = bt_field_fit(field, clearance, held, wanted);
     }
     free(first);

@@ -33,8 +33,6 @@ static void add_static(bt_world *world, int n, double *v)
                                        .vertices = v,
                                        .x = moments.cx,
                                        .y = moments.cy,
-                                       .mass = 1,
-                                       .inertia = 1,
                                        .restitution = 1});
 }
 

@@ -13,6 +13,7 @@
 
 #include "field/field_make.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/rng.h"
 
 static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order in which sizes are assigned
@@ -74,12 +75,7 @@ typedef struct piece {
     int64_t id;
 } piece;
 
-static int by_key(const void *a, const void *b)
-{
-    const piece *p = a, *q = b;
-    if (p->key != q->key) return p->key < q->key ? -1 : 1;
-    return (p->id > q->id) - (p->id < q->id);
-}
+BT_ASCENDING_BY(by_key, piece, key, id)
 
 // Strip k holds pieces [first[k], first[k+1]). share: cell area per target area, over lx. Returns the number of strips;
 // *last: width of the last strip over the width it should have.

@@ -59,10 +59,10 @@ void bt_environment_at(const bt_case *input, bool water, double t, double v[2])
     velocity(&fluid, t, v);
 }
 
-void bt_environment_mean(const bt_case *input, bool water, double v[2])
+void bt_environment_mean(const bt_case *input, double v[2])
 {
     enum { SAMPLES = 1000 };
-    const flow fluid = flow_of(input, water);
+    const flow fluid = flow_of(input, true);
     v[0] = fluid.u, v[1] = fluid.v;
     if (!changes(&fluid)) return;
     double sum[2] = {0, 0};

@@ -46,8 +46,8 @@ void bt_environment_advance(bt_world *world);
 /// Current (water true) or wind of a case at time t, m/s.
 void bt_environment_at(const bt_case *input, bool water, double t, double v[2]);
 
-/// Mean of current or wind over the run, m/s.
-void bt_environment_mean(const bt_case *input, bool water, double v[2]);
+/// Mean of the current over the run, m/s.
+void bt_environment_mean(const bt_case *input, double v[2]);
 
 /// Does the current or the wind of a case change in time?
 bool bt_environment_changes(const bt_case *input);

@@ -8,6 +8,7 @@
 #include "base/elementary.h"
 #include "base/inside.h"
 #include "body/bodies.h"
+#include "geometry/polygons.h"
 #include "partition/domain.h"
 #include "space/cells.h"
 #include "space/phases.h"
@@ -179,38 +180,14 @@ static int outline_of(const neighbour *near, const double **v)
     return bt_body_corners(near->b, near->i);
 }
 
-/// Area shared by two convex outlines, m²: b clipped by the edges of a, one after the other.
+/// Area shared by two convex outlines, m².
 static double shared(const neighbour *a, const neighbour *b)
 {
     const double *v, *u, dx = b->dx - a->dx, dy = b->dy - a->dy;
-    const int n = outline_of(a, &v);
-    int m = outline_of(b, &u);
+    const int n = outline_of(a, &v), m = outline_of(b, &u);
     double left[2][4 * BT_MAX_VERTICES];
     for (int k = 0; k < m; k++) left[0][2 * k] = u[2 * k] + dx, left[0][2 * k + 1] = u[2 * k + 1] + dy;
-    for (int e = 0; e < n; e++) {
-        const double *p = v + 2 * e, *q = v + 2 * (e + 1 < n ? e + 1 : 0);
-        const double *from = left[e & 1], *last = from + 2 * (m - 1);
-        const double ex = q[0] - p[0], ey = q[1] - p[1];
-        double *to = left[1 - (e & 1)], before = m > 0 ? ex * (last[1] - p[1]) - ey * (last[0] - p[0]) : 0;
-        int kept = 0;
-        for (int k = 0; k < m; last = from + 2 * k++) {
-            const double *at = from + 2 * k, inside = ex * (at[1] - p[1]) - ey * (at[0] - p[0]);
-            if ((inside >= 0) != (before >= 0)) {
-                const double f = before / (before - inside);
-                to[2 * kept] = last[0] + f * (at[0] - last[0]);
-                to[2 * kept++ + 1] = last[1] + f * (at[1] - last[1]);
-            }
-            if (inside >= 0) to[2 * kept] = at[0], to[2 * kept++ + 1] = at[1];
-            before = inside;
-        }
-        m = kept;
-    }
-    const double *v_left = left[n & 1];
-    double twice = 0;
-    for (int k = 1; k + 1 < m; k++)
-        twice += (v_left[2 * k] - v_left[0]) * (v_left[2 * k + 3] - v_left[1]) -
-                 (v_left[2 * k + 1] - v_left[1]) * (v_left[2 * k + 2] - v_left[0]);
-    return bt_max(0, 0.5 * twice);
+    return bt_max(0, bt_polygon_shared(m, n, v, (double *const[]){left[0], left[1]}));
 }
 
 /// Do two convex outlines overlap by more than `slop`, m, along every edge normal of the first? A second call tests the
@@ -414,12 +391,7 @@ static int32_t span(int32_t c, int rings, int32_t wrap, int32_t *first)
     return wrap > 0 && n >= wrap ? wrap : n;
 }
 
-static int by_cell(const void *a, const void *b)
-{
-    const placed *p = a, *q = b;
-    if (p->cell[1] != q->cell[1]) return p->cell[1] < q->cell[1] ? -1 : 1;
-    return (p->cell[0] > q->cell[0]) - (p->cell[0] < q->cell[0]);
-}
+BT_ASCENDING_BY(by_cell, placed, cell[1], cell[0])
 
 /// Copies of floes in cell (x, y): [first, end).
 static void find_copies(const surroundings *around, int32_t x, int32_t y, bt_idx *first, bt_idx *end)

@@ -44,6 +44,46 @@ bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx
     return apart;
 }
 
+// --- clipping --------------------------------------------------------------------------------------------------------
+
+int64_t bt_polygon_cut(int64_t n, const double *v, const uint8_t *of, const double at[2], const double along[2],
+                       double *out, uint8_t *mark)
+{
+    const double *last = v + 2 * (n - 1);
+    double before = along[0] * (last[1] - at[1]) - along[1] * (last[0] - at[0]);
+    uint8_t last_of = of ? of[n - 1] : 0;
+    int64_t kept = 0;
+    for (int64_t k = 0; k < n; k++) {
+        const double *now = v + 2 * k, inside = along[0] * (now[1] - at[1]) - along[1] * (now[0] - at[0]);
+        if ((inside >= 0) != (before >= 0)) {
+            const double f = before / (before - inside);
+            out[2 * kept] = last[0] + f * (now[0] - last[0]);
+            out[2 * kept + 1] = last[1] + f * (now[1] - last[1]);
+            if (mark) mark[kept] = inside >= 0 ? last_of : 1;
+            kept++;
+        }
+        if (inside >= 0) {
+            out[2 * kept] = now[0];
+            out[2 * kept + 1] = now[1];
+            if (mark) mark[kept] = of[k];
+            kept++;
+        }
+        last = now, before = inside;
+        if (of) last_of = of[k];
+    }
+    return kept;
+}
+
+double bt_polygon_shared(int64_t n, int m, const double *by, double *const w[2])
+{
+    int now = 0;
+    for (int e = 0; e < m && n > 0; e++, now = 1 - now) {
+        const double *p = by + 2 * e, *q = by + 2 * (e + 1 < m ? e + 1 : 0), along[2] = {q[0] - p[0], q[1] - p[1]};
+        n = bt_polygon_cut(n, w[now], NULL, p, along, w[1 - now], NULL);
+    }
+    return 0.5 * bt_outline_area2((int)n, w[now]);
+}
+
 // --- motion ----------------------------------------------------------------------------------------------------------
 
 // Conservative advancement (Mirtich 1996) of two convex polygons in the plane.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two convex polygons: their distance, and whether they meet as they move; outlines that lie flush.
+// Two polygons: their distance, and whether they meet as they move; what they share; outlines that lie flush.
 #ifndef BT_POLYGONS_H
 #define BT_POLYGONS_H
 
@@ -39,6 +39,19 @@ typedef struct bt_moving {
 /// turns about to that of b at the beginning, m. Never false if it does; also true for some that pass at little more
 /// than `near` (1 % in straight motion).
 bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy, double near, double dt);
+
+// --- clipping --------------------------------------------------------------------------------------------------------
+
+/// The part of a polygon of n points to the left of the line through `at` along `along` [Sutherland & Hodgman 1974,
+/// Comm. ACM 17], to out: at most 2 n points, n + 1 of a convex one; returns their number. of, mark: of the edge that
+/// starts at each point, before and after; an edge along the line gets 1. NULL = none.
+int64_t bt_polygon_cut(int64_t n, const double *v, const uint8_t *of, const double at[2], const double along[2],
+                       double *out, uint8_t *mark);
+
+/// Signed area, m², of the polygon of n points in w[0] within a convex, anticlockwise one of m points: cut at each of
+/// its edges. Cutting a polygon that is not convex leaves seams, whose areas cancel. w: two arrays with room for all
+/// cuts, which are overwritten.
+double bt_polygon_shared(int64_t n, int m, const double *by, double *const w[2]);
 
 // --- flush outlines --------------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 #include "route/swath.h"
 
 #include "base/elementary.h"
+#include "geometry/polygons.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -359,41 +360,6 @@ bool bt_swath_better(const bt_path_cost *a, const bt_path_cost *b)
     return a->second < b->second * (1 - 1e-9);
 }
 
-/// Area of a polygon of n points within a convex, anticlockwise one of m points, by clipping at each edge of the latter
-/// [Sutherland & Hodgman 1974]. Clipping a polygon that is not convex leaves seams, whose areas cancel. w: two work
-/// arrays of 2^m n points.
-static double shared_area(int64_t n, const double *v, int m, const double *by, double *w[2])
-{
-    int now = 0;
-    memcpy(w[0], v, (size_t)n * 2 * sizeof *v);
-    for (int e = 0; e < m && n > 0; e++) {
-        const double *p = by + 2 * e, *q = by + 2 * (e + 1 < m ? e + 1 : 0), ex = q[0] - p[0], ey = q[1] - p[1];
-        const double *in = w[now], *last = in + 2 * (n - 1);
-        double *out = w[1 - now], before = ex * (last[1] - p[1]) - ey * (last[0] - p[0]);
-        int64_t kept = 0;
-        for (int64_t k = 0; k < n; k++) {
-            const double *at = in + 2 * k, inside = ex * (at[1] - p[1]) - ey * (at[0] - p[0]);
-            if ((inside >= 0) != (before >= 0)) {
-                const double f = before / (before - inside);
-                out[2 * kept] = last[0] + f * (at[0] - last[0]);
-                out[2 * kept++ + 1] = last[1] + f * (at[1] - last[1]);
-            }
-            if (inside >= 0) {
-                out[2 * kept] = at[0];
-                out[2 * kept++ + 1] = at[1];
-            }
-            last = at, before = inside;
-        }
-        n = kept;
-        now = 1 - now;
-    }
-    double twice = 0; // about the first point: coordinates are large compared with floes
-    const double *o = w[now];
-    for (int64_t k = 1; k + 1 < n; k++)
-        twice += (o[2 * k] - o[0]) * (o[2 * k + 3] - o[1]) - (o[2 * k + 1] - o[1]) * (o[2 * k + 2] - o[0]);
-    return 0.5 * fabs(twice);
-}
-
 /// Ice in the swath: clip the floes to the stretches, arcs in slices of at most 3°.
 static void clip_floes(const bt_planner *planner, bt_route *route)
 {
@@ -444,8 +410,9 @@ static void clip_floes(const bt_planner *planner, bt_route *route)
             for (int64_t i = 0; i < task->n_floes; i++) {
                 const double *b = box + 4 * i;
                 if (b[0] > high[0] || b[1] > high[1] || b[2] < low[0] || b[3] < low[1]) continue;
-                const int64_t first = task->floe_first[i];
-                const double area = shared_area(task->floe_first[i + 1] - first, task->floe + 2 * first, 4, v, w);
+                const int64_t first = task->floe_first[i], n = task->floe_first[i + 1] - first;
+                memcpy(w[0], task->floe + 2 * first, (size_t)n * 2 * sizeof **w);
+                const double area = fabs(bt_polygon_shared(n, 4, v, w));
                 route->ice_area += area;
                 route->ice_mass += area * task->density * task->thickness[i];
             }

@@ -314,12 +314,7 @@ typedef struct {
     int64_t condition;
 } lot;
 
-static int by_lot(const void *a, const void *b)
-{
-    const lot *p = a, *q = b;
-    if (p->key != q->key) return p->key < q->key ? -1 : 1;
-    return (p->condition > q->condition) - (p->condition < q->condition);
-}
+BT_ASCENDING_BY(by_lot, lot, key, condition)
 
 /// A random permutation of the strata for each parameter, by sorting random numbers.
 void bt_study_draw_strata(bt_study *study)

@@ -244,28 +244,30 @@ static void drop_islands_below(bt_world *world, bt_islands *islands, double spee
         if (!(islands->share[i] > speed * bt_sum_value(&islands->sum[i]))) islands->share[i] = 0;
 }
 
+static double normal_load(const hard *h) { return h->u.ln[0] + h->u.ln[1]; }
+static double above_rounding(const hard *h) { return normal_load(h) - BT_LOCKED_ROUNDING * h->at_first; }
+static double moved(const hard *h) { return fabs(normal_load(h) - h->at_first) - BT_LOCKED_OTHER * h->at_first; }
+
+/// Write the sum of a quantity of the contacts of each island to sum.
+static void add_contacts(bt_world *world, bt_islands *islands, const loads *found, double (*of)(const hard *h))
+{
+    bt_islands_clear(world, islands);
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++)
+        bt_sum_add(&islands->sum[bt_islands_of(world, islands, &found->contact[i].u)], of(&found->contact[i]));
+    bt_islands_add(world, islands);
+}
+
 /// Strike out islands that close no faster than the tolerance.
 static void drop_islands_not_closing(bt_world *world, bt_islands *islands, const loads *found)
 {
-    bt_islands_clear(world, islands);
-    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
-        const bt_contact *contact = &found->contact[i].u;
-        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)], contact->ln[0] + contact->ln[1]);
-    }
-    bt_islands_add(world, islands);
+    add_contacts(world, islands, found, normal_load);
     drop_islands_below(world, islands, world->par.tolerance);
 }
 
 /// Strike out islands whose balanced loads are no more than rounding errors: they prove nothing.
 static void drop_islands_without_loads(bt_world *world, bt_islands *islands, const loads *found)
 {
-    bt_islands_clear(world, islands);
-    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
-        const bt_contact *contact = &found->contact[i].u;
-        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
-                   contact->ln[0] + contact->ln[1] - BT_LOCKED_ROUNDING * found->contact[i].at_first);
-    }
-    bt_islands_add(world, islands);
+    add_contacts(world, islands, found, above_rounding);
     for (bt_idx i = 0; i < world->bodies.n; i++)
         if (!(bt_sum_value(&islands->sum[i]) > 0)) islands->share[i] = 0;
 }
@@ -273,14 +275,7 @@ static void drop_islands_without_loads(bt_world *world, bt_islands *islands, con
 /// Strike out islands whose balanced loads differ from those at the end of the sweeps.
 static void drop_islands_moved(bt_world *world, bt_islands *islands, const loads *found)
 {
-    bt_islands_clear(world, islands);
-    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) {
-        const bt_contact *contact = &found->contact[i].u;
-        const double was = found->contact[i].at_first;
-        bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
-                   fabs(contact->ln[0] + contact->ln[1] - was) - BT_LOCKED_OTHER * was);
-    }
-    bt_islands_add(world, islands);
+    add_contacts(world, islands, found, moved);
     for (bt_idx i = 0; i < world->bodies.n; i++)
         if (bt_sum_value(&islands->sum[i]) > 0) islands->share[i] = 0;
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "body/bodies.h"
 #include "space/exchange.h"
 
@@ -235,12 +236,7 @@ typedef struct {
     bt_idx from;
 } sort_key;
 
-static int by_cell(const void *p, const void *q)
-{
-    const sort_key *a = p, *b = q;
-    if (a->cell != b->cell) return a->cell < b->cell ? -1 : 1;
-    return a->gid < b->gid ? -1 : a->gid > b->gid;
-}
+BT_ASCENDING_BY(by_cell, sort_key, cell, gid)
 
 static void **array_of(bt_bodies *bodies, int k) { return (void **)((char *)bodies + bt_body_fields[k].array); }
 

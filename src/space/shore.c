@@ -52,19 +52,14 @@ bool bt_shore_in_cone(const bt_face *face, double nx, double ny)
 
 // --- tree ------------------------------------------------------------------------------------------------------------
 
-static int along_x(const void *p, const void *q)
+static int along(int axis, const bt_shore_polygon *a, const bt_shore_polygon *b)
 {
-    const bt_shore_polygon *a = p, *b = q;
-    const double x = a->low[0] + a->high[0], y = b->low[0] + b->high[0];
+    const double x = a->low[axis] + a->high[axis], y = b->low[axis] + b->high[axis];
     return x != y ? (x < y ? -1 : 1) : a->gid != b->gid ? (a->gid < b->gid ? -1 : 1) : a->part - b->part;
 }
 
-static int along_y(const void *p, const void *q)
-{
-    const bt_shore_polygon *a = p, *b = q;
-    const double x = a->low[1] + a->high[1], y = b->low[1] + b->high[1];
-    return x != y ? (x < y ? -1 : 1) : a->gid != b->gid ? (a->gid < b->gid ? -1 : 1) : a->part - b->part;
-}
+static int along_x(const void *p, const void *q) { return along(0, p, q); }
+static int along_y(const void *p, const void *q) { return along(1, p, q); }
 
 static void build_node(bt_shore *shore, int node, int begin, int end)
 {

@@ -10,10 +10,6 @@
 #include "base/elementary.h"
 #include "case/speed_law.h"
 
-// --- rows of the line, and the vessel --------------------------------------------------------------------------------
-
-// The line rows of a step and the vessel at the end of the line; equations in tow/tow.h.
-
 // --- the vessel ------------------------------------------------------------------------------------------------------
 
 /// Course of the vessel and its three possible linear models at the end of the step.

@@ -45,11 +45,11 @@ TEST(ellipse_by_hand)
     // largest more.
     double mean[2];
     c.run.duration = 24 * hour;
-    bt_environment_mean(&c, true, mean);
+    bt_environment_mean(&c, mean);
     CHECK_CLOSE(mean[0], 0.1, 1e-9);
     CHECK_CLOSE(mean[1], -0.05, 1e-9);
     c.run.duration = 6 * hour, c.water.tide.phase = 90 * deg;
-    bt_environment_mean(&c, true, mean);
+    bt_environment_mean(&c, mean);
     CHECK_CLOSE(mean[0], 0.1 + 2 / BT_PI * 0.5 * x, 1e-6);
     CHECK_CLOSE(mean[1], -0.05 + 2 / BT_PI * 0.5 * y, 1e-6);
     bt_case_free(&c);
