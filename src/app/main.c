@@ -197,7 +197,7 @@ static int bergtow(int argc, char **argv)
         if (argc > 2 && !json) return refuse_word("option", argv[2], (const char *const[]){"--json", NULL});
         (json ? lists[list].json : lists[list].text)(stdout);
     }
-    if (help || version || list >= 0) return fflush(stdout) ? BT_ERR_IO : BT_OK;
+    if (help || version || list >= 0) return bt_cmd_end(&bt_comm_alone, BT_OK, &(bt_errors){0});
 
     if (word[0] == '-')
         return refuse_word("option", word,

@@ -20,6 +20,8 @@ static const double GROWN = 1.25, BYTES_PER_ENTRY = 810, MOST_OF_ENTRIES = 110e6
                     MOST_OF_FRAMES = 60e6;
 // on rank 0 while it writes a checkpoint: contacts in transit, and a column of the bodies
 static const double CHECKPOINT_BYTES_PER_FLOE = 300;
+// on rank 0 while it makes the ice, before there is a run: cells of the tessellation, the world that shakes the floes
+static const double MAKING_BYTES_PER_FLOE = 3500;
 
 // --- disk ------------------------------------------------------------------------------------------------------------
 
@@ -96,11 +98,12 @@ static double steps_kept(const bt_case *input)
 
 double bt_cost_memory(const bt_case *input, double n_floes, double parts, int size, int ranks_here)
 {
-    return (BASE_BYTES + (BYTES_PER_FLOE * n_floes + BYTES_PER_PART * parts) / size +
-            FIELD_BYTES_PER_FLOE * n_floes) * ranks_here +
-           CHECKPOINT_BYTES_PER_FLOE * n_floes + GROWN * steps_kept(input) +
-           bt_min(MOST_OF_ENTRIES, BYTES_PER_ENTRY * entries_of(input)) +
-           bt_min(MOST_OF_FRAMES, BYTES_PER_FRAME * bt_cost_frames(input));
+    const double run = (BASE_BYTES + (BYTES_PER_FLOE * n_floes + BYTES_PER_PART * parts) / size +
+                        FIELD_BYTES_PER_FLOE * n_floes) * ranks_here +
+                       CHECKPOINT_BYTES_PER_FLOE * n_floes + GROWN * steps_kept(input) +
+                       bt_min(MOST_OF_ENTRIES, BYTES_PER_ENTRY * entries_of(input)) +
+                       bt_min(MOST_OF_FRAMES, BYTES_PER_FRAME * bt_cost_frames(input));
+    return bt_max(run, BASE_BYTES * ranks_here + MAKING_BYTES_PER_FLOE * bt_case_floes_made(input));
 }
 
 double bt_cost_corners(const bt_case *input, const bt_field *field, double n)

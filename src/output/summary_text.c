@@ -101,8 +101,9 @@ static void print_forces(const bt_summary *summary, const bt_case *input)
                        steady->series[k].name);
         return;
     }
-    printf("  window              %g to %g s (%s), %s; %.3g independent samples", steady->start, steady->end,
-           steady->given ? "given" : "found by MSER-5", loud[steady->verdict], summary->ice.n_eff);
+    printf("  window              %g to %g s (%s), %s; %.3g independent sample%s", steady->start, steady->end,
+           steady->given ? "given" : "found by MSER-5", loud[steady->verdict], summary->ice.n_eff,
+           summary->ice.n_eff == 1 ? "" : "s");
     if (isfinite(steady->correlation_time)) printf(", correlation time %.3g s", steady->correlation_time);
     printf("\n");
     if (steady->verdict == BT_NOT_STEADY) print_reasons("    not steady       ", steady);

@@ -7,6 +7,7 @@ xarray and by the program's own reader of outlines.
 import csv
 import json
 import math
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -251,6 +252,18 @@ def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):
         back = pyproj.Proj("EPSG:32633")(d.lon.values[there], d.lat.values[there])
         np.testing.assert_allclose(back, [d.x.values[there], d.y.values[there]], rtol=0, atol=1e-6)
         assert d.time.attrs["comment"].startswith("assumed") and d.time.values[0] == np.datetime64("1970-01-01")
+
+
+def test_rings_over_the_180th_meridian_are_closed():
+    """To the last bit, as GDAL asks: its longitudes are unwrapped in floating point."""
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        lon = np.remainder(180 + 180 + rng.normal(0, 1e-3, 7), 360) - 180
+        ring = np.column_stack([lon, -65 + rng.normal(0, 1e-3, 7)])
+        place = SimpleNamespace(degrees=True, ring=lambda at: np.concatenate([at, at[:1]]))
+        polygon = export._geometry(ogr, "Polygon", ogr.wkbPolygon, place, ring)
+        line = polygon.GetGeometryRef(0)  # of the polygon, which must outlive it
+        assert line.GetPoint(0) == line.GetPoint(7) and np.ptp([p[0] for p in line.GetPoints()]) < 0.1
 
 
 def test_ice_that_a_moving_window_renews_is_another_trajectory():

@@ -2,7 +2,7 @@
 // Example of a program that steps a simulation: the force law of force_law.c, a case file, and what the tow is like on
 // the way.
 //
-//     cc simulation.c $(pkg-config --cflags --libs bergtow) -o simulation
+//     cc simulation.c $(pkg-config --cflags --libs bergtow) -lm -o simulation
 //     ./simulation CASE.yml [KEY=VALUE...]
 #include "bergtow/simulation.h"
 

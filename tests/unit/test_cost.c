@@ -2,6 +2,7 @@
 // What a run needs of a machine, and the refusal of what it has not.
 #include "test.h"
 #include "output/record.h"
+#include "case/case_derived.h"
 #include "case/cost.h"
 
 static bt_case a_case(void)
@@ -27,6 +28,21 @@ TEST(memory_by_hand)
     c.body.shape = BT_BODY_DISC;
     c.impact.conversion = BT_IMPACT_DURATION;
     assert_float_equal(bt_cost_memory(&c, 1e6, 0, 1, 1), 30e6 + 2548e6 + kept + 1.25 * 32 * 36 * 3125, 1);
+}
+
+/// Making the ice takes more than a short run with it, and on one rank only.
+TEST(memory_of_making_the_ice)
+{
+    bt_case c = {.run = {.dt = 1, .duration = 10},
+                 .domain = {.length = 6700, .width = 6700},
+                 .ice = {.concentration = 0.7, .size = 20, .size_law = BT_SIZE_SINGLE, .x_max = 6700, .y_max = 6700},
+                 .output = {.frame_interval = 10, .sample_every = 1}};
+    const double n = bt_case_floes_made(&c);
+    assert_true(n > 9e4 && n < 1.1e5);
+    assert_float_equal(bt_cost_memory(&c, n, 0, 1, 1), 30e6 + 3500 * n, 1);
+    assert_float_equal(bt_cost_memory(&c, n, 0, 4, 2), 60e6 + 3500 * n, 1);
+    c.ice.field = "field.h5";
+    assert_true(bt_cost_memory(&c, n, 0, 1, 1) < 30e6 + 2600 * n);
 }
 
 // By hand: 0.1 s, a million steps of 8 µs, 100,000 entries of 17 µs, 501 frames of 1 ms and 1.6 µs a floe; 1000 floes

@@ -25,7 +25,8 @@ class _Stream:
     and the work continues."""
 
     def __init__(self, stream):
-        self._stream, self.lost = stream, False
+        # None: the descriptor was closed when Python started
+        self._stream, self.lost = stream or open(os.devnull, "w"), stream is None
 
     def __getattr__(self, name):
         return getattr(self._stream, name)

@@ -319,6 +319,8 @@ def _geometry(ogr, name, kind, place, at):
     points = place.ring(at) if name == "Polygon" else place.coordinates(at)
     if place.degrees:  # keep it in one piece across the 180th meridian
         points = np.column_stack([np.unwrap(points[:, 0], period=360), points[:, 1]])
+    if name == "Polygon":  # unwrapped, the last longitude may differ from the first by rounding
+        points[-1] = points[0]
     line = ogr.Geometry(ogr.wkbLinearRing if name == "Polygon" else kind)
     for x, y in points:
         line.AddPoint_2D(x, y)

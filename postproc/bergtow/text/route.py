@@ -74,8 +74,8 @@ def answer(found):
                 f"{percent(low)} to {percent(high)} at 95 %.")
     if code == "straight_not_passable":
         return (f"The straight line cannot be towed; {chosen} " +
-                ("reaches the goal in every member that judged." if v["recommended"] else
-                 "does not reach the goal in every member either, and is not recommended."))
+                ("reaches the goal without a fault in every member that judged." if v["recommended"] else
+                 "fails in some members, too, and is not recommended."))
     if code == "no_route":
         return "No route other than the straight line was found."
     if code == "one_member":
