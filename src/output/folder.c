@@ -12,8 +12,7 @@
 #include "output/record_parts.h"
 #include "output/xdmf.h"
 
-#define CASE_FILE "case.resolved.yml"
-#define NEW_CASE CASE_FILE ".new"
+#define NEW_CASE BT_FOLDER_CASE ".new"
 
 static bool is_summary(const char *path) { return bt_file_begins(path, "{\n  \"title\": "); }
 static bool is_frames(const char *path) { return bt_file_begins(path, BT_XDMF_HEAD); }
@@ -43,7 +42,7 @@ static const struct {
     bool (*ours)(const char *path);
     bool hdf5;
 } files[] = {
-    {CASE_FILE, is_case, false},
+    {BT_FOLDER_CASE, is_case, false},
     {"summary.json", is_summary, false},
     {BT_RESULT_FILE, is_regular, true},
     {BT_RESULT_PART, is_begun, true},
@@ -156,7 +155,7 @@ static void move_back(const char *dir)
 
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err)
 {
-    const char *ready = BT_PATH(dir, NEW_CASE), *path = BT_PATH(dir, CASE_FILE);
+    const char *ready = BT_PATH(dir, NEW_CASE), *path = BT_PATH(dir, BT_FOLDER_CASE);
     bt_status status = bt_file_write(ready, resolved, err); // if the disk is full, nothing has changed
     if (status == BT_OK) {
         status = make_room(dir, err);
@@ -174,14 +173,14 @@ bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *er
 void bt_folder_put_back(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    unlink(BT_PATH(dir, CASE_FILE));
+    unlink(BT_PATH(dir, BT_FOLDER_CASE));
     unlink(BT_PATH(dir, BT_RESULT_PART));
     move_back(dir);
 }
 
 void bt_folder_recover(const char *dir)
 {
-    if (!bt_file_there(dir, CASE_FILE)) bt_folder_put_back(dir);
+    if (!bt_file_there(dir, BT_FOLDER_CASE)) bt_folder_put_back(dir);
     const char *ready = BT_PATH(dir, NEW_CASE);
     if (is_case(ready)) unlink(ready);
     rmdir(BT_PATH(dir, BT_FOLDER_REPLACED)); // it stays if not empty
@@ -197,6 +196,8 @@ void bt_folder_settle(const char *dir)
 
 bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err)
 {
+    if (bt_file_there(dir, BT_FOLDER_STUDY))
+        return bt_fail(err, BT_ERR_IO, "%s: holds an ensemble; give the run another folder", dir);
     const bool finished = bt_file_there(dir, "summary.json"), begun = has_begun(dir);
     const bt_status foreign = bt_folder_check(dir, err);
     if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;

@@ -17,6 +17,10 @@
 #include "bergtow/base.h"
 
 #define BT_FOLDER_REPLACED "replaced"
+/// The first file of a run, and of an ensemble, whose folder takes no run, as an ensemble takes none of a run: readers
+/// of a folder would have to guess which one is meant.
+#define BT_FOLDER_CASE "case.resolved.yml"
+#define BT_FOLDER_STUDY "study.resolved.yml"
 
 /// Report, by name, every file that a run would replace although this program has not written it, such as a `stop` that
 /// is not empty: a request to stop is an empty file. The other calls leave such files alone. Errors: BT_ERR_IO.

@@ -41,6 +41,7 @@
 #include "case/schema.h"
 #include "base/checksum.h"
 #include "bergtow/quantity.h"
+#include "output/folder.h"
 #include "output/summary_keys.h"
 #include "base/units.h"
 
@@ -399,7 +400,7 @@ static void write_all(bt_h5 *h5, const table *t, const bt_study *study, const ch
     bt_h5_describe_file(h5, study->title);
     char *resolved;
     size_t size;
-    if (bt_file_read(BT_PATH(dir, "study.resolved.yml"), "a study", &resolved, &size, NULL) == BT_OK)
+    if (bt_file_read(BT_PATH(dir, BT_FOLDER_STUDY), "a study", &resolved, &size, NULL) == BT_OK)
         bt_h5_put_text(h5, "/study_resolved", resolved, "what the members are, and the base case with every key");
     free(resolved);
     bt_h5_attr_text(h5, "/", "program", "bergtow " BT_VERSION);

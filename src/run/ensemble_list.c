@@ -17,6 +17,7 @@
 #include "case/cost.h"
 #include "field/field_kept.h"
 #include "output/checkpoint.h"
+#include "output/folder.h"
 #include "run/study.h"
 
 // --- the journal -----------------------------------------------------------------------------------------------------
@@ -87,7 +88,7 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
 static bt_status keep_resolved(const char *dir, const char *text, bool *old, char digest[BT_DIGEST_TEXT],
                                bt_errors *err)
 {
-    const char *path = BT_PATH(dir, "study.resolved.yml");
+    const char *path = BT_PATH(dir, BT_FOLDER_STUDY);
     char *before = NULL;
     size_t size;
     *old = access(path, F_OK) == 0;
@@ -108,6 +109,8 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
 bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_options *options,
                                      char digest[BT_DIGEST_TEXT], bt_errors *err)
 {
+    if (bt_file_there(options->dir, BT_FOLDER_CASE))
+        return bt_fail(err, BT_ERR_IO, "%s: holds a run; give the ensemble another folder with -o", options->dir);
     char *text = bt_study_resolved(study, err);
     if (!text) return BT_ERR_CASE;
     bt_study_files files;

@@ -282,6 +282,12 @@ def test_a_result_is_not_replaced_unasked(folder):
     assert call("run", "good.yml", "--quiet", cwd=folder).returncode == DONE
     old.write_text("damaged")
     refused(call("run", "good.yml", cwd=folder), IO, "out/good: holds a result", "--force")
+    study = "base: good.yml\nrepeats: 1\nseed: 1\n"
+    (folder / "study.yml").write_text(study)
+    refused(call("ensemble", "study.yml", "-o", "out/good", cwd=folder), IO, "out/good: holds a run; give the ensemble")
+    assert not (folder / "out/good/members").exists()
+    assert call("ensemble", "study.yml", "-o", "out/study", cwd=folder).returncode == DONE
+    refused(call("run", "good.yml", "-o", "out/study", "--force", cwd=folder), IO, "out/study: holds an ensemble")
     assert old.read_text() == "damaged"
     result = call("run", "good.yml", "--force", "--quiet", cwd=folder)
     assert result.returncode == DONE, result.stderr
