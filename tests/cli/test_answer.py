@@ -562,6 +562,14 @@ def bend(**case):
     return row, json.loads(made["tow.waypoints"])[0][0] if made else None
 
 
+def test_a_load_case_without_ice_does_not_vary():
+    """Red: the only run as a lower bound of such runs, and no vessel was known to hold it."""
+    alone, two = (SimpleNamespace(few=range(n)) for n in (1, 2))
+    assert load_cases.few(tow(kind="constant"), alone) == ("constant", {})
+    for t, runs in ((tow(), alone), (tow(kind="constant"), two)):  # read ice; ice that the steady tows did not meet
+        assert load_cases.few(t, runs)[0] == "largest_of_n"
+
+
 def test_where_a_bend_lies():
     """The corner of a prescribed body is a tangent beyond ramp and settling; on a line it is that of the towing end,
     and a vessel turns as far before as it looks. A bend that leads into a wall is refused. Red: no line; no walls."""
