@@ -304,7 +304,7 @@ def beside(work, a, row, t):
             if not a.quiet:
                 print(words, flush=True)
         cases, ramp = [], None
-        towed = t.speed > 0  # otherwise held in place
+        towed = t.speed > 0 and not answer.held_back(row)  # otherwise held in place, or back
         # first the cases in the design value, cheapest first; the head sea, far more expensive, last if assumed
         given = a.head_current is not None or a.head_wind is not None
         if towed:

@@ -195,7 +195,7 @@ def start_ramp(t):
 
 
 def taut_stop(t):
-    return t.mass * t.speed / t.mean
+    return t.mass * t.speed / t.mean if t.mean > 0 else np.nan
 
 
 def coasting(t):
@@ -338,7 +338,8 @@ def course_change(t, runs, degrees, radius):
     along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2,
                                                                         load), runs.few))
     kind, such = few(t, runs)
-    return row("course_change", math.hypot(along, values["across_n"]), kind, "runs", runs=len(runs.few), set=sets,
+    n = math.copysign(math.hypot(along, values["across_n"]), along)  # below zero the body is held back in the bend
+    return row("course_change", n, kind, "runs", runs=len(runs.few), set=sets,
                formula="tension" if tension else "hypot", values=values | such | {"along_n": along})
 
 
