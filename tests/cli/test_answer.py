@@ -531,7 +531,7 @@ def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
     upper end of the steady tow's interval counts all the same. Red: "can tow", by two runs."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
     def row(n, kind, interval=None):
-        return {"id": "case.course_change", "speed_m_s": 0.5, "concentration": 0.7, "value": {
+        return {"id": "case.course_change", "speed_m_s": 0.5, "concentration": 0.7, "mean": {"n": n}, "value": {
             "n": n, "kind": kind, "interval_95": interval}, "n": n, "kind": kind, "interval_95": interval}
     def verdict(steady, top):
         return answer.feasible(answer.speeds([steady], v, 1.0), 0.5, v, 1.0, tow(), top)["verdict"]
@@ -548,6 +548,33 @@ def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
         {"n": found["n"], "case": found["id"]}, a)
 
 
+def held_back_answer(mean, value, interval):
+    """The answer about a steady tow with this mean force, value and interval, N, and a vessel of 500 kN."""
+    v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
+    row = {"id": "steady.1", "label": "c", "speed_m_s": 0.5, "concentration": 0.3, "fields": 5, "mean": {"n": mean},
+           "value": {"kind": "return_level", "n": value, "interval_95": interval}, "time_scale_s": 30.0}
+    asked = {"speed_m_s": 0.5, "efficiency": 1.0, "line_factor": None, "line_found": tow().line}
+    bend = load_cases.row("course_change", 2.4e5, "largest_of_n", "runs")
+    return answer.of(asked, None, [row], [bend], None, [], v, tow(water=mean, ice=0.0, value=value), {})
+
+
+def test_a_body_that_the_current_carries_faster_is_not_towed():
+    """Also where the upper tail of its force is above zero. Red: "feasible yes", beside a vessel and a line for the
+    magnitude of the force in a bend, and a line that is slack after -3 min."""
+    for mean, value in ((-2.8e5, -2.6e5), (-1e4, 2e4)):
+        found = held_back_answer(mean, value, [value - 1e4, value + 1e4])
+        assert found["design"] is None and [s["feasible"] for s in found["speeds"]] == ["held_back"]
+        assert found["feasible"]["verdict"] == "held_back" and found["load_cases"][0]["n"] == value
+        assert np.isnan([found["vessel"]["needed_bollard_pull_n"], found["line"]["needed_breaking_load_n"]]).all()
+        [part] = found["sentence"]
+        assert "must be held back" in words.sentence(found) and part["rows"] == ["steady.1"]
+        assert "held back" in words.written(words.speeds(found))
+    assert held_back_answer(2.8e5, 3e5, [2.9e5, 3.1e5])["feasible"]["verdict"] == "yes"
+    row = {"mean": {"n": 0.0}, "speed_m_s": 0.0}
+    assert not answer.held_back(row) and answer.held_back(row | {"speed_m_s": 0.5})  # at rest; on a slack line
+    assert np.isnan(load_cases.taut_stop(tow(water=-5e5)))
+
+
 def bend(**case):
     """The course change of a tow of 3 km at 0.5 m/s that begins at (-1, 0) km of a domain of 3 by 1 km."""
     made = {}
@@ -560,6 +587,25 @@ def bend(**case):
     t = tow(case=at, speed=0.5, distance=3000.0, width=40.0, slower=1.0, case_ramp=100.0, direction=0.0)
     row = load_cases.course_change(t, SimpleNamespace(make=make, few=range(2)), 30.0, 400.0)
     return row, json.loads(made["tow.waypoints"])[0][0] if made else None
+
+
+def test_a_load_case_without_ice_does_not_vary():
+    """Red: the only run as a lower bound of such runs, and no vessel was known to hold it."""
+    alone, two = (SimpleNamespace(few=range(n)) for n in (1, 2))
+    assert load_cases.few(tow(kind="constant"), alone) == ("constant", {})
+    for t, runs in ((tow(), alone), (tow(kind="constant"), two)):  # read ice; ice that the steady tows did not meet
+        assert load_cases.few(t, runs)[0] == "largest_of_n"
+
+
+@pytest.mark.parametrize("along", [2e5, -2e5])
+def test_the_force_in_a_bend_keeps_its_sign(along):
+    """Red: a body held back in the bend as a pull on the line."""
+    runs = SimpleNamespace(make=lambda some, fields: None, few=range(2), measured=lambda name, measure, fields: [along])
+    t = tow(case={"body.x": "0 m", "body.y": "0 m", "domain.ends": "periodic", "domain.sides": "periodic",
+                  "domain.x0": "0 m", "domain.y0": "0 m", "domain.length": "1 km", "domain.width": "1 km",
+                  "tow.mode": "speed"})
+    row = load_cases.course_change(t, runs, 30.0, 400.0)
+    assert row["n"] == pytest.approx(math.copysign(math.hypot(along, t.mass * t.speed ** 2 / 400), along))
 
 
 def test_where_a_bend_lies():

@@ -286,16 +286,20 @@ def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
     assert asked == [8] and design.fields_settled(tmp_path / "nowhere") == 0
 
 
-def test_ice_that_is_read_gets_one_field(tmp_path, capsys):
-    """Every other one would be the same run."""
-    made_up.write(tmp_path / "out", [made_up.member(np.ones(9), {}, 0)])
-    studies = []
-    work = SimpleNamespace(program=None, jobs=1, began=0.0, core=0.0,
-                           ensemble=lambda study: studies.append(yaml.safe_load(study.read_text())) or True)
-    a = cli.arguments("design", tmp_path / "case.yml", "-o", tmp_path / "out")
-    design.run_case(work, a, {name: {} for name in design.SECTIONS} | {"ice": {"outlines": "floes.geojson"}})
-    assert [s["repeats"] for s in studies] == [1] and "parameters" not in studies[0]
-    assert "one field is run" in capsys.readouterr().out
+@pytest.mark.parametrize("ice, asked, fields", [
+    ({"outlines": "floes.geojson"}, None, 1), ({}, None, 1), ({}, [0.0], 1), ({}, [0.0, 0.3], 9)])
+def test_ice_that_no_seed_changes_gets_one_field(ice, asked, fields, tmp_path, monkeypatch, capsys):
+    """Every other one would be the same run. Red: open water was refused for its study's repeats, which the user has
+    not written."""
+    monkeypatch.setattr(design.answer, "plan", lambda *a: {"core_s": 1.0})
+    monkeypatch.setattr(design.answer_text, "plan", lambda plan: "the plan")
+    a = cli.arguments("design", tmp_path / "case.yml", "-o", tmp_path, "--fields", "9")
+    a.concentrations = asked
+    case = {name: {} for name in design.SECTIONS} | {"ice": ice}
+    design.planned(a, case, {"case": {"ice.concentration": "0"}, "speed": 1.0}, 0.0)
+    assert a.fields == fields and ("one field is run" in capsys.readouterr().out) == (fields == 1)
+    study = yaml.safe_load(design.write_study(a, case, a.fields, {}).read_text())
+    assert study["repeats"] == fields and ("parameters" in study) == (not ice)
 
 
 def test_the_title_block_of_a_study(tmp_path):

@@ -16,6 +16,7 @@ UNKNOWN = SimpleNamespace(bollard_pull=np.nan)
 
 
 def condition(label, **tow):
+    tow.setdefault("mean", tow["largest"] / 2)
     return {"label": label, "design": {"tow": tow}, "values": {"ice.concentration": int(label.split()[0]) / 100}
             if "%" in label else {}}
 
@@ -66,6 +67,12 @@ def test_the_vessel_draws_the_limit_by_the_upper_ends():
     assert re.search(r"15\.0 m/s with 0\.250 m/s of current.* 750 kN", found["wind"][1])
     answer["load_cases"][0]["n"] = None
     assert rows([], answer)[1]["wind"][1] == "not looked for"
+
+
+def test_the_pull_of_a_vessel_is_not_compared_with_a_force_that_holds_back():
+    """Red: -260 kN "within" the pull of the vessel."""
+    some = {"conditions": [condition("a", value=-2.6e5, largest=-2.5e5), condition("b", value=1e5, largest=1e5)]}
+    assert document.held(some, 2e5, "pull") == "within 200 kN, pull: b; held back, not towed: a"
 
 
 def test_limits_of_what_was_varied():

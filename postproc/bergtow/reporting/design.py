@@ -198,10 +198,6 @@ def more_fields(left, member, n, most, conditions, jobs):
 
 def run_case(work, a, case):
     """Run as many fields of a case as the budget allows. Raises RunError."""
-    if reads_ice(case) and a.fields > 1:
-        print("the ice is read, and no seed changes it: one field is run, which tells nothing about the scatter "
-              "between fields")
-        a.fields = 1
     settled = fields_settled(a.output)
     n = min(max(FIRST, settled), a.fields)
     wider = a.wider = widths(work, a, case)
@@ -299,7 +295,8 @@ def beside(work, a, row, t):
                            abs(t.wind) > load_cases.NO_WIND * abs(t.value))
     end = work.last - work.replay
     with locked(a.output / "load-cases") as lock:
-        n = (1, 1) if source_of_ice(t.case) else (PAIRED, OF_A_CASE)
+        random = not source_of_ice(t.case) and answer.case_value(t.case, "ice.concentration", 0.0) > 0
+        n = (PAIRED, OF_A_CASE) if random else (1, 1)
         duration = answer.case_value(t.case, "run.duration")
         runs = load_cases.Runs(CaseRuns(a.file, a.output, "load-cases", work.program, given, work.jobs, end, end,
                                         lock=lock), *map(range, n), duration, work.member / duration, a.no_load_cases)
@@ -307,7 +304,7 @@ def beside(work, a, row, t):
             if not a.quiet:
                 print(words, flush=True)
         cases, ramp = [], None
-        towed = t.speed > 0  # otherwise held in place
+        towed = t.speed > 0 and not answer.held_back(row)  # otherwise held in place, or back
         # first the cases in the design value, cheapest first; the head sea, far more expensive, last if assumed
         given = a.head_current is not None or a.head_wind is not None
         if towed:
@@ -463,16 +460,20 @@ def planned(a, case, found, began):
     """(Work of the fields, plan): print, before the first run, the cost per value and what the budget allows. Raises
     RunError."""
     own, asked = answer.case_value(found["case"], "ice.concentration", 0.0), a.concentrations
-    a.concentrations = a.concentrations or ([] if reads_ice(case) else [own])
+    a.concentrations = [] if reads_ice(case) else a.concentrations or [own]
     if a.thicknesses and reads_ice(case):
         raise RunError(a.file, "reads its ice, which has the thickness of its floes", "leave --thicknesses out", CASE)
     a.by_speed, a.varied = at_speeds(a, found), varied(a, found)
     n = math.prod(max(1, len(some)) for some in (a.concentrations, a.by_speed, *a.varied.values()))
     work = Work(program_path(), a.output, sets_of_study(a, asked), a.jobs, np.inf, a.quiet, began)
+    alike = "" if any(a.concentrations) else "there is no ice: one field is run" if not reads_ice(case) else (
+        "the ice is read, and no seed changes it: one field is run, which tells nothing about the scatter between "
+        "fields")
+    a.fields = 1 if alike else a.fields
     work.core = answer.plan(work.program, a.file, a.set, n, a.jobs, np.inf, a.fields)["core_s"]
     left = set_ends(work, a, n) - time.monotonic()
     plan = answer.plan(work.program, a.file, a.set, n, a.jobs, left / 60, a.fields)
-    print(answer_text.plan(plan), flush=True)
+    print(alike or answer_text.plan(plan), flush=True)
     return work, plan | {"speed_m_s": found["speed"]}
 
 

@@ -64,13 +64,14 @@ def pull_of(cases, answer):
 
 def held(s, pull, what):
     """In words, which of the conditions a vessel can hold with its pull."""
-    places = {"within": [], "the largest simulated, a lower bound, within": [], "above": []}
+    than = f"{quantity(pull, 'N')}, {what}"
+    places = {f"within {than}": [], f"the largest simulated, a lower bound, within {than}": [], f"above {than}": [],
+              "held back, not towed": []}
     for c in s["conditions"]:
         if (n := load(c)) is not None:
-            place = "above" if n > pull else list(places)["value" not in c["design"]["tow"]]
-            places[place].append(c["label"])
-    return "; ".join([f"{where} {quantity(pull, 'N')}, {what}: {loads_text.several(names)}"
-                      for where, names in places.items() if names])
+            tow = c["design"]["tow"]
+            list(places.values())[3 if tow["mean"] <= 0 else 2 if n > pull else "value" not in tow].append(c["label"])
+    return "; ".join(f"{where}: {loads_text.several(names)}" for where, names in places.items() if names)
 
 
 def operation(s, cases, values, answer):

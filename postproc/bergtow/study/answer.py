@@ -10,6 +10,8 @@ of the row that it comes from. A value is, in this order,
     at_least         the largest simulated, if a line parted or a step had no solution: it has no upper bound
     largest_of_n     the largest of the n tows, distribution-free (stats/largest.py)
     none             if no tow has a window
+
+Where current and wind carry the body faster than the tow there is no design value, vessel or line: see held_back.
 """
 import json
 import math
@@ -216,6 +218,13 @@ def tow_of(e, row, line, vessel):
 # ---- conclusions
 
 
+def held_back(row):
+    """Do current and wind carry the body faster than the tow? A line cannot push, so nothing follows for vessel and
+    line. A body at rest that nothing moves also has a mean of zero."""
+    mean, speed = row["mean"]["n"], row["speed_m_s"]
+    return mean < 0 or mean == 0 and speed > 0
+
+
 def steady_case(row):
     value = row["value"]
     return load_cases.row("steady", value["n"], value["kind"], "ensemble", runs=row["fields"], of=row["id"],
@@ -238,7 +247,7 @@ def speeds(rows, v, efficiency):
         value = r["value"]
         out.append({"id": f"speed.{len(out) + 1}", "of": r["id"], "speed_m_s": speed, "needs_n": value["n"],
                     "kind": value["kind"], "interval_95": value.get("interval_95"), "has_n": has,
-                    "feasible": gear.verdict(value["n"], bounds(value), has)})
+                    "feasible": "held_back" if held_back(r) else gear.verdict(value["n"], bounds(value), has)})
     return out
 
 
@@ -250,6 +259,8 @@ def feasible(some, asked, v, efficiency, t, top=None):
            "not_above_m_s": None, "by": None, "reason": None}
     if not np.isfinite(v.pull):
         return out | {"verdict": "not_asked", "reason": "no_vessel"}
+    if out["verdict"] == "held_back":
+        return out
     if here and here["feasible"] != "no" and top and top["id"] != "case.steady":
         return out | {"verdict": min(here["feasible"], gear.verdict(top["n"], bounds(top), here["has_n"]),
                                      key=("no", "open", "yes").index), "reason": "other_load_case"}
@@ -269,9 +280,13 @@ def feasible(some, asked, v, efficiency, t, top=None):
 def sentence(a):
     """The content of the answer: codes, each with values and the rows that they come from."""
     out, d, v, line = [], a["design"], a["vessel"], a["line"]
+    rows = {row["id"]: row for row in a["load_cases"] + a["conditions"]}
+    if d is None and "case.steady" in rows:
+        steady = rows[rows["case.steady"]["of"]]
+        return [{"code": "held_back", "values": {"n": steady["mean"]["n"], "speed_m_s": steady["speed_m_s"]},
+                 "rows": [steady["id"]]}]
     if d is None:
         return [{"code": "no_value", "values": {}, "rows": []}]
-    rows = {row["id"]: row for row in a["load_cases"] + a["conditions"]}
     case, steady = rows[d["row"]], rows[rows["case.steady"]["of"]]  # the time scale is that of the condition
     out.append({"code": {"at_least": "needs_at_least", "largest_of_n": "needs_largest"}.get(d["kind"], "needs"),
                 "values": {k: d[k] for k in ("n", "interval_95", "kind", "reason")} | {"case": d["row"]},
@@ -300,7 +315,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     the load_cases.Tow of the hardest condition, None without a value."""
     worst = hardest(rows, asked["speed_m_s"])
     cases = ([steady_case(worst)] if worst else []) + cases
-    some = [c for c in cases if c["in_design"] and np.isfinite(c["n"])]
+    some = [c for c in cases if c["in_design"] and np.isfinite(c["n"]) and not held_back(worst)]
     top = max((c for c in some if c["acts_on"] == "tow"), key=lambda c: c["n"], default=None)
     hold = max(some, key=lambda c: c["n"], default=None)
     design = top and {"id": "design", "row": top["id"], **{k: top[k] for k in ("n", "kind", "interval_95", "reason")},
@@ -314,7 +329,8 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
         band |= {"low_n": low, "high_n": high, "combined_95": both, "why_not_combined": why}
     efficiency, factor = asked["efficiency"], asked["line_factor"]
     n, interval = (top["n"], top["interval_95"]) if top else (np.nan, None)
-    needed = [gear.needed_pull(v, max(0.0, x), asked["speed_m_s"], efficiency) for x in (n, *(interval or ()))]
+    # in this order max() keeps NaN
+    needed = [gear.needed_pull(v, max(x, 0.0), asked["speed_m_s"], efficiency) for x in (n, *(interval or ()))]
     by_speed = speeds(rows, v, efficiency)
     pull = gear.pull_at(v, asked["speed_m_s"], efficiency)
     vessel = {"id": "vessel", "name": v.name or None, "needed_bollard_pull_n": needed[0],

@@ -195,7 +195,7 @@ def start_ramp(t):
 
 
 def taut_stop(t):
-    return t.mass * t.speed / t.mean
+    return t.mass * t.speed / t.mean if t.mean > 0 else np.nan
 
 
 def coasting(t):
@@ -238,14 +238,17 @@ def line_parted(t):
 # ---- runs
 
 
-def few(runs):
-    """What the largest of the runs of a load case shows about such tows: a lower bound, as for the steady tows."""
-    return {"n_tows": len(runs.few), "share_below": stat_largest.share_below(len(runs.few))}
+def few(t, runs):
+    """(kind, values) of the largest of the runs of a load case, and what it shows about such tows: a lower bound, as
+    for the steady tows. Without ice the only run is all such tows."""
+    if t.kind == "constant" and len(runs.few) == 1:
+        return "constant", {}
+    return "largest_of_n", {"n_tows": len(runs.few), "share_below": stat_largest.share_below(len(runs.few))}
 
 
 def start(t, runs, say):
     """(row, ramp): the shortest tried ramp whose start requires no more than the steady tow."""
-    first = start_ramp(t)
+    first, (kind, such) = start_ramp(t), few(t, runs)
     own = {"case_s": t.case_ramp, "case_n": t.case_start}
     ramp = {"id": "ramp", "s": first, "n": t.value, "limit_n": t.value, "by": "closed_form", "closed_form_s": first,
             "verified": False, **own}
@@ -283,13 +286,13 @@ def start(t, runs, say):
         found, ramp = closed(reason or "no_ramp_held")
         if tried:
             best = min(tried, key=lambda x: x["n"])
-            found |= {"n": best["n"], "kind": "largest_of_n", "by": "runs", "runs": len(tried) * len(runs.few)}
+            found |= {"n": best["n"], "kind": kind, "by": "runs", "runs": len(tried) * len(runs.few)}
             ramp |= {"s": best["ramp_s"], "n": best["n"], "by": "runs"}
-        return found | {"values": found["values"] | (few(runs) if tried else {}) | {"tried": tried}}, ramp
+        return found | {"values": found["values"] | (such if tried else {}) | {"tried": tried}}, ramp
     ramp |= {"s": held["ramp_s"], "n": held["n"], "by": "runs", "verified": True}
-    return row("start", held["n"], "largest_of_n", "runs", runs=len(tried) * len(runs.few), set=held["set"],
-               values=own | few(runs) | {"ramp_s": held["ramp_s"], "closed_form_s": first, "mass_kg": t.mass,
-                                             "tried": tried}), ramp
+    return row("start", held["n"], kind, "runs", runs=len(tried) * len(runs.few), set=held["set"],
+               values=own | such | {"ramp_s": held["ramp_s"], "closed_form_s": first, "mass_kg": t.mass,
+                                    "tried": tried}), ramp
 
 
 def inside(case, place, margin):
@@ -334,8 +337,10 @@ def course_change(t, runs, degrees, radius):
     load = f"{stat_loads.TENSION}1" if tension else "tow_force"
     along = max(runs.measured("course-change", lambda run: largest_mean(run, t.scale, begin, duration - settle / 2,
                                                                         load), runs.few))
-    return row("course_change", math.hypot(along, values["across_n"]), "largest_of_n", "runs", runs=len(runs.few),
-               set=sets, formula="tension" if tension else "hypot", values=values | few(runs) | {"along_n": along})
+    kind, such = few(t, runs)
+    n = math.copysign(math.hypot(along, values["across_n"]), along)  # below zero the body is held back in the bend
+    return row("course_change", n, kind, "runs", runs=len(runs.few), set=sets,
+               formula="tension" if tension else "hypot", values=values | such | {"along_n": along})
 
 
 def combined_interval(t, n, ends, r):

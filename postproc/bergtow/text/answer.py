@@ -193,9 +193,15 @@ def _against_weather(v, a):
             f"assumed, the same speed over ground would take {force(v['n'])}: that is not in the design value")
 
 
+def _held_back(v, a):
+    return (f"At {speed(v['speed_m_s'])} the body must be held back, since current and wind carry it faster than the "
+            f"tow, whose mean force is {kn(v['n'])} kN: a line cannot push, so no vessel, bollard pull or line is "
+            "named")
+
+
 WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest, "steady": _steady,
          "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
-         "start": _start,
+         "start": _start, "held_back": _held_back,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
 
 
