@@ -143,9 +143,9 @@ def draw_returns(e, conditions, name):
 
 
 def draw_above(e, conditions, name):
-    """Figure of the share of time that a load exceeds a level, with its 95 % interval over fields; None if no condition
-    has the load."""
-    some = [c for c in conditions if name in c["loads"]]
+    """Figure of the share of time that a load exceeds a level, with its 95 % interval over fields; None if it varies in
+    no condition."""
+    some = [c for c in conditions if c["loads"].get(name, {}).get("exceedance")]
     if not some:
         return None
     shown, first = some[::every(some)], some[0]["loads"][name]

@@ -20,6 +20,7 @@ from bergtow.result.origins import short as in_short
 from bergtow.result.run import Run, case_value
 from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
+from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
@@ -176,6 +177,8 @@ def _of_the_sample(e, rows, c, load):
         out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
                     "where it is known throughout, are left out of its numbers",
                     f"{load['members'] - load['fields']} of {load['members']} members"))
+    if d.get("model") == loads.CONSTANT:  # without a tail or an interval nothing else can be wrong with it
+        return out
     if load["fields"] < SHORT_FIELDS:
         out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
                     f"{load['fields']}"))
@@ -217,7 +220,8 @@ def _of_unlike_fields(load):
 
 def start_exceeds(d):
     """Does the start-up exceed the design value or, without one, the largest value of the window?"""
-    return d["start_up"] is not None and d["start_up"]["largest"] > d.get("value", d["largest"])
+    return d["start_up"] is not None and bool(
+        stat_extreme.exceeds(d["start_up"]["largest"], d.get("value", d["largest"])))
 
 
 def _of_the_start(case, load):
@@ -331,9 +335,7 @@ def statement(e, rows, c):
         counts = [f"{c['members'][kind]} {kind}" for kind in ("failed", "waiting", "excluded") if c["members"][kind]]
         warned = [("nothing is known of a condition without a member in the numbers", ", ".join(counts))]
     elif tow is None:
-        left = c["loads_left_out"].get("tow_force")
-        warned.append(("no tow force that varies", left["why"]) if left else
-                      (f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
+        warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
                        "something is towed", ""))
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
