@@ -630,7 +630,7 @@ def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
         "time scales in which they are known throughout, enter none of these numbers: concentration 10 % (3 of 10)." in text
     # a moving mean leaves 2e-10 N of a constant
     x = c["loads"]["line_tension_1"]
-    assert x["design"]["refused"] == "constant, 1230 N, in all 7 fields" and x["sd"]["value"] == 0
+    assert x["design"]["refused"] == "constant, 1230 N, in 7 fields" and x["sd"]["value"] == 0
     assert x["mean"]["value"] == pytest.approx(1234.567) and plot_loads.draw_above(
         Members(tmp_path / "a"), s["conditions"], "line_tension_1") is None
 
@@ -646,10 +646,16 @@ def test_a_constant_tow_force_is_its_own_design_value_in_open_water(tmp_path, fl
     row = report_ensemble.design_row(c)
     assert [row[1], row[2], *row[5:7]] == cells and row[7] == "5.00 kN"
     assert c["loads"]["tow_force"]["start_up"]["largest"] == pytest.approx(5000)
-    assert ("No value (constant, 1230 N, in all 3 fields)." in text) == bool(floes)
+    assert ("No value (constant, 1230 N, in 3 fields)." in text) == bool(floes)
     assert report_ensemble.without_value(s, 0.0).startswith("No value") == bool(floes)
     value = answer.conditions(Members(tmp_path / "a"))[0]["value"]
     assert value == {"kind": "constant", "n": pytest.approx(1234.567)}
+
+
+def test_one_field_is_no_fields(tmp_path):
+    s, text = of_all(sparse(tmp_path / "a", meet=0, fields=1, changes={0: {"window": {"n_contact_stretches": 1}}}))
+    assert s["conditions"][0]["loads"]["tow_force"]["over_threshold"]["refused"] == "constant, 0 N, in 1 field"
+    assert "1 of 1 member)" in text and "1 of 1 member carries warnings and is in" in text and "1 members" not in text
 
 
 def test_a_saturated_load_does_not_end_the_statistics(tmp_path):

@@ -205,7 +205,7 @@ def kinds_of_warnings(some):
     for row in some:
         for kind, text in reversed(row["kinds"].items()):
             found.setdefault(kind, [text, 0])[1] += 1
-    return [f"{text} ({ensemble_text.counted(n)})" for text, n in found.values()]
+    return [f"{text} ({text_table.counted(n)})" for text, n in found.values()]
 
 
 def study_text(e):

@@ -24,7 +24,7 @@ from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
-from bergtow.table import hours_text, quantity, short
+from bergtow.table import counted, hours_text, quantity, short
 
 LONG = 2.0          # the tow of the statement / the simulated tow: above, the value is for a longer tow than simulated
 FAR = 10.0          # times the simulated hours: an extrapolation beyond this is reported
@@ -157,7 +157,7 @@ def _of_the_case(e, rows, case, tow):
     left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
     if np.nanmax(left, initial=0.0) > 0:
         out.append(("floes left through the open ends of the domain and no longer resist: the value can be too small",
-                    f"{np.sum(left > 0)} of {len(rows)} members, up to {np.nanmax(left):.0f} floes"))
+                    f"{np.sum(left > 0)} of {counted(len(rows))}, up to {counted(int(np.nanmax(left)), 'floe')}"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
                     quantity(case.bollard_pull, "N")))
@@ -170,13 +170,13 @@ def _of_the_sample(e, rows, c, load):
     for kind, words in DOUBTFUL.items():
         some = [words + (f", since {e.why_unsteady(m)}" if kind == "unsteady" else "")
                 for m in rows if kind in e.doubts(m)]
-        out += [(what, f"{some.count(what)} of {len(rows)} members") for what in dict.fromkeys(some)]
+        out += [(what, f"{some.count(what)} of {counted(len(rows))}") for what in dict.fromkeys(some)]
     if c["drift"]["verdict"] == "not steady":
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
     if load["fields"] < load["members"]:
         out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
                     "where it is known throughout, are left out of its numbers",
-                    f"{load['members'] - load['fields']} of {load['members']} members"))
+                    f"{load['members'] - load['fields']} of {counted(load['members'])}"))
     if d.get("model") == loads.CONSTANT:  # without a tail or an interval nothing else can be wrong with it
         return out
     if load["fields"] < SHORT_FIELDS:
@@ -197,7 +197,7 @@ def _of_the_sample(e, rows, c, load):
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
         out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
-                    f"{short(d['times_the_hours_simulated'], 2)} times; with {more} fields {FAR:g} times"))
+                    f"{short(d['times_the_hours_simulated'], 2)} times; with {counted(more, 'field')} {FAR:g} times"))
     if d["irregular"]:
         out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, "
                     "and the value can be too small", f"shape {d['shape']:.2g}"))
@@ -289,7 +289,7 @@ def _of_the_line(e, rows, lines):
                     "can load that branch more. Means and largest values cover each tow until nothing tows it (a "
                     "tension until its branch parts), and mix the two; for a design value simulate without "
                     "breaking_load",
-                    ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
+                    ", ".join([f"the line parted in {parted} of {counted(len(tows), 'tow')}", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
     known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # these are reported above

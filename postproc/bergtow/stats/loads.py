@@ -30,7 +30,7 @@ from bergtow.result.run import Run, least
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
-from bergtow.table import bound, quantity
+from bergtow.table import bound, counted, quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -131,7 +131,7 @@ def cut_off(e, rows, load):
     if without := e.without_bound(rows):
         return str(without)
     n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
-    return f"the line parted in {n} of {len(tows)} tows" if n else ""
+    return f"the line parted in {n} of {counted(len(tows), 'tow')}" if n else ""
 
 
 def bounded(found, without):
@@ -223,7 +223,7 @@ def statistics(e, rows, options, gathered=None):
         # where there are floes, a tow that meets none of them does not know the load of one that does
         itself = constant and not why and in_open_water(e, rows)
         if constant and not why:
-            why = f"constant, {quantity(fields[0]['peak'][0], load.units)}, in all {len(fields)} fields"
+            why = f"constant, {quantity(fields[0]['peak'][0], load.units)}, in {counted(len(fields), 'field')}"
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
             fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
