@@ -519,6 +519,14 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
         assert "in the start" in said  # the column
 
 
+def test_inertia_in_the_start_may_exceed_the_sum_of_the_forces():
+    """A current that pushes the body along takes some of it off."""
+    start = {"largest": 135e3, "time_s": 120, "inertia": 437e3}
+    load = {"start_up": start, "design": {}, "largest": 1e5, "time_scale_s": 30.0, "units": "N"}
+    [(_, detail)] = statement_module._of_the_start(argparse.Namespace(ramp=120.0), load)
+    assert detail == "135 kN, with 437 kN of inertia"
+
+
 def test_a_warning_of_many_conditions_names_the_first():
     assert loads_text.several(["a", "b"]) == "a; b"
     assert loads_text.several(list("abcdefg")) == "a; b; c; d; and 3 more conditions"

@@ -234,7 +234,8 @@ def _of_the_start(case, load):
     words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
     ramp = case.ramp if case else 0.0
     if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
-        inertia = f", of which {100 * found['inertia'] / found['largest']:.0f} % inertia" if np.isfinite(
+        # no share: the other forces may have the other sign
+        inertia = f", with {quantity(found['inertia'], load['units'])} of inertia" if np.isfinite(
             found.get("inertia", np.nan)) else ""
         return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
                  "accelerates the body; a longer ramp takes less", force + inertia)]
