@@ -23,7 +23,7 @@ from bergtow.plot import style  # noqa: E402
 from bergtow import table as text_table  # noqa: E402
 from bergtow.errors import RunError  # noqa: E402
 from bergtow.result.members import Members, reading, short_key, worded  # noqa: E402
-from bergtow.plot.variants import relative_change  # noqa: E402
+from bergtow.plot.variants import change_of  # noqa: E402
 from bergtow.stats.mean import t_interval  # noqa: E402
 from bergtow.table import number  # noqa: E402
 
@@ -68,9 +68,10 @@ def rows(base, e):
     width of the interval of the mean, N."""
     out = []
     for b, c in zip(base.conditions(), e.conditions()):
-        means = fields(e, c)
+        means, to = fields(e, c), fields(base, b)
         mean, error, half = mean_and_errors(means)
-        out.append((mean, error, *relative_change(means, fields(base, b), True), half))
+        change = change_of(means, to, True, True) if len(means.keys() & to.keys()) > 1 else (np.nan, np.nan)
+        out.append((mean, error, *change, half))
     return np.array(out)
 
 

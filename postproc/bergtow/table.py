@@ -12,6 +12,11 @@ from bergtow.result.at_least import AtLeast
 FAR = 10.0  # multiple of a level: an interval end beyond it counts as no bound
 
 
+def counted(n, noun="member"):
+    """"1 member", "2 members"."""
+    return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
 def hours_text(hours):
     return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
 

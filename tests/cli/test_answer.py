@@ -482,9 +482,9 @@ def test_a_load_without_a_bound_is_at_least(tmp_path):
     e = Members(tmp_path / "all")
     [c] = e.conditions()
     found = {"design": {"refused": "x"}, "largest": 70.0}
-    assert answer.value_of(e, c, None, [], None)["reason"] == "no_window"
+    assert answer.value_of(e, c, None, [])["reason"] == "no_window"
     e._events[1].append({"time_s": 100.0, "kind": "line_broken", "subject": 1, "value": 1.0})
-    value = answer.value_of(e, c, found, [], None)
+    value = answer.value_of(e, c, found, [])
     assert (value["kind"], value["reason"], value["n"]) == ("at_least", "line_parted", 70.0)
 
 

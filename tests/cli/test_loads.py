@@ -16,8 +16,9 @@ from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import loads as plot_loads
-from bergtow.reporting import statistics
+from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
+from bergtow.reporting import statistics
 from bergtow.reporting.ensemble import OPTIONS
 from bergtow.result.members import Members
 from bergtow.result.run import Run
@@ -27,6 +28,7 @@ from bergtow.stats import conditions as ensemble
 from bergtow.stats import design_value as statement_module
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
+from bergtow.study import answer
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
 
@@ -517,6 +519,14 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
         assert "in the start" in said  # the column
 
 
+def test_inertia_in_the_start_may_exceed_the_sum_of_the_forces():
+    """A current that pushes the body along takes some of it off."""
+    start = {"largest": 135e3, "time_s": 120, "inertia": 437e3}
+    load = {"start_up": start, "design": {}, "largest": 1e5, "time_scale_s": 30.0, "units": "N"}
+    [(_, detail)] = statement_module._of_the_start(argparse.Namespace(ramp=120.0), load)
+    assert detail == "135 kN, with 437 kN of inertia"
+
+
 def test_a_warning_of_many_conditions_names_the_first():
     assert loads_text.several(["a", "b"]) == "a; b"
     assert loads_text.several(list("abcdefg")) == "a; b; c; d; and 3 more conditions"
@@ -624,16 +634,36 @@ def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
     assert x["fields"] == 7 and x["members"] == 10
     assert ("members without a tow force, or without a window of 5 time scales where it is known throughout, are left "
             "out of its numbers", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
-    assert "Members without tow force and ice resistance and vessel thrust, or without a window of 5 time scales in " \
-        "which they are known throughout, enter none of these numbers: concentration 10 % (3 of 10)." in text
+    assert "Members without tow force and ice resistance and line tension and vessel thrust, or without a window of 5 " \
+        "time scales in which they are known throughout, enter none of these numbers: concentration 10 % (3 of 10)." in text
     # a moving mean leaves 2e-10 N of a constant
-    assert "Line tension is left out: constant, 1230 N, in all 7 fields: concentration 10 %." in text
-    assert c["loads_left_out"]["line_tension_1"]["label"] == "line tension"
+    x = c["loads"]["line_tension_1"]
+    assert x["design"]["refused"] == "constant, 1230 N, in 7 fields" and x["sd"]["value"] == 0
+    assert x["mean"]["value"] == pytest.approx(1234.567) and plot_loads.draw_above(
+        Members(tmp_path / "a"), s["conditions"], "line_tension_1") is None
 
 
-def test_a_constant_tow_force_is_named(tmp_path):
-    _, text = of_all(sparse(tmp_path / "a", meet=0, fields=3))
-    assert "No design tow force. WARNING: No tow force that varies (constant, 0 N, in all 3 fields)." in text
+@pytest.mark.parametrize("floes, cells", [(0, ["1230 N", "constant", "1230 N", "1230 N"]),
+                                          (5, ["–", "no value", "1230 N", "1230 N"])])
+def test_a_constant_tow_force_is_its_own_design_value_in_open_water(tmp_path, floes, cells):
+    """Not among floes that the tows missed. Either way it is in the tables, with the largest load of the start."""
+    x = np.where(np.arange(SPARSE) < 100, 5000.0, 1234.567)
+    change = {"more": {"tow_force": x}, "window": {"start_s": 200.0}, "summary": {"n_floes": floes}}
+    s, text = of_all(sparse(tmp_path / "a", fields=3, changes={k: change for k in range(3)}))
+    c, = s["conditions"]
+    row = report_ensemble.design_row(c)
+    assert [row[1], row[2], *row[5:7]] == cells and row[7] == "5.00 kN"
+    assert c["loads"]["tow_force"]["start_up"]["largest"] == pytest.approx(5000)
+    assert ("No value (constant, 1230 N, in 3 fields)." in text) == bool(floes)
+    assert report_ensemble.without_value(s, 0.0).startswith("No value") == bool(floes)
+    value = answer.conditions(Members(tmp_path / "a"))[0]["value"]
+    assert value == {"kind": "constant", "n": pytest.approx(1234.567)}
+
+
+def test_one_field_is_no_fields(tmp_path):
+    s, text = of_all(sparse(tmp_path / "a", meet=0, fields=1, changes={0: {"window": {"n_contact_stretches": 1}}}))
+    assert s["conditions"][0]["loads"]["tow_force"]["over_threshold"]["refused"] == "constant, 0 N, in 1 field"
+    assert "1 of 1 member)" in text and "1 of 1 member carries warnings and is in" in text and "1 members" not in text
 
 
 def test_a_saturated_load_does_not_end_the_statistics(tmp_path):

@@ -351,8 +351,17 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
         assert np.isclose(band[:, 1].min(), 10 - 0.98) and np.isclose(band[:, 1].max(), 10 + 0.98)
         assert plot_force.doubts(run) == ["warning: first doubt", "warning: second doubt (1 more in summary.json)"]
         assert plot_force.draw(run, top=14.0).axes[0].get_ylim()[1] == 14.0
-        assert plot_force.findings(run) == ("mean: ice resistance 10.00 N (95 %: 9.02 to 10.98); tow force 12.0 N; "
+        assert plot_force.findings(run) == ("mean: ice resistance 10.0 N (95 %: 9.0 to 11.0 N); tow force 12.0 N; "
                                             "reference 9.00 N (a test), ratio 1.11")
+
+
+def test_the_head_of_the_forces_has_digits_at_any_magnitude(tmp_path):
+    folder = make_run(tmp_path / "run")
+    summary = json.loads((folder / "summary.json").read_text())
+    summary |= {f"mean_ice_resistance_{key}": v for key, v in (("n", 1.05e-5), ("low_n", 8.7e-6), ("high_n", 1.23e-5))}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    with Run(folder) as run:
+        assert "ice resistance 0.0000105 N (95 %: 0.0000087 to 0.0000123 N)" in plot_force.findings(run)
 
 
 def test_a_mean_of_no_steady_tow_is_called_so(tmp_path):
@@ -365,7 +374,7 @@ def test_a_mean_of_no_steady_tow_is_called_so(tmp_path):
         figure = plot_force.draw(run)
         labels = [line.get_label() for line in figure.axes[0].lines]
         assert "mean over the window, 95 % interval" in labels and "mean, 95 % interval" not in labels
-        assert plot_force.findings(run).startswith("mean over the window: ice resistance 10.00 N")
+        assert plot_force.findings(run).startswith("mean over the window: ice resistance 10.0 N")
         assert "shaded: window 3" in " ".join(t.get_text() for t in figure.texts)
         assert report_run.figures(run)[0][0] == "ice resistance, mean over the window"
     del summary["window"]["verdict"]  # as without a towed body

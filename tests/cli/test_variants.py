@@ -33,7 +33,7 @@ def test_the_interval_of_a_change_holds_the_true_one(paired):
         other = field if paired else rng.normal(100, 20, 10)
         base = dict(enumerate(field + rng.normal(0, 3, 10)))
         means = dict(enumerate(1.2 * (other + rng.normal(0, 3, 10))))
-        change, width = plot_variants.relative_change(means, base, paired)
+        change, width = plot_variants.change_of(means, base, paired, True)
         held += abs(change - 20) <= width
         half.append(width)
     assert 0.93 < held / 1500 < 0.97, held / 1500
@@ -41,8 +41,28 @@ def test_the_interval_of_a_change_holds_the_true_one(paired):
 
 
 def test_too_few_fields_have_no_interval():
-    assert np.isnan(plot_variants.relative_change({1: 2.0}, {1: 1.0}, True)).all()
-    assert np.isnan(plot_variants.relative_change({1: 2.0}, {1: 1.0, 2: 3.0}, False)).all()
+    for base, paired, change in (({1: 1.0}, True, 100), ({1: 1.0, 2: 3.0}, False, 0)):
+        np.testing.assert_equal(plot_variants.change_of({1: 2.0}, base, paired, True), (change, np.nan))
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_a_change_has_the_sign_of_the_difference(paired):
+    """Also from a negative mean, as under a current from astern; from a mean of zero it is a force."""
+    means, base = {1: -5.0, 2: -7.0}, {1: -10.0, 2: -14.0}
+    assert plot_variants.change_of(means, base, paired, True)[0] == pytest.approx(50)
+    assert plot_variants.change_of(base, means, paired, True)[0] == pytest.approx(-100)
+    change, half = plot_variants.change_of(means, {1: 0.0, 2: 0.0}, paired, False)
+    assert (change, half) == (-6, pytest.approx(12.706, rel=1e-3))
+
+
+def test_variants_of_open_water_are_drawn(tmp_path):
+    """A first variant with one field, since the others would be copies, and no ice."""
+    def member(mean, variant, k):
+        return made_up_ensemble.member(np.full(100, mean), {"variant": variant}, ("open", "ice").index(variant))
+    made_up_ensemble.write(tmp_path / "a", [member(0.0, "open", 0), *(member(3e4 + k, "ice", k) for k in range(3))])
+    figure = plot_variants.draw(Members(tmp_path / "a"), lambda *_: None)
+    assert figure.axes[0].patches[0].get_width() == pytest.approx(30, rel=1e-3)
+    assert figure._supxlabel.get_text() == "change of the mean ice resistance, kN"
 
 
 @pytest.mark.slow

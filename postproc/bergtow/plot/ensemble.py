@@ -144,7 +144,7 @@ def pictures(e, options, conditions):
                           if "refused" not in x["over_threshold"])
     out = [(f"returns-{name.replace('_', '-')}", lambda name=name: draw_returns(e, conditions, name)) for name in names]
     out += [(f"above-{name.replace('_', '-')}", lambda name=name: draw_above(e, conditions, name))
-            for name in dict.fromkeys(name for c in conditions for name in c["loads"])
+            for name in dict.fromkeys(name for c in conditions for name, x in c["loads"].items() if x["exceedance"])
             if name != "ice_resistance" and name not in loads.LOCAL]
     out += [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key))
            for key in keys]

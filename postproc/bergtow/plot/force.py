@@ -3,6 +3,7 @@
 import textwrap
 
 from bergtow import arguments, writing
+from bergtow import table as text_table
 from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.result.run import Run
@@ -126,13 +127,8 @@ def findings(run):
     mean, low, high = run.interval("ice_resistance")
     words = []
     if np.isfinite(mean):
-        factor, unit = style.scale([mean], "N")
-        if np.isfinite(low) and high > low:  # all with the two digits that the interval justifies
-            decimals = len(style.short((high - low) / 2 / factor, 2).partition(".")[2])
-            words.append(f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: "
-                         f"{low / factor:.{decimals}f} to {high / factor:.{decimals}f})")
-        else:
-            words.append(f"{run.mean_name}: ice resistance {style.short(mean / factor)} {unit}")
+        said, ends = text_table.stated(mean, low, high, "N")
+        words.append(f"{run.mean_name}: ice resistance {said}" + (f" (95 %: {ends})" if high > low else ""))
     tow, low, high = run.interval("tow_force")
     if np.isfinite(tow):
         words.append(f"tow force {style.quantity(tow, 'N')}")

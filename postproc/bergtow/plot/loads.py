@@ -4,6 +4,7 @@ from bergtow.plot import style
 from bergtow.plot.axes import headline, wants_log
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats.conditions import extremes
+from bergtow.table import counted
 
 import numpy as np
 import scipy
@@ -113,7 +114,7 @@ def draw_returns(e, conditions, name):
     figure.subplots_adjust(left=0.09, right=0.66, top=0.86, bottom=0.14)
     for k, (colour, c) in enumerate(zip(CYCLE, shown)):
         x = c["loads"][name]
-        draw_return_line(axes, x, f"{c['label']}\n{x['fields']} fields, {x['hours']:.3g} h", colour, factor,
+        draw_return_line(axes, x, f"{c['label']}\n{counted(x['fields'], 'field')}, {x['hours']:.3g} h", colour, factor,
                          1.1 ** (k - (len(shown) - 1) / 2))
     style.logarithmic(axes.xaxis)
     floor = min(c["loads"][name]["over_threshold"]["threshold"] for c in shown) / factor
@@ -143,9 +144,9 @@ def draw_returns(e, conditions, name):
 
 
 def draw_above(e, conditions, name):
-    """Figure of the share of time that a load exceeds a level, with its 95 % interval over fields; None if no condition
-    has the load."""
-    some = [c for c in conditions if name in c["loads"]]
+    """Figure of the share of time that a load exceeds a level, with its 95 % interval over fields; None if it varies in
+    no condition."""
+    some = [c for c in conditions if c["loads"].get(name, {}).get("exceedance")]
     if not some:
         return None
     shown, first = some[::every(some)], some[0]["loads"][name]
@@ -160,7 +161,7 @@ def draw_above(e, conditions, name):
         low, high = np.array([row["share_of_time"]["interval_95"] for row in x["exceedance"]], dtype=float).T
         least = min(least, share[share > 0].min(initial=1.0))
         axes.plot(level, 100 * share, color=colour, linewidth=1.6,
-                  label=f"{c['label']}\n{x['fields']} fields, {x['hours']:.3g} h")
+                  label=f"{c['label']}\n{counted(x['fields'], 'field')}, {x['hours']:.3g} h")
         axes.fill_between(level, 100 * np.fmax(low, 1e-9), 100 * np.fmax(high, 1e-9), where=np.isfinite(low),
                           color=colour, alpha=0.15, linewidth=0)
     style.logarithmic(axes.yaxis)

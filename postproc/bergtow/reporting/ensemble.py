@@ -25,6 +25,7 @@ from bergtow.result.run import Run
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import design_value as statement
 from bergtow.stats.conditions import DEFAULTS as OPTIONS
+from bergtow.stats.loads import CONSTANT
 from bergtow.study import analysis
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
@@ -76,7 +77,8 @@ FOOTNOTES = {
 
 def marks(d):
     """The marks of FOOTNOTES that apply to a design value."""
-    carried = {"*": d["beyond_data"], "†": d["model"] == "GEV", "‡": d["value"] < MARGIN * d["largest"]}
+    carried = {"*": d["beyond_data"], "†": d["model"] == "GEV",
+               "‡": d["model"] != CONSTANT and d["value"] < MARGIN * d["largest"]}
     return "".join(mark for mark, there in carried.items() if there)
 
 
@@ -89,7 +91,7 @@ def design_row(c):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
         value, interval = text_table.stated(d["value"], *d["interval_95"], "N", d["largest"])
-        return [value + marks(d), interval]
+        return [value + marks(d), CONSTANT if d["model"] == CONSTANT else interval]
     return [unbroken(c["label"]), *cells(tow), *cells(tension), text_table.stated(tow["mean"], *tow["mean_95"], "N")[0],
             report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
             str(tow["fields"]), text_table.number(tow["hours"])]
@@ -203,7 +205,7 @@ def kinds_of_warnings(some):
     for row in some:
         for kind, text in reversed(row["kinds"].items()):
             found.setdefault(kind, [text, 0])[1] += 1
-    return [f"{text} ({ensemble_text.counted(n)})" for text, n in found.values()]
+    return [f"{text} ({text_table.counted(n)})" for text, n in found.values()]
 
 
 def study_text(e):

@@ -10,10 +10,9 @@ from bergtow.result.run import case_value
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import profile as stat_profile
-from bergtow.table import number, quantity
+from bergtow.table import counted, number, quantity
 from bergtow.text import capability as capability_text
 from bergtow.text import loads as loads_text
-from bergtow.text.ensemble import counted
 
 KEYS = "ice.splitting.toughness", "ice.rafting.kappa", "ice.crushing.pressure"
 

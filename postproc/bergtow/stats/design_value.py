@@ -20,10 +20,11 @@ from bergtow.result.origins import short as in_short
 from bergtow.result.run import Run, case_value
 from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
+from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
-from bergtow.table import hours_text, quantity, short
+from bergtow.table import counted, hours_text, quantity, short
 
 LONG = 2.0          # the tow of the statement / the simulated tow: above, the value is for a longer tow than simulated
 FAR = 10.0          # times the simulated hours: an extrapolation beyond this is reported
@@ -156,7 +157,7 @@ def _of_the_case(e, rows, case, tow):
     left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
     if np.nanmax(left, initial=0.0) > 0:
         out.append(("floes left through the open ends of the domain and no longer resist: the value can be too small",
-                    f"{np.sum(left > 0)} of {len(rows)} members, up to {np.nanmax(left):.0f} floes"))
+                    f"{np.sum(left > 0)} of {counted(len(rows))}, up to {counted(int(np.nanmax(left)), 'floe')}"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
                     quantity(case.bollard_pull, "N")))
@@ -169,13 +170,15 @@ def _of_the_sample(e, rows, c, load):
     for kind, words in DOUBTFUL.items():
         some = [words + (f", since {e.why_unsteady(m)}" if kind == "unsteady" else "")
                 for m in rows if kind in e.doubts(m)]
-        out += [(what, f"{some.count(what)} of {len(rows)} members") for what in dict.fromkeys(some)]
+        out += [(what, f"{some.count(what)} of {counted(len(rows))}") for what in dict.fromkeys(some)]
     if c["drift"]["verdict"] == "not steady":
         out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
     if load["fields"] < load["members"]:
         out.append((f"members without a {load['label']}, or without a window of {stat_load.LEAST_SCALES} time scales "
                     "where it is known throughout, are left out of its numbers",
-                    f"{load['members'] - load['fields']} of {load['members']} members"))
+                    f"{load['members'] - load['fields']} of {counted(load['members'])}"))
+    if d.get("model") == loads.CONSTANT:  # without a tail or an interval nothing else can be wrong with it
+        return out
     if load["fields"] < SHORT_FIELDS:
         out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
                     f"{load['fields']}"))
@@ -194,7 +197,7 @@ def _of_the_sample(e, rows, c, load):
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
         out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
-                    f"{short(d['times_the_hours_simulated'], 2)} times; with {more} fields {FAR:g} times"))
+                    f"{short(d['times_the_hours_simulated'], 2)} times; with {counted(more, 'field')} {FAR:g} times"))
     if d["irregular"]:
         out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, "
                     "and the value can be too small", f"shape {d['shape']:.2g}"))
@@ -217,7 +220,8 @@ def _of_unlike_fields(load):
 
 def start_exceeds(d):
     """Does the start-up exceed the design value or, without one, the largest value of the window?"""
-    return d["start_up"] is not None and d["start_up"]["largest"] > d.get("value", d["largest"])
+    return d["start_up"] is not None and bool(
+        stat_extreme.exceeds(d["start_up"]["largest"], d.get("value", d["largest"])))
 
 
 def _of_the_start(case, load):
@@ -230,7 +234,8 @@ def _of_the_start(case, load):
     words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
     ramp = case.ramp if case else 0.0
     if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
-        inertia = f", of which {100 * found['inertia'] / found['largest']:.0f} % inertia" if np.isfinite(
+        # no share: the other forces may have the other sign
+        inertia = f", with {quantity(found['inertia'], load['units'])} of inertia" if np.isfinite(
             found.get("inertia", np.nan)) else ""
         return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
                  "accelerates the body; a longer ramp takes less", force + inertia)]
@@ -285,7 +290,7 @@ def _of_the_line(e, rows, lines):
                     "can load that branch more. Means and largest values cover each tow until nothing tows it (a "
                     "tension until its branch parts), and mix the two; for a design value simulate without "
                     "breaking_load",
-                    ", ".join([f"the line parted in {parted} of {len(tows)} tows", *each,
+                    ", ".join([f"the line parted in {parted} of {counted(len(tows), 'tow')}", *each,
                                *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
     known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # these are reported above
@@ -331,9 +336,7 @@ def statement(e, rows, c):
         counts = [f"{c['members'][kind]} {kind}" for kind in ("failed", "waiting", "excluded") if c["members"][kind]]
         warned = [("nothing is known of a condition without a member in the numbers", ", ".join(counts))]
     elif tow is None:
-        left = c["loads_left_out"].get("tow_force")
-        warned.append(("no tow force that varies", left["why"]) if left else
-                      (f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
+        warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
                        "something is towed", ""))
     else:
         warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)

@@ -142,7 +142,10 @@ def gap_of(fields):
 
 
 def exceedance(fields, gap):
-    """Rows of level, share of the time above it, and rate per hour of exceedance, counting a cluster once."""
+    """Rows of level, share of the time above it, and rate per hour of exceedance, counting a cluster once; none of a
+    constant signal."""
+    if constant(fields):
+        return []
     every, out = np.concatenate([f["peak"] for f in fields]), []
     for level in np.linspace(np.median(every), every.max(), LEVELS + 1)[:-1]:
         above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]
@@ -160,7 +163,9 @@ def summary(fields):
     means, least = np.array([x.mean() for x in samples]), least_of(samples)
     return {
         "mean": {"value": means.mean(), "interval_95": mean_over_fields(means, least)},
-        "sd": over_fields(lambda x: float(np.std(x, ddof=1)), samples, 0.0, LOG),
+        # rounding is no scatter
+        "sd": over_fields(lambda x: float(np.std(x, ddof=1)) if np.ptp(x) > stat_extreme.tie(x) else 0.0,
+                          samples, 0.0, LOG),
         "quantiles": {str(q): over_fields(lambda x, q=q: float(np.percentile(x, q)), samples, least)
                       for q in QUANTILES}, "largest": max(x.max() for x in samples)
     }

@@ -30,7 +30,7 @@ from bergtow.result.run import Run, least
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
-from bergtow.table import bound, quantity
+from bergtow.table import bound, counted, quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -42,6 +42,7 @@ LINE = ("line", "bridle")             # the tension of a branch requires one of 
 TENSION = "line_tension_"             # followed by the number of the branch
 PARTED, ADRIFT = "line_broken", "adrift"  # events: a branch parts; none is left
 TAILS = ("over_threshold", "block_maxima")
+CONSTANT = "constant"                 # in place of the model of a tail
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ def cut_off(e, rows, load):
     if without := e.without_bound(rows):
         return str(without)
     n = tows_with(e, tows, *[PARTED] * through_the_line, ADRIFT)
-    return f"the line parted in {n} of {len(tows)} tows" if n else ""
+    return f"the line parted in {n} of {counted(len(tows), 'tow')}" if n else ""
 
 
 def bounded(found, without):
@@ -155,9 +156,9 @@ def in_window(e, m, time_scale):
 def gather(e, rows, options):
     """({name: (Load, [field, ...], start)}, {name: {"label", "why"}}) of a condition: the fields from
     stat_load.field_of; the largest start-up of all its tows, including those whose line parts in it; and the loads that
-    are left out, because they are refused, are constant over all fields together, or contain collisions that the
-    members convert differently. A field with a constant load counts like any other: ice that the tow does not meet
-    gives a load of zero, and its hours count. options: time_scale (None: the default)."""
+    are left out, because they are refused, or contain collisions that the members convert differently. A field with a
+    constant load counts like any other: ice that the tow does not meet gives a load of zero, and its hours count.
+    options: time_scale (None: the default)."""
     out, starts, why = {}, {}, {}
     time_scale = options.time_scale or TIME_SCALE / scaling(e, rows)
     for m in e.tows(rows, excluded=False):
@@ -174,12 +175,20 @@ def gather(e, rows, options):
         load, fields = some[0][0], [field for _, field in some]
         if len({load.conversion for load, _ in some}) > 1:
             why[name] = {"label": load.label, "why": "members convert its collisions in different ways"}
-        elif stat_load.constant(fields):
-            why[name] = {"label": load.label, "why": f"constant, {quantity(fields[0]['peak'][0], load.units)}, in all "
-                                                     f"{len(fields)} fields"}
         else:
             found[name] = load, fields, max(starts.get(name, []), key=lambda s: s["largest"], default=None)
     return found, why
+
+
+def in_open_water(e, rows):
+    """Do no members have floes? If files do not say so, they may have some."""
+    return bool(np.all(e.summary.get("n_floes", np.full(e.n, np.nan))[rows] == 0))
+
+
+def _of_a_constant(value, hours, total):
+    """The design value of a load that nothing makes vary: itself, and there is no tail to extrapolate."""
+    return {"value": value, "interval_95": (value, value), "model": CONSTANT, "return_hours": hours,
+            "times_the_hours_simulated": hours / total, "beyond_data": False, "shape": np.nan, "irregular": False}
 
 
 def _design(found, hours, total):
@@ -210,7 +219,11 @@ def statistics(e, rows, options, gathered=None):
         start_up = start and {what: start[what] for what in ("largest", "time_s")}
         if start and name == ALWAYS[0]:
             start_up |= {"inertia": _inertia(e, start["member"], start["time_s"], start["scale"])}
-        why = cut_off(e, rows, load)
+        why, constant = cut_off(e, rows, load), stat_load.constant(fields)
+        # where there are floes, a tow that meets none of them does not know the load of one that does
+        itself = constant and not why and in_open_water(e, rows)
+        if constant and not why:
+            why = f"constant, {quantity(fields[0]['peak'][0], load.units)}, in {counted(len(fields), 'field')}"
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
             fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
@@ -219,11 +232,13 @@ def statistics(e, rows, options, gathered=None):
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
             "fields": len(fields), "members": len(e.tows(rows, excluded=False)), "hours": total, "gap_s": gap,
-            **stat_load.summary(fields),
-            "alike_p": stat_alike.p_value(fields, stat_load.LEAST_GAPS * gap),
+            **stat_load.summary(fields), "constant": constant,
+            "alike_p": np.nan if constant else stat_alike.p_value(fields, stat_load.LEAST_GAPS * gap),
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
-                "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)
+                "probability": options.probability, "tow_hours": tow_hours,
+                **(_of_a_constant(fields[0]["peak"][0], design_hours, total) if itself else
+                   _design(found, design_hours, total))
             }
         }
     return out

@@ -94,18 +94,18 @@ def options(**more):
                                "threshold": None} | more))
 
 
-def value_of(e, c, found, fields, some):
+def value_of(e, c, found, fields):
     """The value of a condition: see the top of this file. found: statistics of the tow force, None without one; fields:
     from gather()."""
     if found is None:
-        if some is not None:
-            return {"kind": "constant", "n": some}
         return {"kind": "none", "n": np.nan, "reason": "no_window" if len(c.finished) else "no_member"}
     rows = e.tows(c.members)
     reason = "no_solution" if e.without_bound(c.members) else "line_parted" if stat_loads.tows_with(
         e, rows, stat_loads.PARTED, stat_loads.ADRIFT) else None
     if reason:
         return {"kind": "at_least", "n": found["largest"], "reason": reason, "n_tows": len(rows)}
+    if found["constant"]:
+        return {"kind": "constant", "n": found["mean"]["value"]}
     d = found["design"]
     if "value" in d:
         low, high = d["interval_95"]
@@ -135,14 +135,13 @@ def parts_of(e, rows, value, wind):
 
 def condition(e, c, k, o):
     """The row of a steady tow."""
-    gathered, why = stat_loads.gather(e, c.finished, o) if len(c.finished) else ({}, {})
+    gathered = stat_loads.gather(e, c.finished, o)[0] if len(c.finished) else {}
     tow = gathered.get("tow_force")
     s = stat_conditions.condition(e, c, {m: stat_conditions.member(e, m) for m in c.finished}, o)
     found = s["loads"].get("tow_force")
     means = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))[c.finished]
     means = means[np.isfinite(means)]
-    constant = float(means.mean()) if "tow_force" in why and len(means) else None
-    value = value_of(e, c, found, tow[1] if tow else [], constant)
+    value = value_of(e, c, found, tow[1] if tow else [])
     name = f"steady.{k + 1}"
     parts = parts_of(e, c.finished, value["n"], windy(case_of(e, {"id": name})))
     start = found and found["start_up"]

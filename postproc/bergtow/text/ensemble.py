@@ -3,7 +3,7 @@
 import numpy as np
 
 from bergtow.result.members import listed
-from bergtow.table import FAR, Table, number, pair, scale, written
+from bergtow.table import FAR, Table, counted, number, pair, scale, written
 from bergtow.text import converge as converge_text
 from bergtow.text import loads as loads_text
 
@@ -184,10 +184,6 @@ def sensitivity(s):
     return [Table(head, rows), [" ".join(notes)]]
 
 
-def counted(n, noun="member"):
-    return f"{n} {noun}{'' if n == 1 else 's'}"
-
-
 def members(s, markdown):
     """The lines on the members."""
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
@@ -222,7 +218,8 @@ def members(s, markdown):
         lines.append(s["builds"])
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
-        lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers" +
+        lines.append(f"{doubtful} of {counted(n)} {'carries' if doubtful == 1 else 'carry'} warnings and "
+                     f"{'is' if doubtful == 1 else 'are'} in the numbers" +
                      ("." if markdown else "; --exclude leaves them out."))
     if s["members_without_folder"]:
         lines.append(f"{counted(len(s['members_without_folder']))} "
