@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Number of working threads of a run: fewer than assigned while these do as much.
+// Number of working threads of a run: fewer than assigned while other programs use the cores.
 #ifndef BT_PACE_H
 #define BT_PACE_H
 
@@ -10,14 +10,15 @@ typedef struct bt_pace {
     int from;               ///< threads before the present trial, 0 = no trial
     bool fewer;             ///< the next trial is with fewer, otherwise with more
     double rate;            ///< work per second before the trial
-    double wall, work;      ///< s, and work, in the window so far
+    double wall, cpu, work; ///< s, s, work; in the window so far
     double due, pause;      ///< s until the next trial, and from that to the one after it
 } bt_pace;
 
 /// Start with `threads`; varies: false keeps this number.
 void bt_pace_begin(bt_pace *pace, int threads, bool varies);
 
-/// After a step: its wall time, s, and its work in any unit. Returns the number of threads for the next step.
-int bt_pace_step(bt_pace *pace, double wall, double work);
+/// After a step: wall time and processor time of all threads in it, s, and its work in any unit. Returns the number of
+/// threads for the next step.
+int bt_pace_step(bt_pace *pace, double wall, double cpu, double work);
 
 #endif

@@ -308,16 +308,23 @@ bool bt_running_goes_on(const bt_running *running)
     return running->w->step < running->end_step && !bt_halt_stops(running->asked);
 }
 
+/// Processor time of all threads of this process, s.
+static double processor_time(void)
+{
+    struct timespec t;
+    return clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t) == 0 ? (double)t.tv_sec + 1e-9 * (double)t.tv_nsec : 0;
+}
+
 static void step_at_pace(bt_world *world, bt_pace *pace)
 {
     if (pace->now != omp_get_max_threads()) start_threads(pace->now);
-    const double wall = bt_clock();
+    const double wall = bt_clock(), cpu = processor_time();
     bt_world_step(world);
     // not in the step itself: steps that shake fields are not meant to converge
     const bt_lock lock = world->stats.converged ? (bt_lock){0} : bt_locked(world);
     world->stats.locked = lock.found;
     world->stats.no_load = lock.towed;
-    bt_pace_step(pace, bt_clock() - wall, (double)world->stats.contact_updates);
+    bt_pace_step(pace, bt_clock() - wall, processor_time() - cpu, (double)world->stats.contact_updates);
 }
 
 static void warn(const char *text, int64_t step)
