@@ -634,8 +634,9 @@ def test_loads_and_fields_that_are_left_out_are_named(tmp_path):
     assert x["fields"] == 7 and x["members"] == 10
     assert ("members without a tow force, or without a window of 5 time scales where it is known throughout, are left "
             "out of its numbers", "3 of 10 members") in [tuple(w.values()) for w in c["design"]["warnings"]]
-    said = ("Members without tow force and ice resistance and line tension and vessel thrust, or without a window of 5 "
-            "time scales in which they are known throughout, enter none of these numbers: concentration 10 % (3 of 10).")
+    said = ("Members without tow force and ice resistance and line tension and vessel thrust, or without a window of "
+            "5 time scales in which they are known throughout, enter none of these numbers: concentration 10 % (3 of "
+            "10).")
     assert said in text
     # a moving mean leaves 2e-10 N of a constant
     x = c["loads"]["line_tension_1"]
