@@ -145,7 +145,8 @@ TEST(values_land_in_their_members)
         "tow: {mode: line, speed: 0.5 kn, line_stiffness: 50 kN}\n"
         "solver.warm_start: off\n"
         "floes:\n  - {x: 20, y: 1, length: 1 m, yaw: 45 deg}\n"
-        "  - {shape: rectangle, x: 30, y: 0, length: 2, width: 1, thickness: 5 cm, vx: -0.1, fixed: true}\n";
+        "  - {shape: rectangle, x: 30, y: 0, length: 2, width: 1, thickness: 5 cm, vx: -0.1}\n"
+        "  - {shape: square, x: 40, y: 0, length: 2, fixed: true}\n";
     if (read_text(&c, text, &err)) fail_with(&err, "refused");
     assert_true(c.run.dt == 0.01 && c.run.duration == 120);
     assert_string_equal(c.run.title, "a: b # c");
@@ -156,11 +157,11 @@ TEST(values_land_in_their_members)
     assert_true(c.body.yaw == BT_PI / 2 && c.tow.mode == BT_TOW_LINE && c.tow.speed == 0.5 * 1852 / 3600 &&
                 c.tow.line_stiffness == 5e4);
     assert_false(c.solver.warm_start);
-    assert_int_equal(c.n_floes, 2);
+    assert_int_equal(c.n_floes, 3);
     assert_true(c.floes[0].width == 1 && c.floes[0].thickness == 0.04 && c.floes[0].yaw == BT_PI / 4 &&
                 !c.floes[0].fixed);
     assert_true(c.floes[1].shape == BT_BODY_RECTANGLE && c.floes[1].thickness == 0.05 && c.floes[1].vx == -0.1 &&
-                c.floes[1].fixed);
+                !c.floes[1].fixed && c.floes[2].fixed);
     assert_int_equal(c.floes[1].line, 19);
     // the tow points along +x and the body's x along +y: the flat side at body y = -0.5 leads, and its middle is taken
     assert_true(fabs(c.tow.hull_x) < 1e-12 && fabs(c.tow.hull_y + 0.5) < 1e-12);
