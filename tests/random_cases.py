@@ -488,7 +488,7 @@ class Scene:
                 floe["thickness"] = min(100, self.size * d.log(0.005, 0.5))
             if d.chance(0.2) and self.ends != "moving" and self.mode != "speed" and not any(f"domain.{n}_closing" in v
                                                                                             for n in ("ends", "sides")):
-                floe["fixed"] = True
+                floe = {k: x for k, x in floe.items() if k not in ("vx", "vy", "yaw_rate")} | {"fixed": True}
             self.floes.append(floe)
 
     def floe_shapes(self):
