@@ -17,8 +17,8 @@
 #include "bergtow/base.h"
 
 #define BT_FOLDER_REPLACED "replaced"
-/// The first file of a run, and of an ensemble, whose folder takes no run, as an ensemble takes none of a run: readers
-/// of a folder would have to guess which one is meant.
+/// The first file of a run, and of an ensemble. Neither begins in the folder of the other: a reader of the folder would
+/// have to guess which of the two is meant.
 #define BT_FOLDER_CASE "case.resolved.yml"
 #define BT_FOLDER_STUDY "study.resolved.yml"
 

@@ -246,8 +246,8 @@ static void warn_of_splits(bt_summary *summary, const bt_run_totals *totals)
                 (long long)p->no_id, (long long)totals->splitting->reserve / 2);
     if (p->unconverged > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_UNCONVERGED,
-                "no floe split in %lld of %lld steps, as their loads had not converged; raise solver.max_sweeps or "
-                "lower run.dt",
+                "in %lld of %lld steps the loads had not converged, so no floe split; raise solver.max_sweeps or lower "
+                "run.dt",
                 (long long)p->unconverged, (long long)totals->n_steps);
 }
 

@@ -109,7 +109,7 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
 bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_options *options,
                                      char digest[BT_DIGEST_TEXT], bt_errors *err)
 {
-    if (bt_file_there(options->dir, BT_FOLDER_CASE))
+    if (bt_file_there(options->dir, BT_FOLDER_CASE) && !bt_file_there(options->dir, BT_FOLDER_STUDY))
         return bt_fail(err, BT_ERR_IO, "%s: holds a run; give the ensemble another folder with -o", options->dir);
     char *text = bt_study_resolved(study, err);
     if (!text) return BT_ERR_CASE;
