@@ -20,6 +20,22 @@ typedef struct {
 
 enum { KEY_FORCE = 256 };
 
+static bool ends_in(const char *path, const char *one, const char *other)
+{
+    const char *dot = strrchr(path, '.');
+    return dot && (!strcasecmp(dot, one) || !strcasecmp(dot, other));
+}
+
+static bool is_outlines(const char *path) { return ends_in(path, ".geojson", ".json"); }
+static bool is_fixed(const char *path) { return ends_in(path, ".yml", ".yaml"); }
+
+/// Does the name promise a format that is not written here? Without an ending it is HDF5.
+static bool is_other(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return strchr(slash ? slash : path, '.') && !ends_in(path, ".h5", ".hdf5") && !is_outlines(path) && !is_fixed(path);
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
     options *opt = state->input;
@@ -30,6 +46,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case ARGP_KEY_END:
         if (!opt->output || !*opt->output)
             argp_error(state, "no output file given; name one with -o FIELD.h5, FIELD.geojson or COAST.yml");
+        else if (is_other(opt->output))
+            argp_error(state, "-o %s: the name must end in .h5, .geojson or .yml, which decides what is written",
+                       opt->output);
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -51,12 +70,6 @@ static const struct argp field_argp = {.options = field_options,
                                               "write it; another case reads it with ice.field or ice.outlines, or "
                                               "includes it as fixed floes with base."};
 
-static bool ends_in(const char *path, const char *one, const char *other)
-{
-    const char *dot = strrchr(path, '.');
-    return dot && (!strcasecmp(dot, one) || !strcasecmp(dot, other));
-}
-
 int bt_cmd_field(int argc, char **argv)
 {
     options opt = {0};
@@ -67,7 +80,7 @@ int bt_cmd_field(int argc, char **argv)
     bt_field_init(&field);
     bt_status status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
     // Reading a field file to write a field file would only copy it.
-    const bool outlines = ends_in(opt.output, ".geojson", ".json"), fixed = ends_in(opt.output, ".yml", ".yaml");
+    const bool outlines = is_outlines(opt.output), fixed = is_fixed(opt.output);
     if (status == BT_OK && input.ice.field && !outlines && !fixed)
         status = bt_fail(&err, BT_ERR_CASE,
             "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines "

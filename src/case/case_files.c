@@ -10,6 +10,7 @@
 #include "base/checksum.h"
 
 #define ITSELF "case" // no key has this name: all have a section
+#define GIVEN "#> "   // before each line of the case as given
 
 const char *bt_case_file(const bt_case *input, const bt_key *key)
 {
@@ -67,16 +68,50 @@ char *bt_case_digests_in(const bt_case *input, const char *text)
     return bt_text_end(&t);
 }
 
-char *bt_case_with_digests(const char *resolved, const char *digests)
+/// Length of the first piece of a text that holds no line break but at its end. YAML 1.1 breaks lines also at a
+/// carriage return, and at the characters U+0085, U+2028 and U+2029, and the reader of cases follows it.
+static size_t piece_length(const char *text)
+{
+    static const char *const breaks[] = {"\r\n", "\n", "\r", "\xc2\x85", "\xe2\x80\xa8", "\xe2\x80\xa9"};
+    for (const char *at = text; *at; at++)
+        for (size_t k = 0; k < sizeof breaks / sizeof *breaks; k++)
+            if (!strncmp(at, breaks[k], strlen(breaks[k]))) return (size_t)(at - text) + strlen(breaks[k]);
+    return strlen(text);
+}
+
+char *bt_case_with_comments(const char *resolved, const char *digests, const char *given)
 {
     char digest[BT_CHECKSUM_DIGEST];
     const size_t n = strlen(resolved), head = line_length(resolved);
     bt_checksum_digest_text(resolved, n, digest);
-    return bt_text_of("%.*s# " ITSELF ": %zu bytes, xxh128 %s\n%s%s", (int)head, resolved, n, digest, resolved + head,
-                      digests ? digests : "");
+    bt_text text;
+    bt_text_begin(&text);
+    fprintf(text.out, "%.*s# " ITSELF ": %zu bytes, xxh128 %s\n%s%s", (int)head, resolved, n, digest, resolved + head,
+            digests ? digests : "");
+    for (const char *at = given; at && *at; at += piece_length(at))
+        fprintf(text.out, GIVEN "%.*s", (int)piece_length(at), at);
+    fputs(given ? "\n" : "", text.out); // ends the last line, which may have no end of its own
+    return bt_text_end(&text);
 }
 
-/// Is a text the output of bt_case_with_digests, except for comments at its end? line: its comment about itself.
+char *bt_case_given_in(const char *text)
+{
+    bt_text given;
+    bt_text_begin(&given);
+    const char *at = text;
+    while (*at && strncmp(at, GIVEN, strlen(GIVEN)) != 0) at += line_length(at);
+    const bool there = *at;
+    for (; !strncmp(at, GIVEN, strlen(GIVEN)); at += piece_length(at))
+        fprintf(given.out, "%.*s", (int)(piece_length(at) - strlen(GIVEN)), at + strlen(GIVEN));
+    char *made = bt_text_end(&given);
+    const size_t n = strlen(made);
+    if (there && !*at) made[n - 1] = 0; // an end that the last line has only here
+    if (there) return made;
+    free(made);
+    return NULL;
+}
+
+/// Is a text the output of bt_case_with_comments, except for comments at its end? line: its comment about itself.
 static bool is_itself(const char *text, const char *line)
 {
     const size_t before = (size_t)(line - text);
@@ -86,7 +121,7 @@ static bool is_itself(const char *text, const char *line)
     for (const char *at = same ? resolved + n : ""; *at && same; at += line_length(at))
         same = *at == '#' || *at == '\n';
     if (same) resolved[n] = 0;
-    char *made = bt_case_with_digests(resolved, NULL);
+    char *made = bt_case_with_comments(resolved, NULL, NULL);
     same = same && !strncmp(text, made, strlen(made));
     free(made);
     free(resolved);

@@ -6,7 +6,8 @@
 //     # water.current_table: 312 bytes, xxh128 0123...
 //
 // Its second line (# case: ...) does the same for case.resolved.yml itself, and is still there if the file is cut: a
-// file edited in the meantime would be the case of another run under the name of this one.
+// file edited in the meantime would be the case of another run under the name of this one. The case as given follows as
+// comments, each line behind "#> ": reports take its comments for the sources of its values.
 //
 // Rejected: a checkpoint at time zero, which contains them. A checkpoint means that a new result stands and the old one
 // may go (output/folder.h), and that a member whose process dies has made progress (run/ensemble_list.h).
@@ -25,9 +26,12 @@ char *bt_case_digests(const bt_case *input);
 /// Those of these comments that a text contains; the caller frees them.
 char *bt_case_digests_in(const bt_case *input, const char *text);
 
-/// The text of case.resolved.yml: the resolved case with the comment about itself, and digests, those about its files
-/// (bt_case_digests), or NULL. The caller frees it.
-char *bt_case_with_digests(const char *resolved, const char *digests);
+/// The text of case.resolved.yml: the resolved case with the comment about itself; digests, those about its files
+/// (bt_case_digests), or NULL; given, the case as given, or NULL. The caller frees it.
+char *bt_case_with_comments(const char *resolved, const char *digests, const char *given);
+
+/// The case as given, from the text of a case.resolved.yml; NULL if it is not there. The caller frees it.
+char *bt_case_given_in(const char *text);
 
 /// Does a case.resolved.yml match its comment about itself? dir: of the run, for messages. Errors: BT_ERR_CASE.
 bt_status bt_case_itself_same(const char *path, const char *text, const char *dir, bt_errors *err);

@@ -4,8 +4,7 @@
 // The promise. A run that is stopped, or killed, at any moment and resumed ends with the state, the series, the frames,
 // the events, the collisions and the summary of an uninterrupted run, on any number of ranks and threads. Only wall
 // times, and the costs of the division among ranks, are those of the pieces. A run killed before its first checkpoint
-// starts again from case.resolved.yml, which is then also its case as given, unless that or a file that it names has
-// changed (src/case/case_files.h).
+// starts again from case.resolved.yml, unless that or a file that it names has changed (src/case/case_files.h).
 //
 // The file. DIR/checkpoint.h5 is an HDF5 file protected by a checksum (src/base/checksum.h), of named arrays
 // (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp and synced, the previous one

@@ -124,7 +124,7 @@ static bt_status prepare_dir(const bt_record *record, const char *resolved, cons
 {
     bt_status status = bt_file_make_dir(record->dir, err);
     if (status == BT_OK && fresh) {
-        char *text = bt_case_with_digests(resolved, digests);
+        char *text = bt_case_with_comments(resolved, digests, record->c->text);
         status = bt_folder_replace(record->dir, text, err);
         free(text);
     } else if (status == BT_OK) {

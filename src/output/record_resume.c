@@ -116,7 +116,7 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
     size_t size = 0;
     const bool read = bt_file_read(path, "a case", &text, &size, NULL) == BT_OK;
     char *digests = read ? bt_case_digests_in(record->c, text) : NULL,
-         *wanted = bt_case_with_digests(resolved, digests);
+         *wanted = bt_case_with_comments(resolved, digests, record->c->text);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
         status = bt_record_write_text(record, CASE_FILE, wanted, err);

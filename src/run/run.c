@@ -68,6 +68,11 @@ static bt_status start_again(bt_resume *resume, const bt_comm *comm, const bt_ru
     if (status == BT_OK) status = bt_comm_agree(comm, bt_case_read(&resume->c, path, NULL, 0, err));
     if (status == BT_OK && comm->rank == 0) status = bt_case_files_same(&resume->c, options->dir, err);
     status = bt_comm_agree(comm, status);
+    char *given = status == BT_OK ? bt_case_given_in(resume->c.text) : NULL;
+    if (given) { // the result shows the case as given
+        free(resume->c.text);
+        resume->c.text = given;
+    }
     if (status == BT_OK && comm->rank == 0 && !options->quiet)
         printf("%s holds no checkpoint: the run starts at time zero\n", options->dir);
     return status;

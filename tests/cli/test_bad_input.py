@@ -348,6 +348,7 @@ USAGES = {
                                  "step 4 is not computed: the last one is 3"),
     "dump of no step": (["run", "good.yml", "--dump-contacts", "x:a.h5"], "give a whole number"),
     "field without output": (["field", "good.yml"], "no output file given"),
+    "field of another format": (["field", "good.yml", "-o", "ice.shp"], "-o ice.shp: the name must end in .h5"),
 }
 
 

@@ -165,6 +165,8 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
         result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout
     ), result.stderr
     assert Run(tmp_path / "out", None).summary["n_steps"] == STEPS
+    with h5py.File(tmp_path / "out/result.h5") as f:
+        assert f["case_as_given"][()].decode() == path.read_text()
 
 
 def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):

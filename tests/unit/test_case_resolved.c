@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The resolved file of a case reads back to the same bits.
+#include "case/case_files.h"
 #include "case/schema.h"
 #include "case_text.h"
 
@@ -178,6 +179,39 @@ TEST(resolved_text_of_the_resolved_text_is_identical)
         bt_case_free(&c);
         bt_case_free(&d);
     }
+}
+
+// Every line end of YAML, also in the middle, and none at the end: a piece of the text that became a line of its own
+// would be a key of the case.
+TEST(the_case_as_given_comes_back)
+{
+    static const char *const given[] = {
+        "run: {dt: 1}\n", "run: {dt: 1}", "\n\n# a\n\n", "a: 1\r\nb: 2\r\n", "a: 1\rb: 2\r", "a: 1\n\r",
+        "# a\xc2\x85"
+        "b: 1 # \xe2\x80\xa8" "c: 2\xe2\x80\xa9" "d: \xc2\xa0\xe2\x80\xa7", "#> a\n#> b", "---\na: 1\n...\n"};
+    bt_case c = {0}, back = {0};
+    bt_errors err = {0};
+    assert_int_equal(read_text(&c, "run: {dt: 0.1, duration: 100}\nfloes: [{x: 9, y: 0, length: 1}]\n", &err),
+                     BT_OK);
+    char *resolved = bt_case_resolved(&c);
+    for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
+        char *text = bt_case_with_comments(resolved, "# water.current_table: 3 bytes\n", given[i]);
+        char *found = bt_case_given_in(text);
+        assert_string_equal(found, given[i]);
+        assert_int_equal(bt_case_itself_same("case.yml", text, "out", &err), BT_OK);
+        assert_int_equal(read_text(&back, text, &err), BT_OK);
+        char *same = bt_case_resolved(&back);
+        assert_string_equal(same, resolved);
+        bt_case_free(&back);
+        free(same);
+        free(found);
+        free(text);
+    }
+    char *alone = bt_case_with_comments(resolved, NULL, NULL);
+    assert_null(bt_case_given_in(alone));
+    free(alone);
+    free(resolved);
+    bt_case_free(&c);
 }
 
 TEST_MAIN(make_folder, remove_folder)
