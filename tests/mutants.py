@@ -285,7 +285,7 @@ MUTANTS = {
         ("aside[k].formed) put_rows", "aside[k].formed && false) put_rows",
          "displacements end at cells without overlap"),
         ("if (limit->record[law] >= 0) return false;", ";", "rafted floes are pushed apart"),
-        (" + slip);", ");", "a floe that slides along a turning bar stays inside it"),
+        (" + swing * slip;", ";", "a floe that slides along a turning bar stays inside it"),
         ("        gaps->gap[i] += bt_normal_velocity(contact, i, &d[contact->a]",
          "        gaps->gap[i] -= bt_normal_velocity(contact, i, &d[contact->a]",
          "the second projection sees the first backwards"),

@@ -550,6 +550,8 @@ def draw(seed, table):
         if d.chance(0.35):
             values[name] = free_value(d, keys[name], spec)
     values["ice.start"] = d.one(keys["ice.start"]["choices"]) # last: the draws of before stay
+    if "ice.splitting.toughness" in values:  # must be equal then
+        values["ice.added_inertia"] = values["ice.added_mass"] = values.get("ice.added_mass", 0.0)
     for key in idle(values): # without effect, and refused
         values.pop(key, None)
     case = {}

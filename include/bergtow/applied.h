@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Forces that a program applies to bodies: one call per step with arrays of all bodies, instead of one call for each.
+// Forces that a program applies to bodies: one call with arrays of all bodies, instead of one call for each.
 //
 // A force law (bergtow/forces.h) is called for every body, by many threads, and costs nothing to call in C. From Python
 // such a call costs microseconds and holds a lock that all threads share. An applied force is therefore called once a
 // step, by one thread, and fills a row for every body; the rows are loads like those of any law, and are integrated,
-// recorded (series NAME_force, part of the momentum balance) and separated from the ice forces in the same way.
+// recorded (series NAME_force, part of the momentum balance) and separated from the ice forces in the same way. If
+// floes split, the step is solved again with the pieces, and the function is called again at the same time: the loads
+// must follow from the time and the bodies, not from the number of calls.
 //
 // A row of zeros leaves the body as without the force, to the last bit, and floes at rest stay at rest. The undisturbed
 // ice that a moving window takes in has no row: until it has entered it drifts without the force.
@@ -29,8 +31,8 @@ enum {
 /// The bodies of this rank at the start of a step, in the order of their ids. All arrays except load are read only, and
 /// all are valid only during the call.
 typedef struct bt_applied {
-    int64_t n;              ///< bodies; without MPI all, and id[k] = k
-    const int64_t *id;      ///< [n]
+    int64_t n;              ///< bodies; without MPI all
+    const int64_t *id;      ///< [n] rising; not all numbers occur, because floes that may split reserve some
     const double *place;    ///< [n][3] x, y (wrapped in periodic directions), yaw, m, m, rad
     const double *velocity; ///< [n][3] m/s, m/s, rad/s; a prescribed velocity is that of this step
     const double *mass;     ///< [n] with added mass, kg
@@ -39,6 +41,7 @@ typedef struct bt_applied {
     double time, dt;        ///< middle of the step; Δt, s
     double water[2], air[2];///< velocities of the step, m/s
     int64_t towed;          ///< id of the towed body, −1 = none
+    int64_t towed_row;      ///< k with id[k] = towed, −1 = none here
 } bt_applied;
 
 /// Fills the loads; returns 0, any other value ends the run with BT_ERR_NUMERIC. Under MPI it is called on every rank,

@@ -146,7 +146,8 @@ typedef struct bt_force_law {
     /// one line, "drag of water"; in the description of the series "on the towed body against the tow direction"
     /// follows
     const char *doc;
-    const char *part_of;       ///< the law is recorded in the series PART_OF_force instead of its own; NULL = its own
+    /// the law is recorded in the series PART_OF_force, a sum of laws, too; NULL = only in its own
+    const char *part_of;
     bool turns_only;           ///< it has a moment but no force: no series
     bool towed_only;           ///< it acts only on the towed body: add is not called for others
     /// [n_keys] own[k] is the value of the k-th; they are read, checked, listed and written like all others
@@ -161,10 +162,11 @@ typedef struct bt_force_law {
     /// Add the load of the law on the body in this step to *load. Called for every body in every step, by several
     /// threads at once: it must change only *load. Required.
     void (*add)(const bt_force_body *body, bt_load *load);
-    /// Called once per step, by one thread, when all bodies have their places, for work on all bodies together. It may
-    /// set own[]; if its `rests` then becomes false, floes at rest are woken. Returns NULL, or the reason of a failure:
-    /// the run ends after this step. NULL instead of the function = nothing to do. Only for registered laws, not those
-    /// in src/force/laws.h; likewise `context`.
+    /// Called by one thread before the step is solved, when all bodies have their places, for work on all bodies
+    /// together; again if floes split and the step is solved anew with the pieces. It may set own[]; if its `rests` then
+    /// becomes false, floes at rest are woken. Returns NULL, or the reason of a failure: the run ends after this step.
+    /// NULL instead of the function = nothing to do. Only for registered laws, not those in src/force/laws.h; likewise
+    /// `context`.
     const char *(*begin)(const bt_world *world, double own[BT_MAX_FORCE_OWN], void *context);
     void *context;             ///< passed to `begin`, and to `add` in the body
 } bt_force_law;
@@ -200,6 +202,7 @@ typedef struct bt_impulse { double x, y, turn; } bt_impulse; ///< N s, N s, N m 
 typedef struct bt_forces {
     int n;                     ///< laws
     int n_series;
+    bool under_way;            ///< `begin` of a law runs: contacts are neither of the last step nor of this one
     const bt_force_law *failed; ///< a law whose `begin` has failed, and the reason; NULL = none
     const char *why;
     double towed_at[2];        ///< place of the towed body, not wrapped, m; NaN until the first step

@@ -152,7 +152,7 @@ enum {
 };
 
 /// Contacts of the last step that this rank solves: writes up to `room` rows to out, [room][BT_CONTACT_COLUMNS].
-/// Returns their total number, including potential contacts without load.
+/// Returns their total number, including potential contacts without load; −1 in a force, while the step replaces them.
 int64_t bt_simulation_contacts(const bt_simulation *sim, double *out, int64_t room);
 
 // --- cases and texts -------------------------------------------------------------------------------------------------

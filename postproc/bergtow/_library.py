@@ -42,7 +42,7 @@ class Applied(ctypes.Structure):
     _fields_ = [("n", c_int64), ("id", POINTER(c_int64)), ("place", POINTER(c_double)),
                 ("velocity", POINTER(c_double)), ("mass", POINTER(c_double)), ("inertia", POINTER(c_double)),
                 ("load", POINTER(c_double)), ("time", c_double), ("dt", c_double), ("water", c_double * 2),
-                ("air", c_double * 2), ("towed", c_int64)]
+                ("air", c_double * 2), ("towed", c_int64), ("towed_row", c_int64)]
 
 
 class Mean(ctypes.Structure):

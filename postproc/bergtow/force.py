@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Forces as Python functions, called once per step with arrays of all bodies (bergtow/applied.h)."""
+"""Forces as Python functions, called with arrays of all bodies once per step, and again in a step in which floes split
+(bergtow/applied.h)."""
 from __future__ import annotations
 
 import contextlib
@@ -44,9 +45,8 @@ class Bodies:
         self._load = _view(a.load, n, _library.LOADS, writeable=True)
         self.time, self.dt = a.time, a.dt
         self.water, self.air = np.array(a.water), np.array(a.air)
-        rows = np.flatnonzero(self.id == a.towed)
-        self.has_towed: bool = len(rows) > 0
-        self._towed = int(rows[0]) if self.has_towed else None
+        self.has_towed: bool = a.towed_row >= 0
+        self._towed = a.towed_row if self.has_towed else None
 
     @property
     def towed(self) -> int:

@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import html
 import math
+import operator
 import os
 import sys
 import time
@@ -138,6 +139,7 @@ class Simulation:
     def step(self, n: int = 1) -> None:
         """Make n steps, or as many as are left. An exception in a force is raised from here. Ctrl-C stops between two
         steps; a second Ctrl-C aborts a slow force, and with it the simulation."""
+        n = operator.index(n)
         while True:
             with self._forces.in_step():
                 self._library.bt_simulation_step(self._s, min(n, 1))
@@ -301,6 +303,8 @@ class Simulation:
         """Contacts of the last step, an array of dtype CONTACT; those without an impulse are candidates."""
         with _library.LOCK:
             n = self._library.bt_simulation_contacts(self._s, None, 0)
+            if n < 0:
+                raise BergtowError(self._library.bt_last_error().decode())
             rows = np.empty((n, _library.limit("contact_columns")))
             self._library.bt_simulation_contacts(self._s, _pointer(rows), n)
         out = np.empty(n, CONTACT)

@@ -275,7 +275,7 @@ typedef struct limit {
 #define MADE "ice.concentration ice.field ice.outlines ice.size ice.size_law ice.size_min ice.size_max "
 #define BODY "body.shape tow.mode"
 
-enum { LIMITS = 63 };
+enum { LIMITS = 64 };
 enum { TIDE_STEPS = 20 }; // a step takes the current at its middle: 1 - sinc(π/20) = 0.4 % off its mean
 
 /// Does the tow run along x? Then its lead goes round in a moving window without being displaced.
@@ -368,6 +368,10 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
         {splits && input->domain.ends == BT_BOUND_MOVING, REFUSED, "ice.splitting.toughness", NULL, 0, "domain.ends",
          "floes that split are not supported with domain.ends: moving, where floes left behind come back ahead; set 0, "
          "or use another boundary and a domain as long as the tow"},
+        {splits && input->ice.added_inertia != input->ice.added_mass, REFUSED, "ice.added_inertia", NULL, 0,
+         "ice.added_mass ice.splitting.toughness",
+         "is not ice.added_mass, but where floes split the two must be equal, or a split would make or destroy energy of "
+         "the water that turns with the floe; give both the same value"},
         {splits && input->ice.splitting.scatter > 0, AT_LEAST, "ice.splitting.scatter", NULL, 2,
          "ice.splitting.toughness",
          ": such a Weibull modulus leaves floes without strength; give at least 2, as in 10, or 0 for the same "

@@ -29,7 +29,9 @@ static const bt_law_number numbers[] = {
     [EDGE_WORK] = {"raft_edge_work", "J",
                    "work taken where edges raft; part of it is in rafted_energy, the rest is lost",
                    BT_KEEP_SUM, .key = "raft_edge_work_j"},
-    [FRICTION_WORK] = {"raft_friction_work", "J", "work taken by friction between floes that lie over each other",
+    [FRICTION_WORK] = {"raft_friction_work", "J",
+                       "work taken by friction between floes that lie over each other; can be negative in the step in "
+                       "which they stop, where it and the edges share one load",
                        BT_KEEP_SUM, .key = "raft_friction_work_j"},
 };
 

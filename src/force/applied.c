@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Applied forces as laws of the table: each has a row of loads for every body, filled once per step; see
+// Applied forces as laws of the table: each has a row of loads for every body, filled before the step is solved; see
 // bergtow/applied.h.
 //
 // Rest. own[0] says whether any row of the step is not zero: while none is, the law lets floes rest.
@@ -93,8 +93,9 @@ static const char *begin(const bt_world *world, double *own, void *context)
     arrays->of = NULL;
     if (!arrays->force) return NULL; // the same on all ranks
     reserve(arrays, world->bodies.n_global);
+    const int64_t n = list_bodies(arrays, &world->bodies);
     const bt_applied applied = {
-        .n = list_bodies(arrays, &world->bodies),
+        .n = n,
         .id = arrays->id, .place = arrays->place, .velocity = arrays->velocity, .mass = arrays->mass,
         .inertia = arrays->inertia, .load = arrays->load,
         .time = bt_load_time(world),
@@ -102,6 +103,7 @@ static const char *begin(const bt_world *world, double *own, void *context)
         .water = {world->par.water_u, world->par.water_v},
         .air = {world->par.air_u, world->par.air_v},
         .towed = world->towed,
+        .towed_row = world->towed < 0 ? -1 : arrays->row[world->towed],
     };
     const char *fault = arrays->force(&applied, arrays->user) != 0 ? "its function failed"
                                                                    : fault_of(arrays, applied.n, &own[ACTS]);

@@ -236,12 +236,14 @@ void bt_forces_begin(bt_world *world)
     for (int k = BT_LISTED_LAWS; k < forces->n; k++) any = any || bt_force_laws[k]->begin;
     if (!any) return;
     const bool rested = bt_forces_rest(world);
+    forces->under_way = true;
     for (int k = BT_LISTED_LAWS; k < forces->n; k++) {
         const bt_force_law *law = bt_force_laws[k];
         const char *why = law->begin ? law->begin(world, forces->own[k], law->context) : NULL;
         if (why) forces->failed = law, forces->why = why;
         forces->acted[k] |= !bt_force_waits(law, forces->own[k]);
     }
+    forces->under_way = false;
     if (!rested || bt_forces_rest(world)) return;
     bt_cells_wake_all(world->cells);
     for (bt_idx k = 0; k < world->cells->n; k++) world->cells->asleep[k] = BT_AWAKE;

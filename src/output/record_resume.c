@@ -186,13 +186,17 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err)
 
 // --- resuming --------------------------------------------------------------------------------------------------------
 
-/// Is an added series that the run did not have 0 before? Forces are.
-static bool was_zero(const bt_quantity *quantity) { return quantity->role == BT_ROLE_BALANCE; }
+/// Is an added series that the run did not have 0 before? The force of an added law is: a law that has acted must be
+/// there again (src/output/state.c).
+static bool was_zero(const bt_quantity *quantity) { return quantity->of_world == bt_force_of; }
 static bool may_lack(int k) { return k >= bt_n_program_series() && was_zero(bt_series(k)); }
 
-/// Are all values 0 or NaN? A force on the towed body is NaN without a body.
-static bool all_zero(const bt_item *item)
+/// Is it the series of a force, with all values 0 or NaN? A force on the towed body is NaN without a body.
+static bool never_acted(const bt_item *item)
 {
+    static const char force[] = "_force";
+    const size_t n = strlen(item->name), own = sizeof force - 1;
+    if (n < own || strcmp(item->name + n - own, force) != 0) return false;
     for (int64_t k = 0; k < item->n; k++)
         if (item->type != BT_ITEM_F64 ||
             !(isnan(((const double *)item->data)[k]) || ((const double *)item->data)[k] == 0))
@@ -211,7 +215,7 @@ static void check_added(bt_snapshot *snap)
         if (!bt_snapshot_find(snap, name) && !was_zero(bt_added(k))) missing = bt_added(k)->name;
     }
     for (int i = 0; i < snap->n && !left_over; i++) {
-        if (strncmp(snap->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || all_zero(&snap->item[i]))
+        if (strncmp(snap->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || never_acted(&snap->item[i]))
             continue;
         left_over = snap->item[i].name + strlen(BT_HISTORY_ADDED);
         for (int k = 0; k < bt_n_added() && left_over; k++)
@@ -235,7 +239,6 @@ static void load_history(bt_history *history, bt_snapshot *snap, int64_t n)
 {
     for (int k = 0; k < bt_n_history_totals(); k++)
         bt_snapshot_take_rows(snap, "history", &bt_history_total(k)->at, 1, history);
-    check_added(snap);
     history->n = history->cap = n;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < history->n_columns; k++) {
@@ -339,7 +342,8 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
     record->n_merged = bt_snapshot_int(snap, "record/merged_steps");
     bt_snapshot_want(snap, entries == step / every && record->n_merged == step % every, "record/entries", -1,
                      "does not fit the number of steps");
-    if (record->n_merged > 0) load_merged(record, snap);
+    if (first) check_added(snap); // before anything reads their values
+    if (record->n_merged > 0 && !snap->faulty) load_merged(record, snap);
     const char *path = BT_PATH(record->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {

@@ -372,6 +372,8 @@ int64_t bt_simulation_outline(const bt_simulation *sim, int64_t id, double *xy, 
 
 #define NO_EDIT "a step has failed, or was the last: there is no next one for which a body could be changed"
 
+static bool may_edit(const bt_simulation *sim) { return sim->status == BT_OK && bt_simulation_steps_left(sim) > 0; }
+
 /// After an edit, a frame or checkpoint of this step no longer shows the state.
 static bt_status edited(bt_simulation *sim, bt_status status, bt_errors *err)
 {
@@ -386,7 +388,7 @@ bt_status bt_simulation_set_velocity(bt_simulation *sim, int64_t id, double x, d
 {
     bt_errors err = {0};
     if (sim == stepping) return refuse_within();
-    if (sim->status != BT_OK) return refuse(NO_EDIT);
+    if (!may_edit(sim)) return refuse(NO_EDIT);
     return edited(sim, bt_edit_velocity(sim->r.w, id, (const double[]){x, y, rate}, &err), &err);
 }
 
@@ -395,7 +397,7 @@ static bool is_outside(double x, double low, double length) { return x < low || 
 bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, double y, double yaw)
 {
     if (sim == stepping) return refuse_within();
-    if (sim->status != BT_OK) return refuse(NO_EDIT);
+    if (!may_edit(sim)) return refuse(NO_EDIT);
     bt_errors err = {0};
     const bt_params *par = &sim->r.w->par;
     const double length = sim->c.domain.length, width = sim->c.domain.width;
@@ -454,6 +456,10 @@ static bool still_there(const bt_simulation *sim, const bt_contact *contact)
 int64_t bt_simulation_contacts(const bt_simulation *sim, double *out, int64_t room)
 {
     const bt_world *world = sim->r.w;
+    if (world->forces->under_way) {
+        refuse("a step is replacing the contacts; read them between two steps, or in a quantity");
+        return -1;
+    }
     int64_t n = 0;
     for (bt_idx k = 0; k < world->cells->n; k++) {
         const bt_cell *cell = &world->cells->cell[k];

@@ -10,8 +10,9 @@
 // Velocity-level correction (Baumgarte) would add spurious kinetic energy and load (Metrikin 2014).
 //
 // Second pass. The gaps above are linear in the rotations of a step. Two bodies that rotate by θ relative to each other
-// may overlap by θ²/2 of their radii at the end, as does, at 5 s, a floe that rolls along a hull. So where a rotation
-// can have left more than LEFT slops, the contacts of the pair are found anew at the present poses: the rolling floe
+// may overlap by θ²/2 of their radii at the end, as does, at 5 s, a floe that rolls along a hull. One that slides by s
+// along the other while both turn by θ overlaps it by θ s: the surface turns under it. So where a rotation can have left
+// more than LEFT slops, the contacts of the pair are found anew at the present poses: the rolling floe
 // now touches the hull metres away. If one of them is that deep, the new rows, with the unchanged rows of all other
 // pairs, separate the bodies once more. Most steps have no such rotation; most that have need no second pass. Not for
 // the plain reference, which also makes the fields: its own sweeps, point by point, keep the bits of fields.
@@ -40,11 +41,12 @@ static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double l
     const bt_bodies *bodies = &world->bodies;
     const bt_contact *contact = &cell->contacts[j];
     const bt_vel *va = &bodies->vel[contact->a], *vb = &bodies->vel[contact->b];
-    const double turn = world->par.dt * fabs(vb->w - va->w);
-    if (turn == 0) return false;
+    const double turn = world->par.dt * fabs(vb->w - va->w),
+                 swing = world->par.dt * bt_max(fabs(va->w), fabs(vb->w)); // of the normal, which slip depends on
+    if (swing == 0) return false;
     const double *g = cell->gaps[j].gap, gap = contact->n > 1 ? bt_min(g[0], g[1]) : g[0];
     const double slip = world->par.dt * fabs(bt_tangent_velocity(contact, va, vb));
-    const double error = turn * (0.5 * turn * (bodies->radius[contact->a] + bodies->radius[contact->b]) + slip);
+    const double error = 0.5 * turn * turn * (bodies->radius[contact->a] + bodies->radius[contact->b]) + swing * slip;
     if (!(bt_max(gap, -world->par.slop) - error < -least)) return false;
     if (!cell->laws->limits) return true;
     const bt_limit *limit = &cell->laws->limits[j];

@@ -24,8 +24,9 @@ typedef struct bt_piece {
 /// moments, of the second piece are the parent's minus the first's, so that the sums
 ///     A_1 + A_2 = A,   A_1 c_1 + A_2 c_2 = 0,   J_1 + A_1 c_1² + J_2 + A_2 c_2² = J
 /// hold to rounding, and with velocities V + ω k × c_i and spins ω also mass, momentum, angular momentum and kinetic
-/// energy. The ends of the section have the same bits in the parent's frame before the centroids are subtracted. False
-/// if a piece has fewer than 3 or more than BT_MAX_VERTICES vertices, no area, or no convex parts.
+/// energy, if mass and inertia have the same share of added water. The ends of the section have the same bits in the
+/// parent's frame before the centroids are subtracted. False if a piece has fewer than 3 or more than BT_MAX_VERTICES
+/// vertices, no area, or no convex parts.
 bool bt_split_cut(int n, const double *outline, double area, double polar, const bt_chord *chord, bt_piece piece[2]);
 
 #endif

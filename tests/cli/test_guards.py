@@ -167,6 +167,20 @@ def test_the_last_look_leaves_no_trace_in_a_run_that_goes_on(tmp_path):
         assert all(np.array_equal(a["series"][n][:], b["series"][n][:], equal_nan=True) for n in a["series"])
 
 
+def test_a_floe_that_slides_along_a_hull_that_turns_stays_outside(tmp_path):
+    """Both turn alike, so their relative rotation is none; but the hull turns under the floe by its way along it."""
+    still = {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}
+    r = run(tmp_path, {
+        "run": {"dt": 5, "duration": 60},
+        "domain": {"length": 600, "width": 600, "x0": -300, "ends": "open", "sides": "open"},
+        "ice": {"concentration": 0, "size": 10, "thickness": 1, "friction": 0, "drag": still},
+        "body": {"shape": "rectangle", "length": 80, "width": 16, "x": 0, "y": 0, "draft": 8, "yaw_rate": 1,
+                 "drag": still},
+        "tow": {"mode": "none"}, "floes": [{"shape": "square", "length": 10, "x": 12, "y": 13}]})
+    slop = 0.001 * 10 * np.pi**-0.5 * 2  # of the floe's circle of equal area
+    assert 0 < r.summary["max_overlap_m"] < 5 * slop
+
+
 def test_an_overlap_of_the_last_state_is_held_against_its_guard(tmp_path):
     """The limit lies between what the steps have found and what the last one has left."""
     free = run(tmp_path, LAST, "--quiet", name="free")

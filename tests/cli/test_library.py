@@ -128,6 +128,17 @@ def test_a_program_with_quantities_has_them_on_the_way_and_in_its_result(built, 
         assert np.array_equal(moving, f["series/moving_ice"][9::10])
 
 
+def test_a_quantity_that_was_zero_so_far_is_missed(built, tmp_path):
+    """Only of the force of a law is it known that it is 0 where the law is not added."""
+    case = write_case(tmp_path, {k: v for k, v in CASE.items() if k != "tow"} | {"body": {"shape": "none"}})
+    subprocess.run([built / "measure", case, tmp_path / "out"], check=True, timeout=120)
+    with h5py.File(tmp_path / "out/result.h5") as f:
+        assert not f["series/moving_ice"][:].any() and np.isnan(f["series/carried_water_force"][:]).all()
+    (tmp_path / "out/summary.json").unlink()
+    done = subprocess.run([BERGTOW, "resume", tmp_path / "out"], capture_output=True, text=True)
+    assert done.returncode == 3 and "the run had " in done.stderr, done.stderr
+
+
 def test_a_faulty_case_is_a_message_and_not_the_end(program, tmp_path):
     case = write_case(tmp_path, changed(CASE, tow__sped=1))
     result = subprocess.run([program, case], capture_output=True, text=True)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """postproc/plot_resistance.py: points, curves, table and words of made-up runs, and what it refuses."""
+import copy
 import json
 from dataclasses import replace
 
@@ -82,6 +83,16 @@ def test_the_picture_has_points_bars_and_curves(runs):
     least = points[1].estimates["lichey_hellmer"].force  # the smallest of what is meant for 50 %
     assert np.isclose(plot_resistance.limits(points[1:3], True)[0], least / 2.5)
     assert plot_resistance.draw(points, log=False).axes[0].get_yscale() == "linear"
+
+
+def test_an_estimate_without_a_value_has_no_place_on_the_axis(runs):
+    point = copy.deepcopy(plot_resistance.read(runs[1]))
+    known = plot_resistance.limits([point], False)
+    numbers = next(iter(point.of_ice.values())).numbers
+    numbers.update(valid=True, force_n=None, low_n=None, high_n=None)
+    plot_resistance.limits([point], False)
+    numbers.update(force_n=0.1 * known[1], low_n=None)
+    assert plot_resistance.limits([point], False)[1] <= known[1]
 
 
 def test_the_table_has_means_errors_and_ratios(runs, tmp_path):

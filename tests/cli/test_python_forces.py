@@ -281,6 +281,17 @@ def test_without_a_towed_body_there_is_no_row_of_it():
         sim.drop()
 
 
+def test_the_row_of_the_towed_body_where_floes_reserve_numbers():
+    def push(bodies):
+        assert (np.diff(bodies.id) > 0).all() and bodies.id[bodies.towed] == sim.towed != bodies.towed
+        bodies.force[bodies.towed] += -100, 0
+
+    case = SHORT | {"ice": SHORT["ice"] | {"splitting": {"toughness": 1e5, "strength": 1e5}}}
+    with bergtow.Simulation(case, threads=1, forces={"push": push}) as sim:
+        sim.step(5)
+        assert sim["push_force"] == 100
+
+
 def test_a_force_cannot_change_what_steps(tmp_path):
     said, calls = [], []
 
@@ -290,6 +301,8 @@ def test_a_force_cannot_change_what_steps(tmp_path):
             with pytest.raises(bergtow.BergtowError) as refused:
                 call()
             said.append(str(refused.value))
+        with pytest.raises(bergtow.BergtowError, match="a step is replacing the contacts"):
+            sim.contacts()
         assert len(sim.positions) == len(bodies.id)
 
     def after(bodies):

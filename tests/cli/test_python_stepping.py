@@ -451,6 +451,10 @@ def test_bodies_are_changed_by_hand_within_limits():
             assert sim.state_hash == before
         with pytest.raises(bergtow.BergtowError, match="prescribed"):
             sim.set_velocity(sim.towed, 1, 0)
+        sim.step(sim.steps_left)
+        for change in lambda: sim.set_velocity(0, 0, 0, 0), lambda: sim.set_position(1, *free, 0):
+            with pytest.raises(bergtow.BergtowError, match="was the last"):
+                change()
     with bergtow.Simulation(LINE) as sim, pytest.raises(bergtow.BergtowError, match="is towed"):
         sim.set_position(sim.towed, 6, 0, 0)
 
@@ -544,6 +548,9 @@ def test_a_floe_that_is_pushed_by_hand_hits_another():
 def test_errors_of_numbers_and_of_what_has_ended():
     with bergtow.Simulation(SHORT) as sim:
         assert math.isnan(sim["ice_resistance"])
+        with pytest.raises(TypeError, match="integer"):
+            sim.step(2.0)
+        assert sim.steps == 0
         with pytest.raises(KeyError, match="no series of this name"):
             sim["resistance_of_ice"]
         with pytest.raises(bergtow.BergtowError, match="no folder for a checkpoint"):

@@ -19,6 +19,7 @@ import signal
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -327,6 +328,18 @@ def test_a_state_of_another_set_of_quantities_is_refused(tmp_path):
     started(BERGTOW, "run", "case.yml", "-o", "out", "--steps", 20, cwd=tmp_path)
     done = subprocess.run([EXTENDED, "resume", "out"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 3 and "the run had no carried_water_force, which this program has added" in done.stderr
+
+
+def test_the_report_gives_a_quantity_its_unit_and_its_rule():
+    """Of a program, under the roles of forces: not as means in N."""
+    of = {"winch_power": ("W", "max_winch_power_w", 11.0), "load": ("N", "sum_load_n", 248.0)}
+    run = SimpleNamespace(
+        towed=0, at_least=False, mean_name="mean over the window", summary={}, by_role=lambda *_: list(of),
+        number=lambda key, *_: next((value for _, own, value in of.values() if own == key), np.nan),
+        attribute=lambda name, what: of[name][0] if what == "units" else of[name][1],
+        label=lambda name: name, description=lambda name: "")
+    assert [row[:2] for row in report_run.forces(run)[:2]] == [
+        ("winch_power, largest over the window", "11.0 W"), ("load, sum over the window", "248 N")]
 
 
 @pytest.mark.parametrize("what", ["quantity", "estimate"])

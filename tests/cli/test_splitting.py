@@ -154,6 +154,25 @@ def test_a_split_keeps_area_momentum_and_energy(tmp_path):
     assert at[0, 0] == pytest.approx(at[1, 0], abs=1e-3) and at[0, 1] == pytest.approx(-at[1, 1], abs=1e-3)
 
 
+def test_added_water_goes_with_the_pieces_and_keeps_its_energy(tmp_path):
+    """A floe that spins hits a fixed one and splits: contacts alone take energy. The share of the water in mass and
+    inertia must be the same (theory, the cut)."""
+    still = {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}
+    r = run(tmp_path, {
+        "run": {"dt": 0.05, "duration": 3}, "domain": {"length": 40, "width": 20, "ends": "open", "sides": "open"},
+        "ice": {"concentration": 0, "size": 1, "thickness": 0.1, "friction": 0, "added_mass": 0.5, "added_inertia": 0.5,
+                "drag": still, "splitting": {"toughness": 2000, "strength": 20000, "least_size": 0.3}},
+        "body": {"shape": "none"}, "tow": {"mode": "none"},
+        "floes": [{"shape": "rectangle", "length": 6, "width": 1, "x": 10, "y": 0.5, "vx": 0, "vy": -1, "yaw_rate": 60,
+                   "yaw": -30}, {"shape": "square", "length": 1, "x": 10, "y": -4, "fixed": True}]})
+    with h5py.File(r.dir / "result.h5") as f:
+        energy, work = f["series/kinetic_energy"][:], f["series/contact_work"][:]
+        assert f["splits/time"].shape[0] > 1
+    mass, length = 910 * 0.1 * 6 * 1.5, 6
+    start = 0.5 * mass * (1 + (length**2 + 1) / 12 * np.radians(60)**2)
+    assert energy[-1] - start == pytest.approx(work.sum(), rel=1e-9)
+
+
 def test_an_infinite_strength_leaves_every_bit(tmp_path):
     none = run(tmp_path / "none", TOW)
     keys = {"toughness": 1e9, "strength": 1e9, "least_size": 0.1}
@@ -297,7 +316,7 @@ def test_python_tells_floes_that_are_not_there(tmp_path):
     from bergtow.errors import BergtowError
     with bergtow.Simulation(bergtow.Case(write_case(tmp_path, weak())), threads=1) as sim, warnings.catch_warnings():
         warnings.simplefilter("error")  # NaN as a whole number
-        sim.step(sim.steps_left)
+        sim.step(sim.steps_left - 1)
         gone = np.isnan(sim.positions[:, 0])
         assert gone.any() and (gone == (sim.motions == -1)).all() and (np.isnan(sim.thicknesses) == gone).all()
         for change in (lambda id: sim.set_velocity(id, 0, 0), lambda id: sim.set_position(id, 1, 0, 0)):
@@ -320,6 +339,7 @@ def test_paraview_sees_the_pieces(tmp_path):
     ({"ice__splitting": {"strength": 1e5}}, "ice.splitting.toughness"),
     ({"ice__splitting": {"toughness": 1e5, "least_size": 5}}, "ice.splitting.least_size"),
     ({"ice__splitting": {"toughness": 1e5}, "domain__ends": "moving"}, "moving"),
+    ({"ice__splitting": {"toughness": 1e5}, "ice__added_mass": 0.5}, "ice.added_inertia: is not ice.added_mass"),
 ])
 def test_bad_input_is_refused(tmp_path, keys, words):
     assert words in run(tmp_path, changed(TOW, **keys), code=CASE).result.stderr

@@ -121,6 +121,7 @@ TEST(what_will_not_do_is_refused)
         {{.name = "drag", .doc = "a sum of that name", .add = spring}, "a force of this name exists"},
         {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: a series"},
         {{.name = "share", .doc = "a part of no name", .add = spring, .part_of = "My Sum!"}, "part_of \"My Sum!\""},
+        {{.name = "swell", .doc = "a part of one law", .add = spring, .part_of = "coriolis"}, "the force of one law"},
         {{.name = "Big Law", .doc = "a law of that name", .add = spring}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without function"}, "no function"},
         {{.name = "mute", .add = spring}, "describe it in one line"},

@@ -125,7 +125,8 @@ TEST(bodies_case_and_provenance_are_there)
     // the same but for its digest, which is a comment
     const char *comment = strstr(file, "\n# case: "), *rest = comment ? strchr(comment + 1, '\n') : NULL;
     assert_true(rest && !strncmp(file, resolved, (size_t)(comment - file)));
-    assert_string_equal(rest, resolved + (comment - file));
+    const size_t left = strlen(resolved) - (size_t)(comment - file);
+    assert_true(!strncmp(rest, resolved + (comment - file), left) && !strncmp(rest + left, "#> ", 3));
     free(stored);
     free(resolved);
     free(file);

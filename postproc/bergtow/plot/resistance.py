@@ -225,9 +225,9 @@ def limits(points, log):
     seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)] + [r["high"] for r in rows(points)]
     for p in points:
         for e in p.of_ice.values():
-            if e.valid and e.force:
+            if e.valid and e.force > 0:
                 seen += [e.numbers["low_n"], e.numbers["high_n"]]
-    seen = np.array([x for x in seen if np.isfinite(x)])
+    seen = np.array([x for x in seen if x is not None and np.isfinite(x)])
     if not log:
         return min(0.0, seen.min()), 1.1 * max(seen.max(), 1e-12)
     seen = seen[seen > 0]

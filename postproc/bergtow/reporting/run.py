@@ -129,6 +129,10 @@ def figures(run):
     return out
 
 
+# by the first word of a summary key: how a quantity is taken together over the window
+RULES = {"mean": "mean", "max": "largest", "sum": "sum", "last": "last value"}
+
+
 def forces(run):
     """Rows (quantity, value, interval, remark) over the window."""
     if run.towed is None:
@@ -143,6 +147,11 @@ def forces(run):
                 rows.append((f"{run.label(name)}, largest step mean", force(peaks[0]), "",
                              "no mean over the window: it parted" +
                              start_peak(run, f"window.series.{name}.start_peak_n")))
+            continue
+        rule, unit = key.partition("_")[0], run.attribute(name, "units")
+        if rule != "mean" or unit != "N":  # of a program
+            rows.append((f"{run.label(name)}, {RULES[rule]} over the window", style.quantity(mean, unit), "",
+                         run.description(name)))
             continue
         known = re.fullmatch(r"mean_(.*)_n", key)
         value, interval = with_interval(*run.interval(known[1])) if known else (force(mean), "–")
