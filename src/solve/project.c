@@ -11,8 +11,8 @@
 //
 // Second pass. The gaps above are linear in the rotations of a step. Two bodies that rotate by θ relative to each other
 // may overlap by θ²/2 of their radii at the end, as does, at 5 s, a floe that rolls along a hull. One that slides by s
-// along the other while both turn by θ overlaps it by θ s: the surface turns under it. So where a rotation can have left
-// more than LEFT slops, the contacts of the pair are found anew at the present poses: the rolling floe
+// along the other while both turn by θ overlaps it by θ s: the surface turns under it. So where a rotation can have
+// left more than LEFT slops, the contacts of the pair are found anew at the present poses: the rolling floe
 // now touches the hull metres away. If one of them is that deep, the new rows, with the unchanged rows of all other
 // pairs, separate the bodies once more. Most steps have no such rotation; most that have need no second pass. Not for
 // the plain reference, which also makes the fields: its own sweeps, point by point, keep the bits of fields.
