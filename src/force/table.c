@@ -65,8 +65,8 @@ static void check_series(const bt_force_law *law, const char *name, bt_errors *e
     if (!of) return;
     const int there = bt_force_series_find(of);
     if (there >= 0 && bt_force_series_of[there].law)
-        bt_errors_add(err, "force law %s: part_of \"%s\" is the force of one law; name a sum of laws, such as drag, or a "
-                      "new one", name, of);
+        bt_errors_add(err, "force law %s: part_of \"%s\" is the force of one law; name a sum of laws, such as drag, or "
+                      "a new one", name, of);
     if (there >= 0 || !bt_series_may_be) return;
     char series[BT_MOST_LAW_NAME + sizeof "_force"];
     snprintf(series, sizeof series, "%.*s_force", BT_MOST_LAW_NAME, of);
