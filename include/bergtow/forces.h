@@ -163,10 +163,10 @@ typedef struct bt_force_law {
     /// threads at once: it must change only *load. Required.
     void (*add)(const bt_force_body *body, bt_load *load);
     /// Called by one thread before the step is solved, when all bodies have their places, for work on all bodies
-    /// together; again if floes split and the step is solved anew with the pieces. It may set own[]; if its `rests` then
-    /// becomes false, floes at rest are woken. Returns NULL, or the reason of a failure: the run ends after this step.
-    /// NULL instead of the function = nothing to do. Only for registered laws, not those in src/force/laws.h; likewise
-    /// `context`.
+    /// together; again if floes split and the step is solved anew with the pieces. It may set own[]; if its `rests`
+    /// then becomes false, floes at rest are woken. Returns NULL, or the reason of a failure: the run ends after this
+    /// step. NULL instead of the function = nothing to do. Only for registered laws, not those in src/force/laws.h;
+    /// likewise `context`.
     const char *(*begin)(const bt_world *world, double own[BT_MAX_FORCE_OWN], void *context);
     void *context;             ///< passed to `begin`, and to `add` in the body
 } bt_force_law;

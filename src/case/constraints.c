@@ -370,8 +370,8 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
          "or use another boundary and a domain as long as the tow"},
         {splits && input->ice.added_inertia != input->ice.added_mass, REFUSED, "ice.added_inertia", NULL, 0,
          "ice.added_mass ice.splitting.toughness",
-         "is not ice.added_mass, but where floes split the two must be equal, or a split would make or destroy energy of "
-         "the water that turns with the floe; give both the same value"},
+         "is not ice.added_mass, but where floes split the two must be equal, or a split would make or destroy energy "
+         "of the water that turns with the floe; give both the same value"},
         {splits && input->ice.splitting.scatter > 0, AT_LEAST, "ice.splitting.scatter", NULL, 2,
          "ice.splitting.toughness",
          ": such a Weibull modulus leaves floes without strength; give at least 2, as in 10, or 0 for the same "
