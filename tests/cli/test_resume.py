@@ -145,6 +145,21 @@ def test_a_finished_run_says_so(whole):
     assert (one.dir / "result.h5").read_bytes() == before
 
 
+@pytest.mark.parametrize("name, damage, code, text", [
+    ("result.h5", lambda path: path.unlink(), IO, "result.h5: cannot read the file: No such file"),
+    ("result.h5", lambda path: path.write_bytes(b""), REFUSED, "result.h5: is not this program's result file"),
+    ("result.h5", lambda path: flip(path, 70000), REFUSED, "result.h5: is damaged"),
+    ("summary.json", lambda path: path.write_text("{"), DONE, ""),
+])
+def test_a_finished_run_with_a_damaged_file_is_not_called_finished(tmp_path, name, damage, code, text):
+    r = run(tmp_path, TOW, "--quiet")
+    damage(r.dir / name)
+    result = call("resume", r.dir)
+    assert result.returncode == code and text in result.stderr, result.stderr
+    assert "is finished" not in result.stdout
+    assert code or Run(r.dir, None).hash == r.hash
+
+
 # ---- the folder ----
 
 def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
