@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 from bergtow import _library
-from bergtow.errors import BergtowError, RunError
+from bergtow.errors import RunError
 from bergtow.result import at_least, integrity
 from bergtow.result.hdf5 import opened, plain
 from bergtow.result.run import Run, least, within
@@ -155,12 +155,9 @@ class Members:
         self._dropped = {}
 
     def _read(self):
-        try:
-            integrity.check_seal(self.file, "ensemble")
-        except BergtowError as error:
-            why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
-            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file again") from None
-        with opened(self.file, "run `bergtow ensemble` again: it makes the file again") as f:
+        remedy = "run `bergtow ensemble` again: it makes the file again"
+        integrity.check_seal(self.file, "ensemble", remedy)
+        with opened(self.file, remedy) as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
                 setattr(self, key, f[f"members/{key}"][()])
