@@ -14,7 +14,7 @@ import pytest
 
 from harness import (BERGTOW, CASE as REFUSED, DONE, FAULT, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed,
                      environment, heard, quick, run, write_case)
-from made_up_ensemble import seal
+from made_up_ensemble import edited, seal
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
@@ -158,6 +158,18 @@ def test_a_finished_run_with_a_damaged_file_is_not_called_finished(tmp_path, nam
     assert result.returncode == code and text in result.stderr, result.stderr
     assert "is finished" not in result.stdout
     assert code or Run(r.dir, None).hash == r.hash
+
+
+def test_a_resumed_result_tells_how_the_run_began_and_every_revision(tmp_path):
+    path = run(tmp_path, TOW, "--quiet", "--steps", 20).dir / "result.h5"
+    with edited(path) as f:
+        command, revision = f.attrs["command_line"], f.attrs["revision"]
+        f.attrs["start_time"], f.attrs["revision"] = "2026-01-02T03:04:05Z", "0123456"
+    for words in ("--steps", 20), ():
+        resumed(tmp_path, "out", *words)
+        with h5py.File(path) as f:
+            assert f.attrs["start_time"] == "2026-01-02T03:04:05Z" and f.attrs["command_line"] == command
+            assert f.attrs["revision"] == f"0123456, {revision}"
 
 
 # ---- the folder ----

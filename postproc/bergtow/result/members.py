@@ -404,7 +404,7 @@ class Members:
             of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
             said.append(f"The members come from {len(builds)} builds of the program, which may differ in the last bits "
                         f"({of}).")
-        if any(str(build[1]).endswith("-dirty") for build in builds):
+        if any("-dirty" in str(build[1]) for build in builds):
             said.append("The program was built from sources with uncommitted changes: its results cannot be reproduced "
                         "from the revision alone.")
         return " ".join(said)
