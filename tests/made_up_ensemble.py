@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """An ensemble's folder with numbers of the test's own, of the layout that src/run/ensemble_file.c writes."""
+import contextlib
 import ctypes
 import json
 import re
@@ -112,6 +113,7 @@ def write_member(folder, m):
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
         f["impacts/time"], f["impacts/peak"] = np.asarray(times, dtype=float), np.asarray(peaks, dtype=float)
         f["impacts"].attrs["conversion"] = m["conversion"]
+    seal(folder / "result.h5")
 
 
 def verdict(m):
@@ -143,6 +145,14 @@ def seal(path, name=None):
     kind = re.search(rf'"({name or path.stem} \d+)"', header)[1]
     text = f"bergtow sealed file\nkind: {kind}\nbytes: {len(raw)}\nxxh128: {digest(raw)}\n".encode()
     path.write_bytes(raw + text.ljust(128, b"\0"))
+
+
+@contextlib.contextmanager
+def edited(path):
+    """A sealed HDF5 file, open to change it, and sealed again."""
+    with h5py.File(path, "r+") as f:
+        yield f
+    seal(path)
 
 
 def record(folder, study, name=None):

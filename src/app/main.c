@@ -218,6 +218,7 @@ int main(int argc, char **argv)
 {
     give_back_hangup();
     start_with_settings(argc, argv);
+    bt_limit_threads();
     if (bt_comm_start(&argc, &argv) != BT_OK) return BT_ERR_USAGE;
     give_back_hangup();
     argp_err_exit_status = BT_ERR_USAGE;

@@ -288,3 +288,18 @@ void bt_provenance_write(bt_h5 *h5, const char *command_line)
     bt_h5_attr_int(h5, "/", "ranks", bt_comm_world()->size);
     bt_h5_attr_int(h5, "/", "threads", omp_get_max_threads());
 }
+
+void bt_provenance_keep(bt_h5 *h5, bt_h5_reader *old)
+{
+    static const char *const names[] = {"start_time", "command_line", "revision"};
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        char *before = bt_h5_read_word(old, names[k]);
+        if (!before) continue;
+        const char *space = strrchr(before, ' '), *last = space ? space + 1 : before;
+        const bool other = !strcmp(names[k], "revision") && strcmp(last, BT_REVISION) != 0;
+        char *text = bt_text_of("%s%s", before, other ? ", " BT_REVISION : "");
+        bt_h5_attr_text(h5, "/", names[k], text);
+        free(text);
+        free(before);
+    }
+}

@@ -4,6 +4,7 @@
 #define BT_H5DATASET_H
 
 #include "bergtow/comm.h"
+#include "base/h5read.h"
 #include "base/h5util.h"
 
 // --- units and axes --------------------------------------------------------------------------------------------------
@@ -95,5 +96,9 @@ static inline void *bt_rows_next(bt_rows *rows)
 const char *bt_provenance_revision(void);
 
 void bt_provenance_write(bt_h5 *h5, const char *command_line);
+
+/// Of a resumed run: keep start time and command line of the old result, and add the revision if it differs from the
+/// last one there.
+void bt_provenance_keep(bt_h5 *h5, bt_h5_reader *old);
 
 #endif

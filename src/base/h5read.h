@@ -37,7 +37,7 @@ void bt_h5_fail(bt_h5_reader *reader, const char *why);
 bool bt_h5_there(const bt_h5_reader *reader, const char *name);
 /// Size of dimension k of a dataset; 0 if it has fewer dimensions.
 int64_t bt_h5_size(bt_h5_reader *reader, const char *name, int k);
-/// Read an attribute of the root that bt_h5_attr_word wrote; the caller frees it. NULL if there is none.
+/// Read a text attribute of the root; the caller frees it. NULL if there is none.
 char *bt_h5_read_word(bt_h5_reader *reader, const char *name);
 /// Read rows first to first + n − 1 along the first dimension; the other dimensions together give `width` numbers a
 /// row. mem: H5T_NATIVE_...

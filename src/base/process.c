@@ -9,6 +9,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/largest.h"
+
 // --- the launcher ----------------------------------------------------------------------------------------------------
 
 // Was this process started by a launcher of parallel programs? The environment tells.
@@ -152,4 +154,10 @@ int bt_cores_share(const bt_comm *comm)
     const double share = share_of(sets, n, rank);
     free(sets);
     return within_task((int)(share + 1e-9));
+}
+
+void bt_limit_threads(void)
+{
+    const int n = omp_get_max_threads(); // negative if OMP_NUM_THREADS is more than an int holds
+    if (n < 1 || n > BT_MOST_THREADS) omp_set_num_threads(BT_MOST_THREADS);
 }

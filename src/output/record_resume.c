@@ -17,6 +17,7 @@
 
 #include "base/checksum.h"
 #include "base/fileio.h"
+#include "base/h5dataset.h"
 #include "case/case_files.h"
 #include "output/record_parts.h"
 
@@ -353,6 +354,7 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
         if (!snap->faulty) check_counts(&old, entries, frames, record->frames.n_floes);
         if (!snap->faulty && old.status == BT_OK) load_series(record, snap, &old, entries);
         if (!snap->faulty && old.status == BT_OK) bt_impact_store_load(&record->impacts, snap, &old);
+        if (!snap->faulty && old.status == BT_OK) bt_provenance_keep(&record->h5, &old);
         bt_record_events(record, events, err);
     }
     bt_status status = bt_comm_agree(record->comm, snap->faulty                      ? BT_ERR_CASE

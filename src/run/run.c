@@ -7,11 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/checksum.h"
 #include "base/fileio.h"
 #include "case/case_files.h"
 #include "output/checkpoint.h"
 #include "output/folder.h"
 #include "revision.h"
+#include "run/ensemble_record.h"
 #include "run/run_parts.h"
 
 // --- contents of a folder --------------------------------------------------------------------------------------------
@@ -84,12 +86,15 @@ static bt_status go_on(bt_resume *resume, const bt_comm *comm, const bt_run_opti
     bt_snapshot_share(comm, &resume->s);
     resume->s.err = err;
     const bt_status status = bt_comm_agree(comm, bt_running_load_case(&resume->c, &resume->s, err));
-    // without a summary it was stopped after its last checkpoint: no steps are left, but the end of the run is
-    int ended = comm->rank == 0 && bt_file_there(options->dir, "summary.json");
+    if (status != BT_OK) return status;
+    // without a sound summary and result no steps are left, but the end of the run is
+    const int64_t steps = bt_case_steps(&resume->c);
+    int ended = bt_snapshot_int(&resume->s, "world/step") >= steps && comm->rank == 0 &&
+                bt_member_is_whole(options->dir, steps) &&
+                bt_checksum_check(BT_PATH(options->dir, "result.h5"), BT_CHECKSUM_RESULT, NULL, NULL) == BT_OK;
     bt_comm_bcast(comm, &ended, sizeof ended);
-    resume->finished = status == BT_OK && ended &&
-                       bt_snapshot_int(&resume->s, "world/step") >= bt_case_steps(&resume->c);
-    return status;
+    resume->finished = ended;
+    return BT_OK;
 }
 
 bt_status bt_resume_begin(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)

@@ -116,7 +116,7 @@ typedef struct bt_resume {
     char *path;    ///< of the checkpoint
     int lock;      ///< on the folder, on rank 0; the caller drops it, whatever the status
     bool fresh;    ///< killed before its first checkpoint: begins at time zero
-    bool finished; ///< all its steps are done, and its summary is written
+    bool finished; ///< all its steps are done, and its summary and result are sound
 } bt_resume;
 
 /// Collective. Read the point in options->dir (or options->from) from which to resume. bt_resume_end must follow

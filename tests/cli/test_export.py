@@ -9,7 +9,6 @@ import json
 import math
 from types import SimpleNamespace
 
-import h5py
 import numpy as np
 import pytest
 import xarray
@@ -17,6 +16,7 @@ from osgeo import ogr
 from pyproj import CRS, Geod
 
 from harness import DONE, IO, TOW as BASIN, USAGE, area, call, changed, run
+from made_up_ensemble import edited
 from test_map import ARROW, BOX, LOCAL, ORIGIN, write
 from test_outlines import field, same_ring
 
@@ -166,7 +166,7 @@ def test_a_shapefile_says_what_it_renamed_and_spares_files_of_others(tmp_path):
 
 def absent(there, floe, frame):
     """A floe that a frame does not have: it has been broken, or is not born yet."""
-    with h5py.File(there / "result.h5", "r+") as f:
+    with edited(there / "result.h5") as f:
         f["frames/pose"][frame, floe] = np.nan
 
 

@@ -5,7 +5,6 @@ import csv
 import json
 import shutil
 
-import h5py
 import numpy as np
 import pytest
 from scipy import stats
@@ -683,7 +682,7 @@ def test_a_saturated_load_does_not_end_the_statistics(tmp_path):
 def test_events_come_from_the_file_that_has_all_of_them(tmp_path):
     """summary.json has the first 40: a tow through so many way-points may lose its line after them."""
     folder = sparse(tmp_path / "a", fields=1) / "members/c001-r001"
-    with h5py.File(folder / "result.h5", "a") as f:
+    with made_up.edited(folder / "result.h5") as f:
         f["events/kind_names"] = np.array([b"line_broken", b"adrift", b"waypoint"])
         f["events/time"], f["events/value"] = np.arange(1.0, 43.0), np.arange(42.0)
         f["events/kind"], f["events/subject"] = np.array([2] * 40 + [0, 1]), np.array([*range(1, 41), 1, 0])

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from harness import script
+from made_up_ensemble import edited, seal
 
 pytestmark = pytest.mark.usefixtures("look")
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
@@ -108,6 +109,7 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
         f["bodies/vertices"], f["bodies/offsets"] = np.vstack([HULL, wall]), np.array([0, 4, 8])
         f["bodies/towed"] = np.array([towed])
         f.create_dataset("bodies/names", data=["towed body", "wall y low"], dtype=h5py.string_dtype())
+    seal(folder / "result.h5")
     summary = {"title": "Square", "n_floes": 2, "n_steps": n, "concentration": 0.8, "mean_ice_resistance_n": 10.0,
                "mean_ice_resistance_se_n": 0.5,
                "mean_ice_resistance_low_n": 10 - 0.98, "mean_ice_resistance_high_n": 10 + 0.98,
@@ -228,18 +230,34 @@ def _truncated_result(run):
     (run / "result.h5").write_bytes(data[:len(data) // 2])
 
 
+def _one_bit(run):
+    data = bytearray((run / "result.h5").read_bytes())
+    data[5000] ^= 1
+    (run / "result.h5").write_bytes(data)
+
+
+def _opened_to_change_it(run):
+    with h5py.File(run / "result.h5", "r+") as f:
+        f["series/ice_resistance"][50] = 5e6
+
+
+def _failed(run):
+    _no_summary(run)
+    (run / "failure.h5").touch()
+
+
 def _no_floes(run):
-    with h5py.File(run / "result.h5", "a") as f:
+    with edited(run / "result.h5") as f:
         del f["floes"]
 
 
 def _no_time(run):
-    with h5py.File(run / "result.h5", "a") as f:
+    with edited(run / "result.h5") as f:
         del f["series/time"]
 
 
 def _offsets_beyond_vertices(run):
-    with h5py.File(run / "result.h5", "a") as f:
+    with edited(run / "result.h5") as f:
         f["floes/offsets"][2] = 9
 
 
@@ -248,8 +266,11 @@ def _empty(run):
         path.unlink()
 
 
-DAMAGES = {_no_summary: "summary.json: missing", _broken_summary: "summary.json: damaged",
-           _no_result: "result.h5: missing", _truncated_result: "result.h5: not readable as HDF5",
+DAMAGES = {_no_summary: "summary.json: missing: .*; wait for it, or continue it with `bergtow resume",
+           _failed: "summary.json: missing: the run failed; failure.h5 holds the state before the step that failed",
+           _broken_summary: "summary.json: damaged .*; make it again with `bergtow resume",
+           _one_bit: "result.h5: is damaged", _opened_to_change_it: "result.h5: has no seal at its end",
+           _no_result: "result.h5: missing", _truncated_result: "result.h5: is (truncated|damaged)",
            _no_floes: "has no /floes/vertices", _no_time: "has no /series/time",
            _offsets_beyond_vertices: "/floes/offsets does not fit", _empty: "holds neither summary.json nor result.h5"}
 
@@ -270,7 +291,7 @@ def test_scripts_leave_with_4_and_a_message_on_a_bad_folder(tmp_path, name):
     run = make_run(tmp_path / "run")
     _truncated_result(run)
     for folder, reason in ((tmp_path / "nowhere", "no such folder"), (run / "summary.json", "not a folder"),
-                           (run, "not readable as HDF5")):
+                           (run, "is truncated")):
         result = script(name, folder)
         assert result.returncode == 4, result.stderr
         assert result.stderr.startswith(f"bergtow {name}: {folder}") and reason in result.stderr
@@ -279,7 +300,7 @@ def test_scripts_leave_with_4_and_a_message_on_a_bad_folder(tmp_path, name):
 
 def test_missing_frame_data_is_named(tmp_path):
     run = make_run(tmp_path / "run")
-    with h5py.File(run / "result.h5", "a") as f:
+    with edited(run / "result.h5") as f:
         del f["frames/speed"]
     result = script("plot-field", run)
     assert result.returncode == 4 and "/frames/speed" in result.stderr and "Traceback" not in result.stderr
@@ -330,7 +351,7 @@ def test_the_head_tells_the_speed_ordered_from_the_one_made_good(tmp_path):
 def test_a_jam_of_one_step_hides_no_force(tmp_path):
     """A force is held against the running mean of the tow, not against its largest sample."""
     folder = make_run(tmp_path / "run")
-    with h5py.File(folder / "result.h5", "r+") as f:
+    with edited(folder / "result.h5") as f:
         f["series/tow_force"][50], f["series/ice_resistance"][50] = 5000.0, 4998.0
         f["series/inertia_force"][:], f["series/drag_force"][:] = 0.1, 20.0
         f["series/tow_force"].attrs["order"] = 0
@@ -449,7 +470,7 @@ def test_a_moving_window_is_shown_about_the_body(tmp_path):
     body is."""
     path = [(15.0 * i, 0.0) for i in range(5)]
     folder = make_run(tmp_path / "run", frame="geographic", ends="moving", path=path)
-    with h5py.File(folder / "result.h5", "r+") as f:
+    with edited(folder / "result.h5") as f:
         f["frames/body_pose"][:, 0, 0] = (np.array(path)[:, 0] + 20) % 40 - 20
         del f["case"]
         f["case"] = CASE.format(frame="geographic", ends="moving\n  ahead: 25 m",
@@ -467,7 +488,7 @@ def test_a_moving_window_is_shown_about_the_body(tmp_path):
 
 def test_titles_of_narrow_panels_stand_apart(tmp_path):
     folder = make_run(tmp_path / "run", path=[(1000.0 + i, 0.0) for i in range(5)])
-    with h5py.File(folder / "result.h5", "r+") as f:
+    with edited(folder / "result.h5") as f:
         del f["case"]
         f["case"] = CASE.format(frame="geographic", ends="open",
                                 mode="speed").replace("length: 40 m", "length: 4000 m").replace(

@@ -8,7 +8,6 @@ import zlib
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
 import numpy as np
 import pytest
 from selenium.webdriver import ActionChains, Keys
@@ -17,6 +16,7 @@ from selenium.webdriver.support.ui import Select
 from browser import browser, complaints, opened, until
 import harness
 from harness import TOW, call, changed, run, texts, write_case
+from made_up_ensemble import edited
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 
@@ -502,7 +502,7 @@ def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
 
 
 @pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"),
-                                         ("truncated", "not readable as HDF5"), ("frames", "/frames/pose"),
+                                         ("truncated", "is truncated"), ("frames", "/frames/pose"),
                                          ("key", "summary.json: has no collisions_whole_run; ")])
 def test_unusable_folders_are_reported_and_leave_the_old_page(tow, tmp_path, harm, words):
     folder = tmp_path / "run"
@@ -519,7 +519,7 @@ def test_unusable_folders_are_reported_and_leave_the_old_page(tow, tmp_path, har
     elif harm == "truncated":
         (folder / "result.h5").write_bytes((tow.dir / "result.h5").read_bytes()[:5000])
     elif harm == "frames":
-        with h5py.File(folder / "result.h5", "a") as f:
+        with edited(folder / "result.h5") as f:
             f["frames/pose"][3, 4, 0] = np.nan
             del f["frames/pose"]
     result = script(folder)

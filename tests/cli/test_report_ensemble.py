@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 
-import h5py
 import numpy as np
 import pytest
 
@@ -216,7 +215,7 @@ def test_the_labels_of_the_keys_fit_into_the_columns_of_a_printed_page(page):
 
 @pytest.mark.slow
 def test_members_of_other_builds_and_lost_folders_are_reported(study):
-    with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
+    with made_up.edited(study / "members/c001-r001/result.h5") as f:
         f.attrs["revision"] = "other"
     made_up.record(study / "members/c001-r001", Members(study).study)
     e = Members(study)
@@ -225,7 +224,7 @@ def test_members_of_other_builds_and_lost_folders_are_reported(study):
     (study / "members/c001-r002").rename(study / "members/lost")
     assert Members(study).without_folder == ["c001-r002"]
     (study / "members/lost").rename(study / "members/c001-r002")
-    with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
+    with made_up.edited(study / "members/c001-r001/result.h5") as f:
         del f.attrs["revision"]
     assert not Members(study).builds
 

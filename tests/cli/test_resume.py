@@ -14,7 +14,7 @@ import pytest
 
 from harness import (BERGTOW, CASE as REFUSED, DONE, FAULT, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed,
                      environment, heard, quick, run, write_case)
-from made_up_ensemble import seal
+from made_up_ensemble import edited, seal
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
@@ -143,6 +143,33 @@ def test_a_finished_run_says_so(whole):
     result = call("resume", one.dir)
     assert result.returncode == DONE and f"is finished: all {STEPS} steps are done" in result.stdout
     assert (one.dir / "result.h5").read_bytes() == before
+
+
+@pytest.mark.parametrize("name, damage, code, text", [
+    ("result.h5", lambda path: path.unlink(), IO, "result.h5: cannot read the file: No such file"),
+    ("result.h5", lambda path: path.write_bytes(b""), REFUSED, "result.h5: is not this program's result file"),
+    ("result.h5", lambda path: flip(path, 70000), REFUSED, "result.h5: is damaged"),
+    ("summary.json", lambda path: path.write_text("{"), DONE, ""),
+])
+def test_a_finished_run_with_a_damaged_file_is_not_called_finished(tmp_path, name, damage, code, text):
+    r = run(tmp_path, TOW, "--quiet")
+    damage(r.dir / name)
+    result = call("resume", r.dir)
+    assert result.returncode == code and text in result.stderr, result.stderr
+    assert "is finished" not in result.stdout
+    assert code or Run(r.dir, None).hash == r.hash
+
+
+def test_a_resumed_result_tells_how_the_run_began_and_every_revision(tmp_path):
+    path = run(tmp_path, TOW, "--quiet", "--steps", 20).dir / "result.h5"
+    with edited(path) as f:
+        command, revision = f.attrs["command_line"], f.attrs["revision"]
+        f.attrs["start_time"], f.attrs["revision"] = "2026-01-02T03:04:05Z", "0123456"
+    for words in ("--steps", 20), ():
+        resumed(tmp_path, "out", *words)
+        with h5py.File(path) as f:
+            assert f.attrs["start_time"] == "2026-01-02T03:04:05Z" and f.attrs["command_line"] == command
+            assert f.attrs["revision"] == f"0123456, {revision}"
 
 
 # ---- the folder ----

@@ -7,7 +7,6 @@ import re
 import shutil
 import sys
 
-import h5py
 import numpy as np
 import pytest
 
@@ -56,7 +55,7 @@ class Words:
         path.write_text(json.dumps(s | {"stopped": self.other(s["stopped"])}))
 
     def in_file(self, path, columns=()):
-        with h5py.File(path, "a") as f:
+        with made_up.edited(path) as f:
             def reword(_, item):
                 for name in set(SENTENCES) & set(item.attrs):
                     if isinstance(item.attrs[name], str):
@@ -88,7 +87,6 @@ def reworded(folder, copy):
             words.in_file(member / "result.h5")
             made_up.record(member, study)
     words.in_file(copy / "ensemble.h5", ("warnings/text", "reasons/text", "codes/meaning", "members/reason"))
-    made_up.seal(copy / "ensemble.h5")
     return words
 
 

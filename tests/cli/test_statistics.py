@@ -17,7 +17,7 @@ import made_up_ensemble as made_up
 from harness import DONE, TOW, call, changed, run, script, write_case
 from test_postproc import done, pixels
 
-from bergtow import cli
+from bergtow import _library, cli
 from bergtow.errors import BergtowError, RunError
 from bergtow.plot import chains as plot_chains
 from bergtow.plot import ensemble as plot_ensemble
@@ -292,9 +292,16 @@ def test_doubts_are_known_without_the_folders_and_by_codes_alone(tmp_path):
         shutil.rmtree(folder / "members", ignore_errors=True)
 
 
+def test_a_result_that_matches_its_record_is_not_read_whole_again(tmp_path, monkeypatch):
+    e = Members(made_up.write(tmp_path / "all", [made_up.member(np.ones(50), {}, 0)]))
+    monkeypatch.delattr(_library.library(), "bt_seal_check")
+    with Run(e.folder(0)) as run:
+        assert run.result.exists()
+
+
 def test_members_of_two_builds_are_reported(tmp_path):
     folder = made_up.write(tmp_path / "all", [made_up.member(np.ones(50) + k, {}, 0) for k in range(3)])
-    with h5py.File(folder / "members/c001-r001/result.h5", "a") as f:
+    with made_up.edited(folder / "members/c001-r001/result.h5") as f:
         f.attrs["revision"] = "other"
     made_up.record(folder / "members/c001-r001", Members(folder).study)
     result = script("statistics", folder, "--resamples", 1)

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Launchers as the environment tells of them, and the cores of a process.
 #include "test.h"
+
+#include <omp.h>
+
+#include "base/largest.h"
 #include "base/process.h"
+#include "bergtow/run.h"
 
 extern char **environ;
 
@@ -87,6 +92,19 @@ TEST(cores_are_those_that_were_given)
     setenv("SLURM_CPUS_PER_TASK", "1", 1);
     assert_int_equal(bt_cores_share(&bt_comm_alone), 1);
     unsetenv("SLURM_CPUS_PER_TASK");
+}
+
+TEST(threads_of_the_environment_are_limited)
+{
+    static const bt_case input;
+    const int before = omp_get_max_threads();
+    setenv("OMP_NUM_THREADS", "given", 1); // libgomp has read it already
+    omp_set_num_threads(5000000);
+    assert_int_equal(bt_run_threads(&bt_comm_alone, &input, 0), BT_MOST_THREADS);
+    omp_set_num_threads(3);
+    assert_int_equal(bt_run_threads(&bt_comm_alone, &input, 0), 3);
+    unsetenv("OMP_NUM_THREADS");
+    omp_set_num_threads(before);
 }
 
 TEST_MAIN(NULL, NULL)

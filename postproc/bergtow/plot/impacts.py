@@ -135,7 +135,7 @@ def draw(run):
     for name in ("mean_load", "max_load", "max_peak"):
         if name not in panels:
             raise RunError(run.result, f"has no /panels/{name}: the run has not ended",
-                           "wait for it, or run the case again")
+                           f"wait for it, or continue it with `bergtow resume {run.path}`")
     figure = style.Figure(figsize=(11, 8.6))
     grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.855, bottom=0.09, hspace=0.26, wspace=0.16)
     window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(panels["from"]) else "no window"

@@ -14,6 +14,7 @@ import numpy as np
 
 from bergtow.errors import IO, BergtowError
 from bergtow.functions import report
+from bergtow.result import integrity
 
 if TYPE_CHECKING:
     import h5py
@@ -33,8 +34,7 @@ class Result:
         try:
             return json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
-            raise BergtowError(f"{path}: is missing: the run has not ended; continue it with `bergtow resume "
-                               f"{self.folder}`", IO) from None
+            raise integrity.without_summary(self.folder) from None
 
     def open(self) -> xarray.Dataset:
         """open_result(folder)"""

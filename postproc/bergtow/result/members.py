@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 from bergtow import _library
-from bergtow.errors import BergtowError, RunError
+from bergtow.errors import RunError
 from bergtow.result import at_least, integrity
 from bergtow.result.hdf5 import opened, plain
 from bergtow.result.run import Run, least, within
@@ -155,12 +155,9 @@ class Members:
         self._dropped = {}
 
     def _read(self):
-        try:
-            integrity.check_seal(self.file, "ensemble")
-        except BergtowError as error:
-            why = str(error).removeprefix(f"{self.file}: ").partition(";")[0]
-            raise RunError(self.file, why, "run `bergtow ensemble` again: it makes the file again") from None
-        with opened(self.file, "run `bergtow ensemble` again: it makes the file again") as f:
+        remedy = "run `bergtow ensemble` again: it makes the file again"
+        integrity.check_seal(self.file, "ensemble", remedy)
+        with opened(self.file, remedy) as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
                 setattr(self, key, f[f"members/{key}"][()])
@@ -407,7 +404,7 @@ class Members:
             of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
             said.append(f"The members come from {len(builds)} builds of the program, which may differ in the last bits "
                         f"({of}).")
-        if any(str(build[1]).endswith("-dirty") for build in builds):
+        if any("-dirty" in str(build[1]) for build in builds):
             said.append("The program was built from sources with uncommitted changes: its results cannot be reproduced "
                         "from the revision alone.")
         return " ".join(said)

@@ -23,7 +23,7 @@ import numpy as np
 import yaml
 
 from bergtow.errors import RunError
-from bergtow.result import at_least
+from bergtow.result import at_least, integrity
 from bergtow.result.frames import Frames
 from bergtow.result.hdf5 import first_line, opened, plain
 
@@ -175,24 +175,29 @@ class Run(Frames):
         try:
             summary = json.loads(path.read_text(encoding="utf-8"), object_hook=lambda found: Numbers(path, found))
         except FileNotFoundError:
-            if not self.result.exists():
+            if not any((self.path / name).exists() for name in ("result.h5", "result.part.h5")):
                 raise RunError(self.path, "holds neither summary.json nor result.h5",
                                "give the folder that `bergtow run -o` wrote") from None
-            raise RunError(path, "missing: the run has not ended, or was killed",
-                           "wait for it, or run the case again") from None
+            raise integrity.without_summary(self.path) from None
         except (OSError, UnicodeDecodeError) as error:
             raise RunError(path, f"cannot be read ({error})", "check the file and its permissions") from None
         except ValueError as error:
-            raise RunError(path, f"damaged ({error})", "run the case again") from None
+            raise self._damaged(path, error) from None
         if not isinstance(summary, dict):
-            raise RunError(path, "damaged (no JSON object)", "run the case again")
+            raise self._damaged(path, "no JSON object")
         return at_least.summary(summary)
+
+    def _damaged(self, path, why):
+        return RunError(path, f"damaged ({why})", f"make it again with `bergtow resume {self.path}`, or run the case "
+                        "again")
 
     def _open(self):
         if not self.result.exists():
-            raise RunError(self.result, "missing", "run the case again: this file holds series and frames")
-        return opened(self.result, "the file is truncated or still being written: wait for the run, or run the case "
-                      "again")
+            raise RunError(self.result, "missing", "restore it, or run the case again: this file holds series and "
+                           "frames")
+        remedy = "use another copy of it, or run the case again"
+        integrity.check_seal(self.result, "result", remedy)
+        return opened(self.result, remedy)
 
     def _dataset(self, name):
         try:
