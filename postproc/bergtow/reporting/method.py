@@ -11,6 +11,7 @@ from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import profile as stat_profile
 from bergtow.table import counted, number, quantity
+from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
 from bergtow.text import loads as loads_text
 
@@ -220,7 +221,7 @@ def beyond(results, e):
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("assumed values, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
-        f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
+        f"{budget_text.of_mean(b, b['parameters']['sd'])} of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     if budget is not None and budget.get("doubt"):
         rows[0] = rows[0][0], f"{rows[0][1]} ({budget['doubt']})"
