@@ -13,6 +13,7 @@ from bergtow.stats import profile as stat_profile
 from bergtow.table import counted, number, quantity
 from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
+from bergtow.text import converge as converge_text
 from bergtow.text import loads as loads_text
 
 KEYS = "ice.splitting.toughness", "ice.rafting.kappa", "ice.crushing.pressure"
@@ -207,12 +208,16 @@ def _convergence(found, e):
     texts = compared.cases(e)
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
-    verdicts = compared.verdicts(found["rows"], compared.values(e, texts))
-    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
-             ("elsewhere", "not compared at the value of these tows:"))
-    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
+    own = compared.values(e, texts)
+    verdicts = compared.verdicts(found["rows"], own)
+    shares = [compared.chain(found["rows"], name, own.get(name))[0].get("share_without")
+              for name, verdict in verdicts.items() if verdict == "none"]
+    least = converge_text.without(min(filter(None, shares), default=None))
+    words = (("matters", "it depends on", ""), ("open", "open is", ""), ("none", "no effect that matters of", least),
+             ("elsewhere", "not compared at the value of these tows:", ""))
+    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind], end) for kind, said, end in words]
     at = compared.alone(found, texts)
-    return "; ".join([f"{said} {', '.join(names)}" for said, names in some if names] +
+    return "; ".join([f"{said} {', '.join(names)}{end}" for said, names, end in some if names] +
                      [f"studied at {at} alone"] * bool(at)) or "nothing compared"
 
 
