@@ -27,6 +27,7 @@ from bergtow.stats import loads as stat_loads
 from bergtow.stats import mean as stat_mean
 from bergtow.study import answer, assumed, gear, load_cases
 from bergtow.text import answer as words
+from bergtow.text import loads as loads_text
 
 
 # ---- coverage
@@ -486,6 +487,16 @@ def test_a_load_without_a_bound_is_at_least(tmp_path):
     e._events[1].append({"time_s": 100.0, "kind": "line_broken", "subject": 1, "value": 1.0})
     value = answer.value_of(e, c, found, [])
     assert (value["kind"], value["reason"], value["n"]) == ("at_least", "line_parted", 70.0)
+
+
+def test_the_answer_and_the_tables_state_the_same_load(tmp_path):
+    """A value that is rounded up, for it would be below the largest simulated. Red: 121 kN in the sentence."""
+    e = ensemble(tmp_path)
+    [c] = e.conditions()
+    d = {"value": 121.3e3, "largest": 121.185e3, "interval_95": [118e3, 130e3], "model": "over_threshold",
+         "irregular": False, "times_the_hours_simulated": 2.0, "beyond_data": False}
+    value = answer.value_of(e, c, {"design": d, "largest": d["largest"], "constant": False}, [])
+    assert f"{loads_text.value(d, 1e3)} kN" == words.force(value["n"]) == "122 kN" and words.kn(value["n"]) == "122"
 
 
 def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):

@@ -2,6 +2,7 @@
 """postproc/budget.py: variance components and shares of models with known ones, distributions of the Latin hypercube,
 and a study end to end."""
 import json
+import re
 import subprocess
 
 import h5py
@@ -14,6 +15,7 @@ from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 
 from bergtow import cli
 from bergtow.errors import RunError
+from bergtow.reporting import method
 from bergtow.result import compared, findings
 from bergtow.result.members import Members
 from bergtow.result.run import Run
@@ -178,6 +180,18 @@ def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
     refused, text = said_of({"refused": "converge.json is of another case, ice.size is 1 m there and 2 m here"}, None,
                             rng)
     assert "not known" in text and "ice.size is 1 m there" in text and "share" not in refused["numerics"]
+
+
+def test_shares_of_a_mean_of_zero_are_unknown():
+    """Such as stalled windows of tows that never stall."""
+    found = stat_budget.budget(*drawn(lambda u: 0 * u[:, 0], 40, 1, 2, 0.0, np.random.default_rng(6)),
+                               stat_budget.relative_numerics(ROWS, {"dt": 2.0, "width": 40.0})) | {
+        "units": "", "of": "stalled_windows", "meaning": "stalled windows", "wanted": 80, "title": "t",
+        "assumed": {"a": {"distribution": "uniform", "source": ""}}}
+    text = written(budget_text.content(plain(found)))
+    assert re.search(r"^together +0 +–", text, re.M)
+    budget_text.figure(plain(found))
+    assert method.beyond({"budget": plain(found)}, None)[0][1] == "– of the stalled windows"
 
 
 def test_converge_of_another_case_does_not_fit():

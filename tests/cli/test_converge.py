@@ -184,6 +184,9 @@ def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp
     steady, tows = found["verdicts"].get("steady", 0), sum(found["verdicts"].values())
     assert tows >= 4 and (f"WARNING: of the {tows} tows of the case as it is" in text) == (steady < tows)
     assert first["judged"] == "none" and first["same_ice"] and "0.001 will do" in text
+    # a tenth of the fields could feel an effect, and 4 fields without one still be the usual finding
+    assert first["share_without"] == pytest.approx(0.05 ** (1 / first["fields"])) and "share_without" not in second
+    assert f"no effect that matters in at least {100 * first['share_without']:.0f} % of fields" in text
     assert found["values"]["ice.concentration"] == "0.2"  # of which case it speaks, for other studies
     assert second["name"] == "fields" and second["recommended"] > 4 and f"{second['recommended']:g} fields" in text
 

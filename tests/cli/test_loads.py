@@ -223,6 +223,14 @@ def test_fields_that_differ_are_found(process, fields, n, least):
     assert found_unlike(process, fields, n, 60) >= least
 
 
+def test_a_short_field_does_not_hide_that_fields_differ():
+    """Red: blocks as short as the shortest field allows."""
+    some = fields_of(UNLIKE(0.9, 0.5), 8, 2000, np.random.default_rng(31))
+    alone = stat_alike.p_value(some, 40.0)
+    short = fields_of(UNLIKE(0.9, 0.5), 1, 90, np.random.default_rng(32))
+    assert alone < stat_alike.LEVEL and stat_alike.p_value(some + short, 40.0) == alone
+
+
 def test_warnings_name_the_reason_of_the_verdict(tmp_path):
     """Every verdict was said to be of loads that change; and of a condition whose members failed other reasons were
     named."""

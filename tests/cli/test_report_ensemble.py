@@ -290,6 +290,9 @@ def test_a_quantity_has_one_verdict(tmp_path):
     assert said("b", dt="1 s") == "open is length; no effect that matters of dt, width, window"
     assert said("c", dt="0.5 s", width="40 m") == \
         "open is length; no effect that matters of window; not compared at the value of these tows: dt, width"
+    for k, share in ((1, 0.47), (2, 0.83), (3, 0.69)):  # the first is not of the value that the tows have
+        rows[k]["share_without"] = share
+    assert said("d").endswith("; no effect that matters of width, window in at least 69 % of fields")
 
 
 def test_results_of_another_case_or_of_before_are_doubted(tmp_path):

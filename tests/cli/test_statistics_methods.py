@@ -288,6 +288,35 @@ def test_profile_intervals_of_block_maxima_are_those_of_the_likelihood_region():
     assert shape_ends == pytest.approx((k[inside].min(), k[inside].max()), abs=0.03)
 
 
+@pytest.mark.parametrize("shape", [-0.8, -0.4, 0.7])
+def test_the_likelihood_has_fallen_at_the_ends_of_every_profile_interval(shape, monkeypatch):
+    """Tails whose ends are near the data, where a search that began too far away found nothing possible, and the edge
+    of what it found was called the end of the interval."""
+    monkeypatch.setattr(stat_extreme, "rate_share", lambda *_: 1.0)
+    rng, fall = np.random.default_rng(4), stats.chi2.ppf(0.95, 1) / 2  # four fields: the likelihood alone
+    k = np.linspace(stat_fit.LEAST_SHAPE + 1e-6, 6, 3000)[:, None]
+    with np.errstate(all="ignore"):
+        y = stats.genpareto(shape).rvs(60, random_state=rng)
+        scale, found = stat_extreme.gpd(y)
+        [(_, ends)], _ = stat_extreme.gpd_intervals(y.reshape(4, 15), [1.0] * 4, 0.0, scale, found, [2.0])
+        for q in ends:
+            a = q * k / (30 ** k - 1)
+            rise = np.nanmin(np.sum(np.log(a) + (1 + 1 / k) * np.log(1 + k * y / a), axis=1)) - np.sum(
+                -stats.genpareto(found, scale=scale).logpdf(y))
+            assert rise == pytest.approx(fall, rel=0.03)
+        x = stats.genextreme(-shape).rvs(40, random_state=rng)
+        *where, found = stat_fit.gev(x)
+        [(_, ends)], _ = stat_extreme.gev_intervals(x.reshape(4, 10), *where, found, [0.1])
+        k, more = k[::10, None], np.exp(np.linspace(-5, 5, 400))[:, None]
+        for q in ends:
+            # the scales with which all maxima are possible
+            b = (np.maximum(0, np.maximum(k * (q - x.min()), k * (q - x.max()))) + more) * 0.1 ** k
+            t = 0.1 ** -k + k * (x - q) / b
+            rise = np.nanmin(np.sum(np.log(b) + (1 + 1 / k) * np.log(t) + t ** (-1 / k), axis=2)) - np.sum(
+                -stats.genextreme(-found, *where).logpdf(x))
+            assert rise == pytest.approx(fall, rel=0.03)
+
+
 def test_profile_likelihood_of_a_normal_mean():
     # with known variance: mean +- sqrt(2 drop / n), and copies of each value in a field widen by the root of their
     # number

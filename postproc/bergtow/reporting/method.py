@@ -11,7 +11,9 @@ from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import profile as stat_profile
 from bergtow.table import counted, number, quantity
+from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
+from bergtow.text import converge as converge_text
 from bergtow.text import loads as loads_text
 
 KEYS = "ice.splitting.toughness", "ice.rafting.kappa", "ice.crushing.pressure"
@@ -206,12 +208,16 @@ def _convergence(found, e):
     texts = compared.cases(e)
     if why := compared.misfit(found, texts):
         return f"studied for another case: {why}"
-    verdicts = compared.verdicts(found["rows"], compared.values(e, texts))
-    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"),
-             ("elsewhere", "not compared at the value of these tows:"))
-    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind]) for kind, said in words]
+    own = compared.values(e, texts)
+    verdicts = compared.verdicts(found["rows"], own)
+    shares = [compared.chain(found["rows"], name, own.get(name))[0].get("share_without")
+              for name, verdict in verdicts.items() if verdict == "none"]
+    least = converge_text.without(min(filter(None, shares), default=None))
+    words = (("matters", "it depends on", ""), ("open", "open is", ""), ("none", "no effect that matters of", least),
+             ("elsewhere", "not compared at the value of these tows:", ""))
+    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind], end) for kind, said, end in words]
     at = compared.alone(found, texts)
-    return "; ".join([f"{said} {', '.join(names)}" for said, names in some if names] +
+    return "; ".join([f"{said} {', '.join(names)}{end}" for said, names, end in some if names] +
                      [f"studied at {at} alone"] * bool(at)) or "nothing compared"
 
 
@@ -220,7 +226,7 @@ def beyond(results, e):
     budget, converge = results.get("budget"), results.get("converge")
     rows = [("assumed values, standard deviation", "not studied: friction, thickness, size, κ, drag and "
              "draft were not varied beyond the conditions above" if budget is None else "; ".join(
-        f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
+        f"{budget_text.of_mean(b, b['parameters']['sd'])} of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     if budget is not None and budget.get("doubt"):
         rows[0] = rows[0][0], f"{rows[0][1]} ({budget['doubt']})"

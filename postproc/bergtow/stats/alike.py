@@ -27,7 +27,9 @@ LEAST = 2     # blocks of a field, and fields
 
 def p_value(fields, block):
     """Probability that alike fields differ at least this much. Fields are as in stats/extreme.py; block: s, the least
-    length for which maxima are independent. NaN if a field has fewer than LEAST blocks or there is only one."""
+    length for which maxima are independent. Fields much shorter than the others are left out. NaN if a field has
+    fewer than LEAST blocks or there is only one."""
+    fields = stat_extreme.long_enough(fields)
     hours = min(f["hours"] for f in fields)  # the same for all fields, since longer ones would have larger maxima
     k = min(max(LEAST, int(np.ceil(BLOCKS / len(fields)))), int(3600 * hours / block))
     if len(fields) < LEAST or k < LEAST:

@@ -263,12 +263,17 @@ def rate_share(alone, by_field, level, best):
 SHORT = 0.5  # relative to the median length of the fields: shorter ones do not determine the length of the blocks
 
 
+def long_enough(fields):
+    """The fields that are at least SHORT times as long as their median."""
+    least = SHORT * np.median([f["hours"] for f in fields])
+    return [f for f in fields if f["hours"] >= least]
+
+
 def _blocks(fields, blocks):
     """(maxima of the blocks of each field, hours of a block). All blocks have the same length: a whole number of them
-    fits into the shortest of the fields that are at least half as long as the median. The rest of a field after its
-    last whole block is left out, and so are fields without a whole block."""
-    hours = np.array([f["hours"] for f in fields])
-    length, out = float(hours[hours >= SHORT * np.median(hours)].min()) / blocks, []
+    fits into the shortest of the fields that are long enough. The rest of a field after its last whole block is left
+    out, and so are fields without a whole block."""
+    length, out = min(f["hours"] for f in long_enough(fields)) / blocks, []
     for f in fields:
         count = int(f["hours"] / length + 0.01)
         within = f["time"] <= f["start"] + 3600 * count * length * (1 + 1e-9)

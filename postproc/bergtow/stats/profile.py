@@ -22,8 +22,9 @@ import scipy
 
 LEAST_FIELDS = 5  # with fewer fields their scatter is unknown: the likelihood alone, with the normal quantile
 WORTH = 3         # degrees of freedom that the likelihood adds to those of the fields
-STEPS = 60        # steps outwards, each 1.6 times the last, before an interval counts as open
-BISECTIONS = 14
+GROWTH = 1.6      # of the step outwards after a success
+OPEN = 1e12       # times the first step: an interval that goes further counts as open
+FINE = 1e-4       # of the distance to the end: its error
 SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes are of order one
 
 
@@ -75,7 +76,8 @@ def interval(minus_log_likelihood, best, rest, fall, first):
     least = minus_log_likelihood(best, rest)
     def rise(q, start):
         # The simplex is set explicitly: SciPy's is 0.00025 wide near zero, so that the search ends where it began.
-        # Impossible values count as very unlikely ones, because the search takes differences.
+        # Impossible values count as very unlikely ones, because the search takes differences. It may start where
+        # nothing is possible, or stop early. A rise that is too large is therefore never final: it shortens the step.
         simplex = start + SIMPLEX * np.vstack([np.zeros(len(start)), np.eye(len(start))])
         found = scipy.optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
                                         options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400,
@@ -83,23 +85,12 @@ def interval(minus_log_likelihood, best, rest, fall, first):
         return found.fun - least - fall, found.x
     ends = []
     for sign in (-1, 1):
-        inner, outer, start = best, best, np.asarray(rest, dtype=float)
-        step, value = first, -fall
-        for _ in range(STEPS):
-            outer = inner + sign * step
-            value, found = rise(outer, start)
-            if value > 0 or not np.isfinite(value):
-                break
-            inner, start, step = outer, found, 1.6 * step
-        if value <= 0:
-            ends.append(sign * np.inf)
-            continue
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (inner + outer)
-            value, found = rise(middle, start)
-            if value > 0 or not np.isfinite(value):
-                outer = middle
+        end, start, step, grow = best, np.asarray(rest, dtype=float), first, GROWTH
+        while FINE * max(abs(end - best), first) < step < OPEN * first:
+            value, found = rise(end + sign * step, start)
+            if value <= 0:
+                end, start, step, grow = end + sign * step, found, grow * step, GROWTH
             else:
-                inner, start = middle, found
-        ends.append(0.5 * (inner + outer))
+                step, grow = 0.5 * step, 1.0  # no growth after the next success: the steps bisect
+        ends.append(end if step < OPEN * first else sign * np.inf)
     return ends[0], ends[1]

@@ -109,8 +109,10 @@ def value_of(e, c, found, fields):
     d = found["design"]
     if "value" in d:
         low, high = d["interval_95"]
-        return {"kind": "return_level", "n": d["value"], "interval_95": [low, table.bound(d["value"], high)],
-                "model": d["model"], "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
+        # rounded here, so that every sentence and table of it states the same load
+        return {"kind": "return_level", "n": table.designed(d["value"], d["largest"]),
+                "interval_95": [low, table.bound(d["value"], high)], "model": d["model"],
+                "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
     largest = stat_largest.largest_of([f["peak"].max() for f in fields], [f["hours"] for f in fields])
     return {"kind": "largest_of_n", **largest, "reason": "unbounded_tail" if d.get("unbounded") else "no_tail"}
 

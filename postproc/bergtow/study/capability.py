@@ -355,7 +355,7 @@ def perform(a):
     resolution = abs(end - start) / PARTS
     if a.resolution:
         try:
-            resolution = read(a.resolution, unit)
+            resolution = read(a.resolution, unit or "%")
         except BergtowError as error:
             raise BergtowError(f"--resolution {error}", USAGE) from None
         if not 0 < resolution <= abs(end - start):

@@ -22,6 +22,11 @@ therefore made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rej
 is too small where floes jam and too large where nothing happens; a last look at 64, which left a paired effect of 6 %
 with an error of 2 % open while most of the budget was still there.
 
+The intervals do not hold for an effect that few fields feel, such as a jam: n nearly equal pairs have a narrow interval
+wherever the mean of all fields is. "No effect" therefore comes with the share of fields without one, of which n such
+fields are evidence at 95 % (stats/largest.py): 47 % from 4 fields, 91 % from 32. Rejected: no verdict from fewer than
+29 fields, which would show an effect in a tenth of them, because few budgets allow that many.
+
 A tow that starts at full speed (tow.ramp of 0) is compared with a ramp during which the body moves by its size.
 """
 import argparse
@@ -35,6 +40,7 @@ from bergtow.arguments import above_zero, whole_from
 from bergtow.errors import SIGNAL, USAGE, RunError
 from bergtow.result.origins import BESIDE, annotated, source_of_ice
 from bergtow.result.run import Run, within
+from bergtow.stats import largest as stat_largest
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.study import analysis
@@ -343,6 +349,9 @@ def converge(study, names, margin, tries=TRIES):
             rows += window(study, margin)
         except RunError as error:
             rows += not_judged(*WINDOW, error.reason)
+    for row in rows:
+        if row["judged"] == "none":
+            row["share_without"] = stat_largest.share_below(row["fields"])
     if "fields" in names:
         rows += fields_row(study)
     return rows

@@ -23,6 +23,11 @@ def _percent(x):
     return "–" if x is None or not np.isfinite(x) else f"{100 * x:.0f} %"
 
 
+def of_mean(found, x, say=_percent):
+    """A number as a share of the mean, "–" beside a mean of 0."""
+    return say(x / abs(found["mean"])) if x is not None and found["mean"] else "–"
+
+
 def _index(i, what):
     low, high = i[f"{what}_95"]
     ends = "" if low is None else f" ({number(low, 2)} to {number(high, 2)})"
@@ -31,37 +36,36 @@ def _index(i, what):
 
 def rows(found):
     """The lines of the table."""
-    mean, b = found["mean"], found
-    out = [["mean", _force(found, mean) + _ends(found, b["mean_95"]), "", "", "", "", ""]]
-    one = b["fields"]["sd"] is None
-    parts = [("fields: one tow", b["fields"]), ("parameters" + (" and fields" if one else ""), b["parameters"])]
+    out = [["mean", _force(found, found["mean"]) + _ends(found, found["mean_95"]), "", "", "", "", ""]]
+    one = found["fields"]["sd"] is None
+    parts = [("fields: one tow", found["fields"]), ("parameters" + (" and fields" if one else ""), found["parameters"])]
     for name, p in parts[one:]:
-        out.append([name, _force(found, p["sd"]) + _ends(found, p["sd_95"]), _percent(p["sd"] / abs(mean)),
+        out.append([name, _force(found, p["sd"]) + _ends(found, p["sd_95"]), of_mean(found, p["sd"]),
                     _percent(p["share"]), "", "", ""])
-    indices = b["shares"].get("indices", {})
+    indices = found["shares"].get("indices", {})
     for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
         i, given = indices.get(name), found["assumed"][name]
         source = given["source"] or "assumed"
         out.append([f"- {name}", "", "", "", *((_index(i, "first"), _index(i, "total")) if i else ("–", "–")),
                     "; ".join(t for t in (given["distribution"], source) if t)])
     out += _numerics(found)
-    out.append(["together", _force(found, b["together"]["sd"]), _percent(b["together"]["sd"] / abs(mean)), "", "", "",
-                ""])
+    together = found["together"]["sd"]
+    out.append(["together", _force(found, together), of_mean(found, together), "", "", "", ""])
     return out
 
 
 def _numerics(found):
     """Two lines: the scatter that the computation may add, and its known bias."""
-    n, mean = found["numerics"], abs(found["mean"])
+    n = found["numerics"]
     if not n or "refused" in n:
         return [["numerics", "not known" if n else "not studied", *[""] * 5]]
     bound = "" if n["unknown"] else "at most "
     known = n["sd"] is not None and np.isfinite(n["sd"])
     out = [["numerics", bound + _force(found, n["sd"]) if known else "not known",
-            _percent(n["sd"] / mean) if known else "", _percent(n["share"]) if known else "", "", "", ""]]
-    if n.get("biases"):
+            of_mean(found, n["sd"]) if known else "", _percent(n["share"]) if known else "", "", "", ""]]
+    if n.get("bias"):
         out.append([f"bias of {', '.join(n['biases'])}", _force(found, abs(n["bias"])),
-                    _percent(abs(n["bias"]) / mean), _percent(n["bias_share"]), "", "", ""])
+                    of_mean(found, abs(n["bias"])), _percent(n["bias_share"]), "", "", ""])
     return out
 
 
@@ -75,10 +79,10 @@ def numerics_notes(found):
     if "refused" in n:
         return f" Numerics: {n['refused']}."
     said = ""
-    if n.get("biases"):
+    if n.get("bias"):
         each = ", ".join(f"{name} by {percent(b)}" for name, b in n["biases"].items())
         said = (f" Bias: the values to which it was converged change the mean, {each}; together "
-                f"{percent(n['bias'] / found['mean'])}. It is not scatter: no number here is corrected for it, and "
+                f"{of_mean(found, n['bias'], percent)}. It is not scatter: no number here is corrected for it, and "
                 "its square is in the last line and the shares.")
     if n.get("unknown"):
         said += f" Numerics without {', '.join(f'{name} ({why})' for name, why in n['unknown'].items())}."
@@ -152,7 +156,7 @@ def figure(found):
     fig.subplots_adjust(left=1.2 / width, right=1 - 0.25 / width, top=1 - 0.95 / height, bottom=0.7 / height,
                         wspace=0.55)
     some = [(k, found[k]) for k in ("fields", "parameters", "numerics") if found[k] and found[k].get("sd") is not None]
-    if (n := found["numerics"]) and n.get("biases"):
+    if (n := found["numerics"]) and n.get("bias"):
         some.append(("bias", {"sd": abs(n["bias"])}))
     factor, unit = scale([found["together"]["sd"]], found["units"])
     for y, (name, p) in enumerate([*reversed(some), ("together", found["together"])]):

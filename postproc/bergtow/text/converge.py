@@ -38,6 +38,11 @@ def advice(row):
     return row.get("why") or "–"
 
 
+def without(share):
+    """"in at least 47 % of fields", those without an effect; "" if the share is not known."""
+    return "" if share is None else f" in at least {100 * share:.0f} % of fields"
+
+
 def cells(row):
     if "mean" in row:
         return ["fields", "–", f"mean {number(row['mean'])} N", "–", f"{row['fields']}", WORDS[row["judged"]],
@@ -50,7 +55,8 @@ def cells(row):
     # equal for a start whose ramp cannot be made longer
     values = " -> ".join(dict.fromkeys((value(row, "from"), value(row, "to"))))
     return [row["name"], values, row["quantity"],
-            f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
+            f"{percent(row['effect'])} ({interval(row['interval_95'])})", on,
+            WORDS[row["judged"]] + without(row.get("share_without")), advice(row)]
 
 
 def doubtful(found):
@@ -67,5 +73,6 @@ def content(found):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
     note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: ratio of "
             "its error to the error with other ice for each value. Effects below "
-            f"{100 * found['margin']:g} % do not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
+            f"{100 * found['margin']:g} % do not matter; an effect in fewer fields than named may be unseen. "
+            f"{found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return [*doubtful(found), Table(head, [cells(row) for row in found["rows"]]), [note]]
