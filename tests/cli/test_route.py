@@ -185,7 +185,7 @@ def circle(radius, length, turns, speed):
     y = np.append(0 * straight, radius * (1 - np.cos(angle)))
     way = np.append(0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
     return SimpleNamespace(kind="planned", x=x, y=y, heading=np.append(0 * straight, angle), time=way / speed,
-                           length=way[-1], duration=way[-1] / speed, force=0.0,
+                           speed=np.full_like(way, speed), length=way[-1], duration=way[-1] / speed, force=0.0,
                            legs=np.array([(speed,)], [("speed", float)]))
 
 
@@ -200,7 +200,7 @@ def test_a_towed_body_keeps_its_circle(tmp_path, mass):
             "tow": {"mode": "line", "speed": 0.5, "line_length": "560 m", "line_stiffness": "40 MN", "ramp": 300,
                     "line_damping": "500 kN s/m"}}
     s, radius = read_situation(tmp_path, case), 800
-    c = tows.candidate("c", "c", circle(radius, 1000, 1.5, 0.5), 0.5, s)
+    c = tows.candidate("c", "c", circle(radius, 1000, 1.5, 0.5), s)
     sets = [w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")]
     assert call("run", s.case, "-o", tmp_path / "run", "--quiet", *sets).returncode == DONE
     with Run(tmp_path / "run") as r:
@@ -218,8 +218,7 @@ def test_a_towed_body_keeps_its_circle(tmp_path, mass):
 
 
 def test_a_programme_of_legs_goes_their_way():
-    legs = np.array([(0, 100, 0.5), (100, 80, 0.2), (180, 60, 0.4)], [(n, float) for n in ("way", "length", "speed")])
-    t, v = np.array(tows.programme(legs, 30)).T
+    t, v = np.array(tows.programme([(100, 0.5), (80, 0.2), (60, 0.4)], 30)).T
     assert np.trapz(v, t) == pytest.approx(240) and np.all(np.diff(t) > 0)
     assert list(np.unique(v)) == [0, 0.2, 0.4, 0.5]
 

@@ -21,7 +21,7 @@ def features(candidates, place, numbers):
     {name: properties}."""
     out = []
     for c in candidates:
-        parts = [("berg", "LineString", c.track), ("swath", "Polygon", c.route.swath)]
+        parts = [("berg", "LineString", c.track), ("swath", "Polygon", c.swath)]
         if c.tug is not None:
             parts.insert(1, ("tug", "LineString", c.tug))
         for kind, shape, xy in parts:

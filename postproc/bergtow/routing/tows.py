@@ -2,7 +2,8 @@
 """Routes as cases, their tows through the members of the map, and the outcome of each tow.
 
 A route becomes a separate case: the path of the body (tow.mode speed) or of the towing end, tow.speed or tow.programme,
-and run.duration. In a steady turn the line carries the drag F along the path and the centripetal force across it, so it
+and run.duration. Speeds of a route are through the ice, those of a case over the ground: where the ice drifts, a
+programme brings the tow to each point of its path at the planned time. In a steady turn the line carries the drag F along the path and the centripetal force across it, so it
 points inwards of the tangent by delta, tan(delta) = m kappa V² / F, with the mass m including added mass and the
 curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end is placed accordingly at body + L (cos(delta) t +
 sin(delta) n): for a light body this is the inverse of the tractrix. kappa is smoothed over the length of the line,
@@ -16,7 +17,7 @@ from dataclasses import dataclass, field
 
 from bergtow.errors import CASE, RunError
 from bergtow.result.run import least
-from bergtow.routing import apart
+from bergtow.routing import apart, planner
 from bergtow.study.runs import CaseRuns
 
 import numpy as np
@@ -40,6 +41,7 @@ class Candidate:
     keys: dict = field(default_factory=dict)  #: keys of its case, as texts
     track: np.ndarray = None                  #: [m, 2] planned track of the body over the ground, m
     tug: np.ndarray = None                    #: [m, 2] of the towing end, or None
+    swath: np.ndarray = None                  #: [k, 2] outline of what the body sweeps over the ground, m
     points: np.ndarray = None                 #: [k, 2] waypoints of the case, m
 
     @property
@@ -70,17 +72,27 @@ def simplified(xy, off):
     return xy[sorted(keep)]
 
 
-def pairs(points):
-    return "[" + ", ".join(f"[{a:.10g}, {b:.10g}]" for a, b in points) + "]"
+def pairs(points, text="{:.10g}".format):
+    return "[" + ", ".join(f"[{text(a)}, {text(b)}]" for a, b in points) + "]"
 
 
-def programme(legs, ramp):
-    """[(time s, speed m/s)] of a tow at the speeds of its legs: from rest, and from leg to leg. A change of speed takes
-    the share of the ramp that it is of the largest speed."""
-    speeds, lengths = legs["speed"].astype(float), legs["length"].astype(float)
-    top, out, time, at = speeds.max(), [(0.0, 0.0)], 0.0, 0.0
-    for v, length in zip(speeds, lengths):
-        change = ramp * abs(v - at) / top
+def legs_of(route, track, time, situation):
+    """[(length m, speed m/s)] over the ground: of a route, or, where the ice drifts, of its track [n, 2], m, at the
+    times [n], s, to within STRAIGHT."""
+    if not any(situation.drift):
+        return [(float(length), float(v)) for length, v in zip(route.legs["length"], route.legs["speed"])]
+    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(track, axis=0).T)))
+    mean = way[-1] / time[-1]
+    at, way = simplified(np.column_stack([mean * time, way]), STRAIGHT * situation.hull.width).T
+    return [(float(length), float(mean * length / step)) for length, step in zip(np.diff(way), np.diff(at)) if length]
+
+
+def programme(legs, ramp, start=(0.0, 0.0)):
+    """[(time s, speed m/s)] of a tow at the speeds of its legs [(length m, speed m/s)], from a time and a speed on. A
+    change of speed takes the share of the ramp, s, that it is of the largest speed."""
+    top, out, (time, at) = max(v for _, v in legs), [start], start
+    for length, v in legs:
+        change = ramp * abs(v - at) / top * (1 + 1e-9)  # rounded, it is no steeper than the ramp
         way = change * (v + at) / 2
         if change > 0:
             time += change
@@ -91,8 +103,13 @@ def programme(legs, ramp):
     return out
 
 
+def paced(programme, end=np.inf):
+    """Keys of a programme: tow.speed must be its largest speed up to the end of the run, s."""
+    return {"tow.programme": pairs(programme, repr), "tow.speed": f"{max(v for t, v in programme if t <= end)!r} m/s"}
+
+
 def tug_track(route, situation):
-    """[m, 2] track of the towing end in the frame of the ice."""
+    """[m, 2] track of the towing end in the frame of the ice, and [n] of bool: the points of the route it is of."""
     s = situation
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
     new = np.append(True, np.diff(way) > 1e-9 * way[-1])
@@ -111,14 +128,27 @@ def tug_track(route, situation):
     return np.column_stack([x + s.line * np.cos(heading + delta), y + s.line * np.sin(heading + delta)]), new
 
 
-def candidate(name, label, route, speed, situation):
-    """The case of a route. speed: m/s, NaN: as set by its legs."""
+def led(route, situation):
+    """([m, 2], [m]): track over the ground, m, of the body, or of the end that pulls it, and its times, s."""
     s = situation
-    by_legs = not np.isfinite(speed)
-    time = route.time if by_legs else np.append(0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y)))) / speed
-    moved = np.outer(time, s.drift)
+    if s.mode == "speed":
+        track, time = np.column_stack([route.x, route.y]), route.time
+    else:
+        track, new = tug_track(route, s)
+        time = route.time[new]
+    return track + np.outer(time, s.drift), time
+
+
+def candidate(name, label, route, situation):
+    """The case of a route, at the speeds of its legs."""
+    s = situation
+    speed = float(route.legs["speed"][0]) if len(set(route.legs["speed"].tolist())) == 1 else np.nan
+    moved = np.outer(route.time, s.drift)
     body = np.column_stack([route.x, route.y]) + moved
-    c = Candidate(name, label, route, speed, {}, body)
+    course = np.arctan2(route.speed * np.sin(route.heading) + s.drift[1],
+                        route.speed * np.cos(route.heading) + s.drift[0])
+    c = Candidate(name, label, route, speed, {}, body, swath=planner.swath(body, course, s.hull.width))
+    track, time = led(route, s)
     if s.mode == "speed":
         corners, radii = np.asarray(route.waypoints), np.asarray(route.radii)
         if any(s.drift):
@@ -129,34 +159,35 @@ def candidate(name, label, route, speed, situation):
         c.keys = {"tow.waypoints": pairs(corners)} | ({"tow.turn_radius": f"{0.999 * turns.min():.10g} m"}
                                                       if len(turns) else {})
     else:
-        c.tug, new = tug_track(route, s)
-        c.tug += moved[new]
+        c.tug = track
         c.points = simplified(c.tug, STRAIGHT * s.hull.width)[1:]
         c.keys = {"tow.waypoints": pairs(c.points)}
-    if by_legs:
-        points = programme(route.legs, s.ramp)
+    dt = s.values["run.dt"]
+    if any(s.drift) or not np.isfinite(speed):
+        points = programme(legs_of(route, track, time, s), max(s.ramp, dt))
         total = points[-1][0]
-        c.keys["tow.programme"] = pairs(points)
+        c.keys |= paced(points)
     else:
         total = route.length / speed + s.ramp / 2
-        c.keys |= {"tow.speed": f"{speed:.10g} m/s", "tow.ramp": f"{s.ramp:.10g} s"}
-    dt = s.values["run.dt"]
+        c.keys |= {"tow.speed": f"{speed!r} m/s", "tow.ramp": f"{s.ramp!r} s"}
     c.keys["run.duration"] = f"{dt * np.ceil(LONGER[s.mode] * total / dt):.10g} s"
     c.keys["output.window_start"] = "-1 s"
     return c
 
 
-def candidates(routes, speeds, situation):
-    """Every route at every speed, and also at the speeds of its legs if these differ."""
+def candidates(routes, speeds, situation, at_speed):
+    """Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ.
+    at_speed(route, m/s): the route at that speed, or None."""
     out, k = [], 0
     for route in routes:
         k += route.kind != "straight"
         name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
         for speed in speeds:
             more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
-            out.append(candidate(name + more[0], label + more[1], route, speed, situation))
+            if same := at_speed(route, speed):
+                out.append(candidate(name + more[0], label + more[1], same, situation))
         if len(set(route.legs["speed"].tolist())) > 1:
-            out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, np.nan, situation))
+            out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, situation))
     return out
 
 
