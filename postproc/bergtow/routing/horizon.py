@@ -21,7 +21,6 @@ from bergtow.text import route as words
 import numpy as np
 
 MOST = 100       # looks
-FINE = 1e-4      # body widths: how far a polyline may deviate from the path of a body whose speed is prescribed
 AHEAD = 2        # steps by which the decided part extends beyond a look
 
 
@@ -59,9 +58,8 @@ def way_of(route, s, decided=None):
     old = decided or Way(track[:1], [(0.0, 0.0)])
     far = np.argmax(np.hypot(*(track - old.points[-1]).T) > 0.1 * s.hull.width)
     track, time = np.vstack([old.points[-1:], track[far:]]), np.append(0.0, time[far:])
-    fine = FINE if s.mode == "speed" else tows.STRAIGHT
     pace = tows.programme(tows.legs_of(route, track, time, s), max(s.ramp, s.values["run.dt"]), old.pace[-1])
-    return Way(np.vstack([old.points, tows.simplified(track, fine * s.hull.width)[1:]]), old.pace + pace[1:])
+    return Way(np.vstack([old.points, tows.polyline(track, s)[1:]]), old.pace + pace[1:])
 
 
 def with_point(points, way):

@@ -13,7 +13,8 @@ def positions(xy, place):
     """[[east, north]] from metres of the case: degrees if the case has a geographic position, otherwise metres."""
     if place.origin is None:
         return np.round(place.map(xy), 4).tolist()
-    return np.round(place.degrees(xy), 8).tolist()
+    lon, lat = place.degrees(xy).T  # in one piece across the 180th meridian
+    return np.round(np.column_stack([np.unwrap(lon, period=360), lat]), 8).tolist()
 
 
 def features(candidates, place, numbers):

@@ -17,6 +17,7 @@ from pathlib import Path
 from bergtow import writing
 from bergtow._program import program_path
 from bergtow.arguments import from_zero, measure, not_below_zero, several, whole_from
+from bergtow.case import Case
 from bergtow.errors import CASE, IO, SIGNAL, USAGE, BergtowError, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, situation, tows, verdict
@@ -364,14 +365,16 @@ def perform(a):
     for name in FILES:
         writing.may_write(folder / name, a.force)
     began, program = time.monotonic(), program_path()
-    place = situation.place_of(a.case, a.set)
-    body = {}
+    work, body = (folder / "route").resolve(), {}
+    case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
     if a.start:
+        values = Case(case)
+        place = situation.place_of(values, situation.floes_of(program, case, values, work))
         x, y = situation.position(a.start, place, "--from")
         body = {"body.x": f"{x:.12g} m", "body.y": f"{y:.12g} m"}
-    goal = situation.goal(a.to, place)
-    case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
-    s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, a.width)
+        case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
+    s = situation.of(program, case, work, ramp, a.no_go, a.width)
+    goal = situation.goal(a.to, s.place)
     w = wanted(a, s)
     if tows.to_goal(np.array([s.start]), goal)[0] <= tows.ARRIVED * s.hull.width:
         raise RunError(f"--to {a.to}", f"is reached at the start of the tow: within a width of the body, "

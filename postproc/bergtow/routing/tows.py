@@ -24,8 +24,9 @@ import numpy as np
 
 ARRIVED = 1.0        # body widths from the goal
 LONGER = {"speed": 1.05, "line": 1.15, "thrust": 1.6}  # run.duration / the predicted time; a vessel may be slowed down
-PEAK = 99            # percentile of the step means that counts as peak
+PEAK = 99            # percentile of the step means after the ramp that counts as peak
 STRAIGHT = 5e-3      # body widths: how far a polyline may deviate from a path
+FINE = 1e-4          # the same of the path of a body whose speed is prescribed
 FRAMES = 150         # of the one tow per route that a page replays
 TOUCH = 1e-3         # body widths: counts as contact with a no-go area
 
@@ -70,6 +71,11 @@ def simplified(xy, off):
             keep.add(k)
             stack += [(i, k), (k, j)]
     return xy[sorted(keep)]
+
+
+def polyline(track, situation):
+    """Points [k, 2] of the path that a case gives for a track [n, 2], m."""
+    return simplified(track, (FINE if situation.mode == "speed" else STRAIGHT) * situation.hull.width)
 
 
 def pairs(points, text="{:.10g}".format):
@@ -143,25 +149,19 @@ def candidate(name, label, route, situation):
     """The case of a route, at the speeds of its legs."""
     s = situation
     speed = float(route.legs["speed"][0]) if len(set(route.legs["speed"].tolist())) == 1 else np.nan
-    moved = np.outer(route.time, s.drift)
-    body = np.column_stack([route.x, route.y]) + moved
+    body = np.column_stack([route.x, route.y]) + np.outer(route.time, s.drift)
     course = np.arctan2(route.speed * np.sin(route.heading) + s.drift[1],
                         route.speed * np.cos(route.heading) + s.drift[0])
     c = Candidate(name, label, route, speed, {}, body, swath=planner.swath(body, course, s.hull.width))
     track, time = led(route, s)
-    if s.mode == "speed":
-        corners, radii = np.asarray(route.waypoints), np.asarray(route.radii)
-        if any(s.drift):
-            nearest = [int(np.argmin(np.hypot(route.x - x, route.y - y))) for x, y in corners]
-            corners, radii = corners + moved[nearest], 0.8 * radii
-        turns = radii[:-1][radii[:-1] > 0]
-        c.points = corners
-        c.keys = {"tow.waypoints": pairs(corners)} | ({"tow.turn_radius": f"{0.999 * turns.min():.10g} m"}
-                                                      if len(turns) else {})
-    else:
-        c.tug = track
-        c.points = simplified(c.tug, STRAIGHT * s.hull.width)[1:]
-        c.keys = {"tow.waypoints": pairs(c.points)}
+    if s.mode == "speed" and not any(s.drift):
+        turns = route.radii[:-1][route.radii[:-1] > 0]
+        c.points = route.waypoints
+        c.keys = {"tow.turn_radius": f"{0.999 * turns.min():.10g} m"} if len(turns) else {}
+    else:  # where the ice drifts, an arc through it is none over the ground
+        c.points = polyline(track, s)[1:]
+    c.tug = None if s.mode == "speed" else track
+    c.keys["tow.waypoints"] = pairs(c.points)
     dt = s.values["run.dt"]
     if any(s.drift) or not np.isfinite(speed):
         points = programme(legs_of(route, track, time, s), max(s.ramp, dt))
@@ -259,17 +259,18 @@ def outcome(run, c, goal, situation, force_limit=np.inf):
         along = np.sum(step * line, axis=1) / np.hypot(*line.T)
     there = np.isfinite(force) & np.isfinite(along)  # excludes the time after the line has parted
     work = float(np.sum((force * along)[there]))
-    steady = there & (time[:n] > s.ramp)
-    some = force[steady if steady.any() else there]
-    peak = float(np.percentile(some, PEAK)) if len(some) else np.nan
+    largest = float(np.max(force[there])) if there.any() else np.nan
+    late = there & (time[:n] > s.ramp)  # without the force that accelerates the body
+    late = late if late.any() else there
+    force, dt = force[late], dt[late]
     body = np.column_stack([xy, run["body_yaw"]])[:n]
     off = apart.to_edges(xy[:n], np.vstack([c.track, c.track[::-1]]))
     touch = apart.least(body, s.outline, s.no_go, TOUCH * s.hull.width)
     return {"arrived": end is not None, "time": float(time[n - 1]) if end is not None else np.nan,
-            "work": work, "length": float(np.sum(np.hypot(*step.T))), "peak": peak,
-            "largest": float(np.max(force[there])) if there.any() else np.nan,
-            "mean_force": float(np.sum((force * dt)[there]) / np.sum(dt[there])) if there.any() else np.nan,
-            "limit_exceeded": bool(peak > force_limit), "slack": bool(s.mode != "speed" and np.any(some <= 0)),
+            "work": work, "length": float(np.sum(np.hypot(*step.T))), "largest": largest,
+            "peak": float(np.percentile(force, PEAK)) if len(force) else np.nan,
+            "mean_force": float(np.sum(force * dt) / np.sum(dt)) if len(force) else np.nan,
+            "limit_exceeded": largest > force_limit, "slack": bool(s.mode != "speed" and np.any(force <= 0)),
             "parted": any(e["kind"] == "line_broken" for e in run.events),
             "no_go_contact": bool(touch <= TOUCH * s.hull.width), "off_track": float(off.max()),
             "missed_by": float(to_goal(xy, goal).min()), "no_load": bool(np.isnan(run["ice_resistance"][:n]).any()),
