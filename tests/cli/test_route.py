@@ -247,9 +247,9 @@ def test_a_towed_body_keeps_its_circle(tmp_path, mass):
 @pytest.mark.parametrize("mode", ["speed", "line"])
 @pytest.mark.parametrize("drift", [(0.05, 0.02), (-0.05, 0.0)])
 def test_drifting_ice_is_passed_at_the_planned_times(tmp_path, mode, drift):
-    """Over the ground where the plan has the body, a ramp's lag later, and to a goal there that is fixed. Red: the speed
-    through the ice is that over the ground; a corner over the ground is that through the ice; a swath beside the track;
-    at another speed of --speeds the goal is where it was at the first."""
+    """Over the ground where the plan has the body, a ramp's lag later, and to a goal there that is fixed. Red: the
+    speed through the ice is that over the ground; a corner over the ground is that through the ice; a swath beside the
+    track; at another speed of --speeds the goal is where it was at the first."""
     tow = {"mode": mode, "speed": 0.2, "ramp": 4} | ({} if mode == "speed" else {
         "line_length": 2, "line_stiffness": "20 kN", "line_damping": "200 N s/m"})
     case = changed(BASIN, ice__concentration=0, domain__length=60, domain__width=30, tow=tow)
@@ -304,8 +304,8 @@ def test_each_speed_has_its_own_prediction(tmp_path):
 
 
 def test_the_limit_holds_in_every_step(tmp_path):
-    """A tow whose force is largest while the body is accelerated. Red: its mean is larger than its peak; the force of the
-    ramp passes for one within the limit."""
+    """A tow whose force is largest while the body is accelerated. Red: its mean is larger than its peak; the force
+    of the ramp passes for one within the limit."""
     s = read_situation(tmp_path, changed(BASIN, ice__concentration=0, tow__speed=0.4))
     r = planner.route_through(s.ice, s.hull, s.start, (8.5, 0), speed=0.4, extent=s.extent)
     c = tows.candidate("c", "c", r, s)
@@ -589,6 +589,14 @@ def test_a_line_that_parts_ends_the_looks(tmp_path):
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
     assert len(found["rounds"]) == 1 and {"missed", "parted"} <= {*found["horizon"]["tows"]["horizon"]["faults"]}
+
+
+def test_a_spent_budget_of_looks_is_that_of_tows(tmp_path):
+    """Red: exit code 4, as if a file could not be written."""
+    for words in (), ("--replan", "12 s"):
+        done = called("route", write_case(tmp_path, BASIN), "--to", "8.5,0.3", "--routes", "1", "--members", "1",
+                      "--budget", "1e-6", *words, "-o", tmp_path / "out")
+        assert done.returncode == SIGNAL and "the budget" in done.stderr
 
 
 def test_the_estimate_of_looks():
