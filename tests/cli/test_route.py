@@ -591,12 +591,14 @@ def test_a_line_that_parts_ends_the_looks(tmp_path):
     assert len(found["rounds"]) == 1 and {"missed", "parted"} <= {*found["horizon"]["tows"]["horizon"]["faults"]}
 
 
-def test_a_spent_budget_of_looks_is_that_of_tows(tmp_path):
+def test_a_spent_budget_of_looks_is_that_of_tows():
     """Red: exit code 4, as if a file could not be written."""
-    for words in (), ("--replan", "12 s"):
-        done = called("route", write_case(tmp_path, BASIN), "--to", "8.5,0.3", "--routes", "1", "--members", "1",
-                      "--budget", "1e-6", *words, "-o", tmp_path / "out")
-        assert done.returncode == SIGNAL and "the budget" in done.stderr
+    runs = SimpleNamespace(make=lambda name, some, keys: [horizon.SPENT])
+    h = horizon.Horizon(SimpleNamespace(budget=1), {"speeds": [0.5]}, SimpleNamespace(values={"run.dt": 1.0}), None,
+                        runs, SimpleNamespace(folder="out"), {})
+    with pytest.raises(RunError, match="the budget of 1 min is spent") as caught:
+        h.tow("look-1", horizon.Way(np.zeros((2, 2)), [(0.0, 0.5)]), 10.0)
+    assert caught.value.status == SIGNAL
 
 
 def test_the_estimate_of_looks():

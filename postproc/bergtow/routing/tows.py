@@ -6,10 +6,11 @@ and run.duration. Speeds of a route are through the ice, those of a case over th
 programme brings the tow to each point of its path at the planned time.
 
 In a steady turn the line carries the drag F along the path and the centripetal force across it, so it points inwards of
-the tangent by delta, tan(delta) = m kappa V² / F, with the mass m including added mass and the curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end is placed accordingly at body + L (cos(delta) t +
-sin(delta) n): for a light body this is the inverse of the tractrix. kappa is smoothed over the length of the line,
-because a body cannot follow a jump in it; the simulation shows how the tow responds. Rejected: the tractrix alone, with
-which an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
+the tangent by delta, tan(delta) = m kappa V² / F, with the mass m including added mass and the curvature kappa; then
+R_end² = R² - 2 R L sin(delta) + L². The end is placed accordingly at body + L (cos(delta) t + sin(delta) n): for a
+light body this is the inverse of the tractrix. kappa is smoothed over the length of the line, because a body cannot
+follow a jump in it; the simulation shows how the tow responds. Rejected: the tractrix alone, with which an iceberg of
+3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
 
 The goal is reached where the body comes within ARRIVED of its width, at the moment when it is nearest. All numbers of a
 tow are for the time up to then, or to its end if the goal is missed.
