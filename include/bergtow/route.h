@@ -123,8 +123,9 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan);
 /// Release the routes of a plan.
 void bt_route_free(bt_route_plan *plan);
 
-/// Evaluate the straight line from start to goal at speed[0], without a search: terms, forces, areas (to fit weights).
-void bt_route_straight(const bt_route_task *task, bt_route_plan *plan);
+/// Evaluate the way from start to goal through n corners [n][2], m, without a search: terms, forces, areas. No route in
+/// the plan: the goal drifts away, or the turns do not fit.
+void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan);
 
 /// Concentration of the floes of a task on nx × ny cells over its extent, from exact areas; cover [ny][nx].
 void bt_route_cover(const bt_route_task *task, int64_t nx, int64_t ny, double *cover);

@@ -135,7 +135,7 @@ _SIGNATURES = {
     "bt_outline_project": (None, c_double, c_double, c_double, c_double, POINTER(c_double), POINTER(c_double)),
     "bt_outline_unproject": (None, c_double, c_double, c_double, c_double, POINTER(c_double), POINTER(c_double)),
     "bt_route_make": (None, POINTER(RouteTask), POINTER(RoutePlan)),
-    "bt_route_straight": (None, POINTER(RouteTask), POINTER(RoutePlan)),
+    "bt_route_through": (None, POINTER(RouteTask), c_int, POINTER(c_double), POINTER(RoutePlan)),
     "bt_route_free": (None, POINTER(RoutePlan)),
     "bt_route_cover": (None, POINTER(RouteTask), c_int64, c_int64, POINTER(c_double)),
     "bt_route_dubins": (c_double, POINTER(c_double), POINTER(c_double), c_double, POINTER(c_double)),

@@ -28,6 +28,7 @@
 #include "base/largest.h"
 #include "case/ice_bounds.h"
 #include "field/field_admit.h"
+#include "field/map_crs.h"
 
 static const char *const region_names[4] = {"x_min", "y_min", "x_max", "y_max"};
 
@@ -61,6 +62,15 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
                      *region = input->ice.field ? field->outlines.region : own;
         for (int k = 0; k < 4; k++) bt_h5_attr_double(&h5, "/floes", region_names[k], region[k]);
         bt_h5_attr_word(&h5, "/floes", "frame", bt_field_frame(input));
+        const bt_map_place place = bt_map_place_of(&field->outlines, input);
+        if (place.kind == BT_MAP_DEGREES) {
+            bt_h5_attr_double(&h5, "/floes", "origin_lon", place.first * 180 / BT_PI);
+            bt_h5_attr_double(&h5, "/floes", "origin_lat", place.second * 180 / BT_PI);
+        } else if (place.kind == BT_MAP_PLANE) {
+            bt_h5_attr_text(&h5, "/floes", "crs", place.crs);
+            bt_h5_attr_double(&h5, "/floes", "origin_east", place.first);
+            bt_h5_attr_double(&h5, "/floes", "origin_north", place.second);
+        }
         char *text = bt_case_resolved(input);
         bt_h5_put_text(&h5, "/case", text, "the case with every key, in SI units");
         bt_h5_describe_file(&h5, input->run.title);

@@ -378,28 +378,32 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
 
 // --- the task --------------------------------------------------------------------------------------------------------
 
-/// The straight line as a route; false when the goal drifts away from it.
-static bool straight_line(const bt_planner *planner, bt_route *route)
+/// The way through n corners to the goal as a route, n = 0: the straight line; false when the goal drifts away from it,
+/// or its turns do not fit.
+static bool through(const bt_planner *planner, int n, const double (*corner)[2], bt_route *route)
 {
     const bt_route_task *task = &planner->task;
     enum { STEPS = 200 };
-    bt_way way = {.point = bt_alloc(1, sizeof *way.point), .n = 1, .cap = 1};
-    double *end = way.point[0];
+    bt_way way = {.point = bt_alloc((size_t)n + 1, sizeof *way.point), .n = n + 1, .cap = n + 1};
+    if (n) memcpy(way.point, corner, (size_t)n * sizeof *corner);
+    const double *from = n ? corner[n - 1] : task->start;
+    double *end = way.point[n];
     const double wide = task->extent[2] - task->extent[0] + task->extent[3] - task->extent[1];
     const bool still = task->drift[0] == 0 && task->drift[1] == 0;
     bool there = false;
-    way_goal(planner, 0, task->start[0], task->start[1], end);
+    way_goal(planner, 0, from[0], from[1], end);
     for (int k = 0; k < STEPS && !there; k++) {
         way_price(planner, &way);
         const double was[2] = {end[0], end[1]};
-        way_goal(planner, way.cost.time, task->start[0], task->start[1], end);
+        way_goal(planner, way.cost.time, from[0], from[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
         there = still || moved < 1e-9 * task->width;
         if (bt_hypot(end[0] - task->start[0], end[1] - task->start[1]) > 10 * wide) break;
     }
+    there = there && !(way.cost.faults & BT_ROUTE_TURNS);
     if (there) {
         keep_way(planner, route, &way);
-        const double x = end[0] - task->start[0], y = end[1] - task->start[1];
+        const double x = way.point[0][0] - task->start[0], y = way.point[0][1] - task->start[1];
         const double given[2] = {task->start_heading, task->goal_heading};
         for (int k = 0; k < 2; k++) {
             if (isnan(given[k])) continue;
@@ -490,7 +494,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     double there[2];
     way_goal(&planner, 0, t->start[0], t->start[1], there);
     const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
-    if (at_goal || !straight_line(&planner, &plan->route[0])) {
+    if (at_goal || !through(&planner, 0, NULL, &plan->route[0])) {
         plan->n = 0;
         if (!plan->status) plan->status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
     }
@@ -560,14 +564,14 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     end(&planner);
 }
 
-void bt_route_straight(const bt_route_task *task, bt_route_plan *plan)
+void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan)
 {
     bt_planner planner;
     begin(&planner, task);
     *plan = (bt_route_plan){.n = 1};
     bt_lattice *lattice = lattice_of(&planner);
     plan->cell = planner.ice.cell;
-    if (!straight_line(&planner, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
+    if (!through(&planner, n, corner, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
     bt_lattice_free(lattice);
     end(&planner);
 }

@@ -149,6 +149,15 @@ def test_layers_of_the_series_need_no_frames(tmp_path):
         assert done.returncode == IO and "holds no frames" in done.stderr
 
 
+def test_time_zero_is_the_first_frame(tmp_path):
+    """Red: the last one."""
+    there, placed = towed(tmp_path), []
+    for time in (0, 30):
+        bergtow.export(there, tmp_path / "map.geojson", layer="bodies", time=time, force=True)
+        placed.append(json.loads((tmp_path / "map.geojson").read_text())["features"][0]["geometry"])
+    assert placed[0] != placed[1]
+
+
 def test_a_shapefile_says_what_it_renamed_and_spares_files_of_others(tmp_path):
     there = towed(tmp_path)
     done = call("export", there, "-o", tmp_path / "loads.shp", "--layer", "loads")

@@ -2,6 +2,7 @@
 """bergtow route around its planner: positions, members of a map, routes as cases, the towed circle, an honest choice,
 what is kept through a kill, and the receding horizon."""
 import contextlib
+import dataclasses
 import functools
 import json
 import re
@@ -14,16 +15,17 @@ from xml.etree import ElementTree
 
 import h5py
 import numpy as np
+import pyproj
 import pytest
 
 from harness import (BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, changed, environment, heard, run, script,
                      write_case)
 
 import bergtow
-from bergtow import _library
+from bergtow import Case, _library
 from bergtow.errors import RunError
 from bergtow.result.run import Run
-from bergtow.routing import apart, horizon, members, route, situation, tows, verdict
+from bergtow.routing import apart, horizon, members, output, planner, route, situation, tows, verdict
 
 BASIN = changed(TOW, run__duration=20, domain__length=12, domain__width=6, domain__ends="open", body__x=2.5,
                 body__length=0.8, ice__size=0.5, ice__concentration=0.4, output=None)
@@ -55,13 +57,38 @@ def test_degrees_are_those_of_the_program(tmp_path):
     case = ROOT / "cases/outlines/outlines.yml"
     call("field", case, "-o", tmp_path / "f.geojson")
     call("field", case, "-o", tmp_path / "f.h5")
-    floes, place = members.Floes.read(tmp_path / "f.h5").outlines(), situation.place_of(case, [])
+    floes, place = members.Floes.read(tmp_path / "f.h5").outlines(), situation.place_of(Case(case), tmp_path / "f.h5")
     for feature, floe in zip(json.loads((tmp_path / "f.geojson").read_text())["features"], floes):
         ring = np.array(feature["geometry"]["coordinates"][0][:-1])
         own = place.degrees(floe)
         far = np.abs(own[:, None] - ring).max(axis=2).min(axis=1)
         assert far.max() < 1e-8  # a millimetre
         assert np.allclose(place.metres(own), floe, atol=1e-6)
+
+
+@pytest.mark.parametrize("crs", ["", "EPSG:32633", _library.limit("map_local_crs")])
+def test_the_place_is_that_of_the_outlines(tmp_path, crs):
+    """Of a case without keys for it. Red: only keys tell; a projection is none; the remedy for metres is refused."""
+    there = pyproj.Transformer.from_crs("OGC:CRS84", "EPSG:32633", always_xy=True)
+    ring = np.array([20.0, 76.5]) + [[0.004, 0.001], [0.006, 0.001], [0.005, 0.0015], [0.004, 0.001]]
+    at = ring if not crs else np.column_stack(there.transform(*ring.T))
+    map_ = {"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}, "geometry": {
+        "type": "Polygon", "coordinates": [(at if "EPSG" in crs or not crs else at - at[0] + [50, 100]).tolist()]}}]}
+    if crs:
+        map_["crs"] = {"type": "name", "properties": {"name": crs}}
+    (tmp_path / "map.geojson").write_text(json.dumps(map_))
+    case = {"run": {"dt": 0.5, "duration": 30}, "ice": {"outlines": "map.geojson", "thickness": 1},
+            "domain": {"frame": "geographic", "length": 600, "width": 400, "ends": "open", "sides": "open"},
+            "body": {"shape": "disc", "length": 10, "draft": 5, "x": -150}, "tow": {"mode": "speed", "speed": 0.5}}
+    s = read_situation(tmp_path, case)
+    if crs.startswith("urn"):
+        with pytest.raises(RunError, match="unless the ice is outlines in metres"):
+            situation.position("20E,76.5N", s.place, "--to")
+        return
+    (floe,) = s.ice.outlines
+    found = s.place.degrees(floe)
+    assert np.abs(found[:, None] - ring[:-1]).max(axis=2).min(axis=1).max() < 1e-7
+    assert np.allclose(s.place.metres(found), floe, atol=1e-3)
 
 
 def test_a_position_is_metres_or_degrees(tmp_path):
@@ -185,7 +212,7 @@ def circle(radius, length, turns, speed):
     y = np.append(0 * straight, radius * (1 - np.cos(angle)))
     way = np.append(0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
     return SimpleNamespace(kind="planned", x=x, y=y, heading=np.append(0 * straight, angle), time=way / speed,
-                           length=way[-1], duration=way[-1] / speed, force=0.0,
+                           speed=np.full_like(way, speed), length=way[-1], duration=way[-1] / speed, force=0.0,
                            legs=np.array([(speed,)], [("speed", float)]))
 
 
@@ -200,7 +227,7 @@ def test_a_towed_body_keeps_its_circle(tmp_path, mass):
             "tow": {"mode": "line", "speed": 0.5, "line_length": "560 m", "line_stiffness": "40 MN", "ramp": 300,
                     "line_damping": "500 kN s/m"}}
     s, radius = read_situation(tmp_path, case), 800
-    c = tows.candidate("c", "c", circle(radius, 1000, 1.5, 0.5), 0.5, s)
+    c = tows.candidate("c", "c", circle(radius, 1000, 1.5, 0.5), s)
     sets = [w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")]
     assert call("run", s.case, "-o", tmp_path / "run", "--quiet", *sets).returncode == DONE
     with Run(tmp_path / "run") as r:
@@ -217,9 +244,88 @@ def test_a_towed_body_keeps_its_circle(tmp_path, mass):
         assert end.mean() == pytest.approx(np.sqrt(radius ** 2 + s.line ** 2), rel=0.02)
 
 
+@pytest.mark.parametrize("mode", ["speed", "line"])
+@pytest.mark.parametrize("drift", [(0.05, 0.02), (-0.05, 0.0)])
+def test_drifting_ice_is_passed_at_the_planned_times(tmp_path, mode, drift):
+    """Over the ground where the plan has the body, a ramp's lag later, and to a goal there that is fixed. Red: the
+    speed through the ice is that over the ground; a corner over the ground is that through the ice; a swath beside the
+    track; at another speed of --speeds the goal is where it was at the first."""
+    tow = {"mode": mode, "speed": 0.2, "ramp": 4} | ({} if mode == "speed" else {
+        "line_length": 2, "line_stiffness": "20 kN", "line_damping": "200 N s/m"})
+    case = changed(BASIN, ice__concentration=0, domain__length=60, domain__width=30, tow=tow)
+    s = read_situation(tmp_path, case)
+    del tow["ramp"]  # as in route-base.yml
+    write_case(tmp_path, case | {"tow": tow})
+    s = dataclasses.replace(s, drift=drift, water=drift)
+    options = {"drift": drift, "water": drift, "extent": s.extent, "radius": 4.0}
+    goal, corners = (30.0, 2.0), [(14.0, 6.0)]
+    fast = planner.route_through(s.ice, s.hull, s.start, goal, corners, speed=0.2, **options)
+    slow = route.at_speed(fast, 0.15, s, None, options)
+    assert route.at_speed(fast, 0.2, s, None, options) is fast and slow.force < fast.force
+    for r in (fast, slow):
+        c = tows.candidate("c", "c", r, s)
+        assert c.track[-1] == pytest.approx(goal, abs=1e-3)
+        assert (c.swath[:len(c.track)] + c.swath[:len(c.track) - 1:-1]) / 2 == pytest.approx(c.track)
+        sets = [w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")]
+        assert call("run", s.case, "-o", tmp_path / c.name, "--quiet", "--force", *sets).returncode == DONE
+        with Run(tmp_path / c.name) as run_:
+            lag = s.ramp / 2 if mode == "speed" else 0.75 * s.ramp
+            body = [np.interp(r.time[20:] + lag, run_["time"], run_[name]) for name in ("body_x", "body_y")]
+        off = np.hypot(*(np.transpose(body) - c.track[20:]).T)
+        assert off.max() < (0.05 if mode == "speed" else 1.0)
+
+
+def test_a_ramp_that_is_left_out_is_no_short_one(tmp_path):
+    """Red: in a case of a route the derived ramp is rounded, and then too short for the line."""
+    tow = {k: v for k, v in LINE["tow"].items() if k != "ramp"}
+    s = read_situation(tmp_path, changed(LINE, tow=tow, ice__concentration=0))
+    for drift in ((0.0, 0.0), (0.03, 0.02)):
+        r = planner.route_through(s.ice, s.hull, s.start, (400, 0), speed=0.5, extent=s.extent, drift=drift)
+        c = tows.candidate("c", "c", r, dataclasses.replace(s, drift=drift))
+        done = call("check", s.case, *(w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")))
+        assert done.returncode == DONE and "jerks the line" not in done.stdout + done.stderr
+
+
+def test_each_speed_has_its_own_prediction(tmp_path):
+    """That of a plan at that speed alone. Red: every speed has the force, work and faults of the best one."""
+    case = write_case(tmp_path, BASIN)
+    def told(speeds, **more):
+        found = bergtow.route(case, tmp_path / "out", to=(8.5, 0), plan_only=True, routes=1, speeds=speeds, force=True,
+                              **more)
+        return {r["speed"]: r for r in found["routes"] if r["kind"] == "straight"}
+    both, slow, fast = told([0.1, 0.2]), told([0.1])[0.1], told([0.2])[0.2]
+    for one in (slow, fast):
+        for key in ("work", "mean_force", "time", "cost", "peak_of_legs"):
+            assert both[one["speed"]]["predicted"][key] == pytest.approx(one["predicted"][key], rel=0.01)
+    limit = 1.2 * slow["predicted"]["peak_of_legs"]
+    assert limit < fast["predicted"]["mean_force"]
+    limited = told([0.1, 0.2], force_limit=limit)
+    assert [limited[v]["faults"] for v in (0.1, 0.2)] == [[], ["force_limit"]]
+
+
+def test_the_limit_holds_in_every_step(tmp_path):
+    """A tow whose force is largest while the body is accelerated. Red: its mean is larger than its peak; the force
+    of the ramp passes for one within the limit."""
+    s = read_situation(tmp_path, changed(BASIN, ice__concentration=0, tow__speed=0.4))
+    r = planner.route_through(s.ice, s.hull, s.start, (8.5, 0), speed=0.4, extent=s.extent)
+    c = tows.candidate("c", "c", r, s)
+    sets = [w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")]
+    assert call("run", s.case, "-o", tmp_path / "run", "--quiet", *sets).returncode == DONE
+    with Run(tmp_path / "run") as run_:
+        start = s.mass * 0.4 / s.ramp
+        out = tows.outcome(run_, c, (8.5, 0), s, 0.9 * start)
+        assert out["mean_force"] <= out["peak"] < 0.9 * start < out["largest"] and out["limit_exceeded"]
+        assert not tows.outcome(run_, c, (8.5, 0), s, 1.01 * out["largest"])["limit_exceeded"]
+
+
+def test_positions_do_not_jump_at_the_180th_meridian():
+    place = situation.Place(True, tuple(np.radians([180, 70])))
+    lon = np.array(output.positions([(0, -300), (0, 0), (0, 300)], place))[:, 0]
+    assert np.ptp(lon) < 0.1
+
+
 def test_a_programme_of_legs_goes_their_way():
-    legs = np.array([(0, 100, 0.5), (100, 80, 0.2), (180, 60, 0.4)], [(n, float) for n in ("way", "length", "speed")])
-    t, v = np.array(tows.programme(legs, 30)).T
+    t, v = np.array(tows.programme([(100, 0.5), (80, 0.2), (60, 0.4)], 30)).T
     assert np.trapz(v, t) == pytest.approx(240) and np.all(np.diff(t) > 0)
     assert list(np.unique(v)) == [0, 0.2, 0.4, 0.5]
 
@@ -483,6 +589,16 @@ def test_a_line_that_parts_ends_the_looks(tmp_path):
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
     assert len(found["rounds"]) == 1 and {"missed", "parted"} <= {*found["horizon"]["tows"]["horizon"]["faults"]}
+
+
+def test_a_spent_budget_of_looks_is_that_of_tows():
+    """Red: exit code 4, as if a file could not be written."""
+    runs = SimpleNamespace(make=lambda name, some, keys: [horizon.SPENT])
+    h = horizon.Horizon(SimpleNamespace(budget=1), {"speeds": [0.5]}, SimpleNamespace(values={"run.dt": 1.0}), None,
+                        runs, SimpleNamespace(folder="out"), {})
+    with pytest.raises(RunError, match="the budget of 1 min is spent") as caught:
+        h.tow("look-1", horizon.Way(np.zeros((2, 2)), [(0.0, 0.5)]), 10.0)
+    assert caught.value.status == SIGNAL
 
 
 def test_the_estimate_of_looks():

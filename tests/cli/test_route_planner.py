@@ -13,7 +13,7 @@ import scipy.sparse.csgraph
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 from bergtow.errors import BergtowError  # noqa: E402
 from bergtow.routing import planner  # noqa: E402
-from bergtow.routing.planner import Hull, Ice, plan, straight_route  # noqa: E402
+from bergtow.routing.planner import Hull, Ice, plan, route_through  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("library")
 NONE = Ice([], [])
@@ -221,7 +221,7 @@ def test_the_ice_of_a_straight_swath_is_that_of_a_rectangle():
     start, end = np.array([60.0, 40.0]), np.array([720.0, 150.0])
     d = end - start
     t = d / np.hypot(*d)
-    r = straight_route(Ice(outlines, h, added_mass=0.5), BERG, start, end, speed=2, extent=(0, 0, 800, 200), cell=2,
+    r = route_through(Ice(outlines, h, added_mass=0.5), BERG, start, end, speed=2, extent=(0, 0, 800, 200), cell=2,
                        weights=PLOUGH)
     areas = np.array([clipped((o - start) @ np.array([t, [-t[1], t[0]]]).T, 0, -10, np.hypot(*d), 10)
                       for o in outlines])
@@ -251,7 +251,7 @@ def test_terms_of_the_force():
     """One large floe, wider than the berg, of which every term has a closed form. Red: a cap that is none."""
     ice = dict(outlines=[box(-2000, -2000, 3000, 3000)], thickness=[1.0], added_mass=0.5)
     extent, a = (0, 0, 1000, 1000), 5000 / math.sqrt(3)  # the circle of the same second moments
-    r = straight_route(Ice(**ice), BERG, (100, 500), (900, 500), speed=1, extent=extent)
+    r = route_through(Ice(**ice), BERG, (100, 500), (900, 500), speed=1, extent=extent)
     f1, u = 1.5 * 910 * 20, 400 / (a + 10)
     middle = 1.5 * 910 * 25e6 * a / (a + 10) * 2 / math.pi / (a + 10)
     large = middle * (math.asin(u) + u * math.sqrt(1 - u * u)) / (2 * u)
@@ -260,13 +260,13 @@ def test_terms_of_the_force():
     about = middle * np.sqrt(1 - x ** 2 - x[:, None] ** 2).mean()
     assert math.isclose(r.features["compaction"], 9 * (f1 + about), rel_tol=1e-5)
     q = 5 * 910 * (1 - 910 / 1027) * 9.81  # kappa 10
-    r = straight_route(Ice(**ice, rafting=q), BERG, (100, 500), (900, 500), speed=1, extent=extent)
+    r = route_through(Ice(**ice, rafting=q), BERG, (100, 500), (900, 500), speed=1, extent=extent)
     f = r.features
     assert math.isclose(f["plough"] + f["compaction"] + f["large"], 20 * q, rel_tol=1e-5)
     assert math.isclose(f["rafting"], 20 * q, rel_tol=1e-5) and math.isclose(r.force, 1e4 + 20 * q, rel_tol=1e-5)
     # half the cover in small squares: compaction as packed ice of one dimension, of what is about a lane too
     squares = [box(x, y, x + 4, y + 2) for x in range(0, 400, 8) for y in range(0, 200, 2) if abs(y - 99) > 12]
-    r = straight_route(Ice(squares, np.ones(len(squares))), BERG, (100, 100), (300, 100), speed=1,
+    r = route_through(Ice(squares, np.ones(len(squares))), BERG, (100, 100), (300, 100), speed=1,
                        extent=(0, 0, 400, 200), cell=1)
     f, cover = r.features, 0.5 * (47 - 24) / 47  # of a square of 47 m, 24 m of which are the lane
     near = 910 * cover * (20 + 4 / 3 * math.sqrt(4 * 2 / 3))  # whole floes: 4/3 of the mean half axis
@@ -282,7 +282,7 @@ def test_a_floe_takes_the_momentum_of_an_oblique_collision(radius, offset):
     for angle in 0, 0.4, 2.1:
         t = np.array([math.cos(angle), math.sin(angle)])
         ice = Ice([disc(*(np.array([300, 300]) + offset * np.array([-t[1], t[0]])), radius)], [1.0])
-        r = straight_route(ice, BERG, 300 - 200 * t, 300 + 200 * t, speed=2, extent=(0, 0, 600, 600),
+        r = route_through(ice, BERG, 300 - 200 * t, 300 + 200 * t, speed=2, extent=(0, 0, 600, 600),
                            cell=1)
         assert math.isclose(r.features["large"] * 400, exact, rel_tol=0.01)
 
@@ -292,7 +292,7 @@ def test_a_long_floe_reaches_as_far_as_it_is_long():
     t = np.array([math.cos(0.5), math.sin(0.5)])
     n, middle = np.array([-t[1], t[0]]), np.array([400.0, 300.0])
     long = np.array([middle + a * 200 * t + b * 10 * n for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
-    beside, across = (straight_route(Ice([long], [1.0]), BERG, middle + o - 150 * d, middle + o + 150 * d, speed=1,
+    beside, across = (route_through(Ice([long], [1.0]), BERG, middle + o - 150 * d, middle + o + 150 * d, speed=1,
                                      extent=(0, 0, 800, 600)).features["large"] for o, d in ((30 * n, t), (0 * n, n)))
     assert beside == 0 < across
 
@@ -395,7 +395,7 @@ def test_a_goal_that_drifts_away():
 def test_current_across_and_against():
     """Water drag is of the velocity through the water: closed forms. Red: the sign of the current."""
     for water, force in ((0.5, 0), 1e4 * 0.25), ((-0.5, 0), 1e4 * 2.25), ((0, 0.75), 1e4 * 1.25), ((2, 0), 10):
-        r = straight_route(NONE, BERG, (50, 300), (950, 300), speed=1, extent=(0, 0, 1000, 600), water=water)
+        r = route_through(NONE, BERG, (50, 300), (950, 300), speed=1, extent=(0, 0, 1000, 600), water=water)
         assert math.isclose(r.force, force, rel_tol=1e-9)
 
 

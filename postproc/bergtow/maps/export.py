@@ -458,8 +458,9 @@ def perform(a):
     with Run(a.run) as run:
         place = Place.of(run)
         names = (a.layer,) if a.layer else DEFAULT[kind]
-        framed = trajectories or a.time or not FRAMED.isdisjoint(names)
-        frames = frames_of(run, a.time or ("all" if trajectories else "last")) if framed else []
+        framed = trajectories or a.time is not None or not FRAMED.isdisjoint(names)
+        time = ("all" if trajectories else "last") if a.time is None else a.time
+        frames = frames_of(run, time) if framed else []
         if trajectories:
             t = Trajectories.of(run, frames)
             if kind == ".csv":

@@ -77,8 +77,8 @@ def known(path, text, whose):
     except CRSError:
         raise RunError(path, f"{whose} is unknown to PROJ: {' '.join(text.split())[:80]}",
                        "correct it; EPSG:4326, EPSG:32633 and the like are known") from None
-    while crs.is_compound or crs.is_bound:
-        crs = crs.sub_crs_list[0] if crs.is_compound else crs.source_crs
+    if crs.is_compound:
+        crs = crs.sub_crs_list[0]
     if crs.is_geographic or crs.is_projected:
         return crs
     if whose == "--crs":
@@ -86,13 +86,19 @@ def known(path, text, whose):
     return None
 
 
+def unbound(crs):
+    """The crs without a datum shift of its own (TOWGS84)."""
+    return crs.source_crs if crs.is_bound else crs
+
+
 def same(a, b):
-    return a.equals(b, ignore_axis_order=True)
+    return unbound(a).equals(unbound(b), ignore_axis_order=True)
 
 
 def name_of(crs):
     if isinstance(crs, str):
         return "local metres"
+    crs = unbound(crs)
     code = crs.to_authority()
     return f"{':'.join(code)} ({crs.name})" if code else crs.name
 

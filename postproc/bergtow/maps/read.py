@@ -361,16 +361,25 @@ def as_stored(source):
 
 def place_of(path, source, name):
     """The six numbers of GDAL's geotransform, or None if the file does not give them. They are also derived from
-    coordinate variables without units in NetCDF or HDF5, which GDAL does not recognise."""
+    coordinate variables without units in NetCDF or HDF5, which GDAL does not recognise. Raises RunError."""
     place = source.GetGeoTransform(can_return_null=True)
-    if place is not None or source.GetDriver().ShortName not in ("netCDF", "HDF5", "HDF5Image"):
+    if source.GetDriver().ShortName not in ("netCDF", "HDF5", "HDF5Image"):
         return place
     try:
         root = gdal.OpenEx(str(path), gdal.OF_MULTIDIM_RASTER).GetRootGroup()
         full = name or next(n for n in root.GetMDArrayNames() if root.OpenMDArray(n).GetDimensionCount() >= 2)
         rows, columns = root.OpenMDArrayFromFullname("/" + full).GetDimensions()[-2:]
+    except (RuntimeError, AttributeError, StopIteration, ValueError):
+        return place
+    if columns.GetType() == gdal.DIM_TYPE_HORIZONTAL_Y:
+        x, y = rows.GetName(), columns.GetName()
+        raise RunError(path, f"holds {full} as ({x}, {y}), whose rows lie along {y}",
+                       f"give it rows along {x}: ncpdq -a {y},{x} (NCO)")
+    if place is not None:
+        return place
+    try:
         axes = [d.GetIndexingVariable().ReadAsArray().astype(float) for d in (columns, rows)]
-    except (RuntimeError, AttributeError, StopIteration, TypeError, ValueError):
+    except (RuntimeError, AttributeError, TypeError, ValueError):
         return None
     steps = [(axis[-1] - axis[0]) / max(len(axis) - 1, 1) for axis in axes]
     for axis, step in zip(axes, steps):

@@ -52,6 +52,7 @@ def plane_lines(plane, distortion, bend):
     if plane.accuracy:
         lines.append("the map's datum is tied to WGS 84 " + (
             f"within {plane.accuracy:g} m" if math.isfinite(plane.accuracy) else
+            "by the shift in its crs, which gives no accuracy" if plane.crs.is_bound else
             "by no known relation: all places may be off by the same few hundred metres"))
     if plane.heading is not None:
         lines.append(f"first axis towards {plane.heading:g}°, second to its left (frame: basin)")

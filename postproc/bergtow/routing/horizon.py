@@ -12,7 +12,7 @@ bound.
 import dataclasses
 
 from bergtow import writing
-from bergtow.errors import CASE, IO, RunError
+from bergtow.errors import CASE, SIGNAL, RunError
 from bergtow.result.run import Run
 from bergtow.routing import members, output, situation, tows, verdict
 from bergtow.study.runs import SPENT
@@ -21,7 +21,6 @@ from bergtow.text import route as words
 import numpy as np
 
 MOST = 100       # looks
-FINE = 1e-4      # body widths: how far a polyline may deviate from the path of a body whose speed is prescribed
 AHEAD = 2        # steps by which the decided part extends beyond a look
 
 
@@ -35,14 +34,32 @@ def seen(ice, errors, k):
         ice.thickness) * np.exp(sigma * half * (thick + each) - sigma ** 2 / 2))
 
 
-def led(route, s, speed):
-    """[m, 2] over the ground, from the start of the plan: path of the body, or of the end that pulls it."""
-    way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
-    moved = np.outer(way / speed, s.drift)
-    if s.mode == "speed":
-        return tows.simplified(np.column_stack([route.x, route.y]) + moved, FINE * s.hull.width)
-    end, new = tows.tug_track(route, s)
-    return tows.simplified(end + moved[new], tows.STRAIGHT * s.hull.width)
+@dataclasses.dataclass
+class Way:
+    """Path over the ground [n, 2], m, of the body, or of the end that pulls it, and the pace along it: [(time s, speed
+    m/s)], linear between."""
+
+    points: np.ndarray
+    pace: list
+
+    def split(self, look, time):
+        """(The same way with points of its pace at the two times, s, and one of its path at the later; the part up to
+        there)."""
+        early, late = ([p for p in self.pace if p[0] < look], [p for p in self.pace if p[0] > time])
+        pace = early + [(t, float(np.interp(t, *np.transpose(self.pace)))) for t in (look, time)]
+        times, speeds = np.transpose(pace)
+        points, last = with_point(self.points, np.trapz(speeds, times))
+        return Way(points, pace + late), Way(points[:last + 1], pace)
+
+
+def way_of(route, s, decided=None):
+    """The Way of a plan, from the start or after a decided one."""
+    track, time = tows.led(route, s)
+    old = decided or Way(track[:1], [(0.0, 0.0)])
+    far = np.argmax(np.hypot(*(track - old.points[-1]).T) > 0.1 * s.hull.width)
+    track, time = np.vstack([old.points[-1:], track[far:]]), np.append(0.0, time[far:])
+    pace = tows.programme(tows.legs_of(route, track, time, s), max(s.ramp, s.values["run.dt"]), old.pace[-1])
+    return Way(np.vstack([old.points, tows.polyline(track, s)[1:]]), old.pace + pace[1:])
 
 
 def with_point(points, way):
@@ -76,46 +93,44 @@ class Horizon:
         self.a, self.w, self.s, self.goal, self.runs, self.files, self.found = a, w, s, goal, runs, files, found
         self.speed, self.dt = w["speeds"][0], s.values["run.dt"]
 
-    def keys(self, points, duration):
-        return {"tow.waypoints": tows.pairs(points[1:]), "tow.speed": f"{self.speed:.10g} m/s",
-                "tow.ramp": f"{self.s.ramp:.10g} s", "output.window_start": "-1 s",
-                "run.duration": f"{self.dt * np.ceil(duration / self.dt - 1e-9):.10g} s"}
+    def steps(self, duration):
+        """A duration in whole steps, as a case gives it, s."""
+        return float(f"{self.dt * np.ceil(duration / self.dt - 1e-9):.10g}")
 
-    def tow(self, name, points, duration):
+    def keys(self, way, duration):
+        end = self.steps(duration)
+        return {"tow.waypoints": tows.pairs(way.points[1:]), **tows.paced(way.pace, end),
+                "output.window_start": "-1 s", "run.duration": f"{end:.10g} s"}
+
+    def tow(self, name, way, duration):
         """Make a tow and return its folder. Raises RunError."""
-        keys = self.keys(points, duration)
+        keys = self.keys(way, duration)
         why = self.runs.make(name, range(1), keys)
         if SPENT in why:
             raise RunError(self.files.folder,
                            f"the budget of {self.a.budget:g} min is spent, but some tows are still to be made",
-                           "call again: finished work is kept", IO)
+                           "call again: finished work is kept", SIGNAL)
         if why[0]:
             self.runs.tell_failed()
         return self.runs.path(name, 0)
 
-    def whole(self, name, points, c):
-        """The outcome of a tow along a whole polyline, and its folder."""
-        path = self.tow(name, points, self.duration(points))
+    def whole(self, name, way, c):
+        """The outcome of a tow along a whole way, and its folder."""
+        path = self.tow(name, way, self.duration(way))
         with Run(path) as run:
             out = tows.outcome(run, c, self.goal, self.s, self.w["limit"])
         return out | {"faults": [f for f in (*verdict.FAULTS, "no_load") if verdict.fault(out, f)]}, path
 
-    def duration(self, points):
-        way = np.sum(np.hypot(*np.diff(points, axis=0).T))
-        return tows.LONGER[self.s.mode] * (way / self.speed + self.s.ramp / 2)
+    def duration(self, way):
+        return tows.LONGER[self.s.mode] * way.pace[-1][0]
 
-    def way(self, time):
-        """Distance covered by the body or end whose path is prescribed, a few steps after a time, m."""
-        time, ramp = time + AHEAD * self.dt, self.s.ramp
-        return self.speed * (time - ramp / 2 if time > ramp else time ** 2 / (2 * ramp) if ramp > 0 else time)
-
-    def look(self, k, time, points):
-        """(ice, start, heading, decided points, all points) at a look; None once the goal is reached or the line has
-        parted. All points are the route of the current tow, which continues if no new plan is allowed."""
+    def look(self, k, time, way):
+        """(ice, start, heading, decided part, whole way) at a look; None once the goal is reached or the line has
+        parted. The whole way is that of the current tow, which continues if no new plan is allowed."""
         s = self.s
-        points, last = with_point(points, self.way(time))
-        decided, tangent = points[:last + 1], points[last] - points[last - 1]
-        path = self.tow(f"look-{k}", points, time)
+        way, decided = way.split(self.steps(time), self.steps(time) + AHEAD * self.dt)
+        end, tangent = decided.points[-1], decided.points[-1] - decided.points[-2]
+        path = self.tow(f"look-{k}", way, time)
         with Run(path) as run:
             frame = run.frame_at(time - self.w["age"])
             moved = np.array(s.drift) * (time - run.frame_times[frame])
@@ -130,12 +145,13 @@ class Horizon:
                     or 0 < s.values["tow.line.branches"] <= broken):
                 return None
             if s.mode == "speed":
-                start, heading = decided[-1], np.arctan2(*tangent[::-1])
+                through = tangent * decided.pace[-1][1] / np.hypot(*tangent) - s.drift  # the ice
+                start, heading = end, np.arctan2(*through[::-1])
             else:
-                line = decided[-1] - body
+                line = end - body
                 heading = np.arctan2(*line[::-1])
-                start = decided[-1] - s.line * line / np.hypot(*line)
-        return seen(ice, self.w["errors"], k), tuple(start), float(heading), decided, points
+                start = end - s.line * line / np.hypot(*line)
+        return seen(ice, self.w["errors"], k), tuple(start), float(heading), decided, way
 
 
 def estimate(c, every, told, planning):
@@ -159,13 +175,13 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
     if route is None:
         raise RunError("bergtow route", "no route is allowed at the first look", "give a higher --force-limit, or a "
                        "smaller --radius or --clearance", CASE)
-    points = once = led(route, s, h.speed)
+    way = once = way_of(route, s)
     found["horizon"] = {"every": w["replan"], "age": w["age"], "perfect": perfect, "tows": {}}
 
     def noted(k, time, status, r):
         found["rounds"].append({"time": time, "status": status, "length": r.length if r else np.nan,
-                                "work": r.work if r else np.nan, "waypoints": points[1:]})
-        writing.write_json({"keys": h.keys(points, time)} | found["rounds"][-1], files.folder / f"round-{k}.json",
+                                "work": r.work if r else np.nan, "waypoints": way.points[1:]})
+        writing.write_json({"keys": h.keys(way, time)} | found["rounds"][-1], files.folder / f"round-{k}.json",
                            a.force)
         files.write(found)
 
@@ -175,30 +191,28 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
         time = k * w["replan"]
         if left <= w["replan"]:
             break
-        there = h.look(k, time, points)
+        there = h.look(k, time, way)
         if there is None:
             break
-        ice, start, heading, decided, points = there
+        ice, start, heading, decided, way = there
         new = command.planned(a, w, s, goal, weights, factor, ice=ice, start=start, start_heading=heading)
         route = best(new, heading, a.headings)
         if route:
-            ahead = led(route, s, h.speed)
-            far = np.hypot(*(ahead - decided[-1]).T) > 0.1 * s.hull.width
-            points = np.vstack([decided, ahead[np.argmax(far):]])
+            way = way_of(route, s, decided)
             left = route.duration
         else:
             left -= w["replan"]
         noted(k, time, new.status, route)
     by_name = {r["name"]: r for r in found["routes"]}
     straight, some = next(c for c in files.some if c.straight), {}
-    for name, way in (("horizon", points), ("once", once), ("straight", led(straight.route, s, h.speed))):
-        track = straight.track if name == "straight" else way
+    for name, towed in (("horizon", way), ("once", once), ("straight", way_of(straight.route, s))):
+        track = straight.track if name == "straight" else towed.points
         c = tows.Candidate(name, name, straight.route, h.speed, {}, track)
-        found["horizon"]["tows"][name], some[name] = h.whole(f"tow-{name}", way, c)
+        found["horizon"]["tows"][name], some[name] = h.whole(f"tow-{name}", towed, c)
         files.write(found)
     by_name["straight"]["simulated"] = command.means([found["horizon"]["tows"]["straight"]])
     c = tows.Candidate("horizon", "with new looks", route or first.routes[0], h.speed, h.keys(
-        points, h.duration(points)), points, None, points[1:])
+        way, h.duration(way)), way.points, points=way.points[1:])
     output.case(c, files.folder / "route-base.yml", files.folder / "horizon.yml", a.force)
     files.write(found, picture=True)
     told = writing.plain(found)

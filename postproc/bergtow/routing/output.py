@@ -13,7 +13,8 @@ def positions(xy, place):
     """[[east, north]] from metres of the case: degrees if the case has a geographic position, otherwise metres."""
     if place.origin is None:
         return np.round(place.map(xy), 4).tolist()
-    return np.round(place.degrees(xy), 8).tolist()
+    lon, lat = place.degrees(xy).T  # in one piece across the 180th meridian
+    return np.round(np.column_stack([np.unwrap(lon, period=360), lat]), 8).tolist()
 
 
 def features(candidates, place, numbers):
@@ -21,7 +22,7 @@ def features(candidates, place, numbers):
     {name: properties}."""
     out = []
     for c in candidates:
-        parts = [("berg", "LineString", c.track), ("swath", "Polygon", c.route.swath)]
+        parts = [("berg", "LineString", c.track), ("swath", "Polygon", c.swath)]
         if c.tug is not None:
             parts.insert(1, ("tug", "LineString", c.tug))
         for kind, shape, xy in parts:

@@ -204,9 +204,9 @@ class _Task:
             least = math.sqrt((x1 - x0) * (y1 - y0) / most)
             setattr(t, name, 0 if value is None else _number(name, value, least))
 
-    def call(self, what: str) -> _library.RoutePlan:
+    def call(self, what: str, *more: Any) -> _library.RoutePlan:
         plan = _library.RoutePlan()
-        getattr(_library.library(), what)(ctypes.byref(self.task), ctypes.byref(plan))
+        getattr(_library.library(), what)(ctypes.byref(self.task), *more, ctypes.byref(plan))
         return plan
 
     def cover(self, most: int = 1000) -> tuple[np.ndarray, tuple[float, float, float, float]]:
@@ -255,13 +255,17 @@ def _route(found: _library.RouteFound, kind: str, width: float, cell: float) -> 
     x, y, heading, time, speed = _points(stretch, cell)
     radii = np.full(len(corners), found.radius)
     radii[-1] = 0
-    normal = 0.5 * width * np.column_stack([-np.sin(heading), np.cos(heading)])
-    centre = np.column_stack([x, y])
     return Route(kind, corners, radii, x, y, heading, time, speed, _legs(stretch), found.length, found.duration,
                  found.work, found.force, found.peak, found.cost,
                  {name: found.term[k] for k, name in enumerate(Weights._fields)}, found.ice_area, found.ice_mass,
                  found.clearance, tuple(name for bit, name in FAULTS.items() if found.faults & bit),
-                 np.concatenate([centre - normal, (centre + normal)[::-1]]))
+                 swath(np.column_stack([x, y]), heading, width))
+
+
+def swath(centre: np.ndarray, heading: np.ndarray, width: float) -> np.ndarray:
+    """Outline [2 n, 2], m, of what a berg sweeps whose centre goes through points [n, 2], m, at headings [n], rad."""
+    normal = 0.5 * width * np.column_stack([-np.sin(heading), np.cos(heading)])
+    return np.concatenate([centre - normal, (centre + normal)[::-1]])
 
 
 def plan(ice: Ice, hull: Hull, start: Iterable[float], goal: Points, **options: Any) -> Plan:
@@ -311,16 +315,18 @@ def _nearest_polygon(task: _Task, x: float, y: float) -> int:
     return which
 
 
-def straight_route(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[float], *, speed: float,
-                   **options: Any) -> Route:
-    """The straight line at one speed, without a search: its features, for fit_weights, its area, its force. Options:
-    those of plan()."""
+def route_through(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[float], corners: Points = (), *,
+                  speed: float, **options: Any) -> Route:
+    """The way through corners [n, 2], m, at one speed, without a search: its features, for fit_weights, its area, its
+    force. Without corners it is the straight line. Options: those of plan()."""
     task = _Task(ice, hull, start, np.asarray(list(end), dtype=float), speeds=(speed,), **options)
-    found = task.call("bt_route_straight")
+    points = np.ascontiguousarray(corners, dtype=float).reshape(-1, 2)
+    found = task.call("bt_route_through", len(points), _pointer(points))
     try:
         if not found.n:
-            raise BergtowError("the goal drifts away faster than the berg follows; raise the speed")
-        return _route(found.route[0], "straight", task.task.width, found.cell)
+            raise BergtowError("the goal drifts away faster than the berg follows, or the way has turns that do not "
+                               "fit; raise the speed, or give a smaller radius")
+        return _route(found.route[0], "planned" if len(points) else "straight", task.task.width, found.cell)
     finally:
         _library.library().bt_route_free(ctypes.byref(found))
 

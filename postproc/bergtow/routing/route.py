@@ -17,7 +17,8 @@ from pathlib import Path
 from bergtow import writing
 from bergtow._program import program_path
 from bergtow.arguments import from_zero, measure, not_below_zero, several, whole_from
-from bergtow.errors import CASE, IO, SIGNAL, USAGE, RunError
+from bergtow.case import Case
+from bergtow.errors import CASE, IO, SIGNAL, USAGE, BergtowError, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, situation, tows, verdict
 from bergtow.study import analysis
@@ -147,12 +148,29 @@ def wanted(a, s):
 
 def planned(a, w, s, goal, weights, factor, **more):
     """Call planner.plan() with the options. more: further options of planner.plan()."""
-    given = {"speeds": w["speeds"], "objective": a.objective, "force_limit": w["limit"], "force_factor": factor,
-             "no_go": s.no_go, "clearance": w["clearance"], "radius": w["radius"], "headings": a.headings,
-             "cell": w["cell"], "turn_cost": a.turn_cost, "routes": a.routes, "weights": weights, "drift": s.drift,
-             "water": s.water, "extent": s.extent} | more
+    given = {"speeds": w["speeds"], "routes": a.routes, "headings": a.headings, "cell": w["cell"],
+             **priced(a, w, s, weights, factor), **more}
     ice, start = given.pop("ice", s.ice), given.pop("start", s.start)
     return planner.plan(ice, s.hull, start, goal, **given)
+
+
+def priced(a, w, s, weights, factor):
+    """Options of planner.plan() that the cost and the faults of a path depend on."""
+    return {"objective": a.objective, "force_limit": w["limit"], "force_factor": factor, "no_go": s.no_go,
+            "clearance": w["clearance"], "radius": w["radius"], "turn_cost": a.turn_cost, "weights": weights,
+            "drift": s.drift, "water": s.water, "extent": s.extent}
+
+
+def at_speed(route, speed, s, cell, options):
+    """A planned route at one speed, m/s; None if it does not reach the goal at it. cell: m; options: priced()."""
+    if set(route.legs["speed"].tolist()) == {speed}:
+        return route
+    goal = route.waypoints[-1] + np.multiply(s.drift, route.duration)  # over the ground
+    try:  # a hair less of a radius: arcs that touch fit in spite of rounding
+        return planner.route_through(s.ice, s.hull, s.start, goal, route.waypoints[:-1], speed=speed, cell=cell,
+                                     **options | {"radius": 0.999 * options["radius"]})
+    except BergtowError:
+        return None
 
 
 def refuse(plan, found, path, force):
@@ -202,9 +220,9 @@ def calibrated(a, w, s, runs):
         yaw = float(np.arctan2(*(end - start)[::-1]))
         file = folder / f"s{k + 1:03d}.h5"
         floes.take(members.clear_of_hull(outlines, s, start, yaw)).write(file)
-        route = planner.straight_route(s.ice, s.hull, start, end, speed=speed, extent=s.extent, cell=w["cell"],
-                                       drift=s.drift, water=s.water)
-        c = tows.candidate(f"swath-{k + 1}", f"swath {k + 1}", route, speed, s)
+        route = planner.route_through(s.ice, s.hull, start, end, speed=speed, extent=s.extent, cell=w["cell"],
+                                      drift=s.drift, water=s.water)
+        c = tows.candidate(f"swath-{k + 1}", f"swath {k + 1}", route, s)
         keys = c.keys | situation.reading(s.values, file) | {
             f"body.{name}": f"{value:.12g} {unit}" for name, value, unit in
             (("x", start[0], "m"), ("y", start[1], "m"), ("yaw", yaw, "rad"))}
@@ -248,11 +266,9 @@ def tow(runs, name, some, keys, line=None):
 def described(c):
     """A candidate as a dict for JSON."""
     r = c.route
-    by_legs = not np.isfinite(c.speed)
-    seconds = r.duration if by_legs else r.length / c.speed
     return {"name": c.name, "label": c.label, "kind": r.kind, "speed": c.speed, "case": f"{c.name}.yml",
             "faults": list(r.faults), "waypoints": c.points, "predicted": {
-                "length": r.length, "time": seconds, "work": r.work, "mean_force": r.force, "peak_of_legs": r.peak,
+                "length": r.length, "time": r.duration, "work": r.work, "mean_force": r.force, "peak_of_legs": r.peak,
                 "ice_area": r.ice_area, "ice_mass": r.ice_mass, "clearance": r.clearance, "cost": r.cost,
                 "features": r.features}}
 
@@ -349,14 +365,16 @@ def perform(a):
     for name in FILES:
         writing.may_write(folder / name, a.force)
     began, program = time.monotonic(), program_path()
-    place = situation.place_of(a.case, a.set)
-    body = {}
+    work, body = (folder / "route").resolve(), {}
+    case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
     if a.start:
+        values = Case(case)
+        place = situation.place_of(values, situation.floes_of(program, case, values, work))
         x, y = situation.position(a.start, place, "--from")
         body = {"body.x": f"{x:.12g} m", "body.y": f"{y:.12g} m"}
-    goal = situation.goal(a.to, place)
-    case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
-    s = situation.of(program, case, (folder / "route").resolve(), ramp, a.no_go, a.width)
+        case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
+    s = situation.of(program, case, work, ramp, a.no_go, a.width)
+    goal = situation.goal(a.to, s.place)
     w = wanted(a, s)
     if tows.to_goal(np.array([s.start]), goal)[0] <= tows.ARRIVED * s.hull.width:
         raise RunError(f"--to {a.to}", f"is reached at the start of the tow: within a width of the body, "
@@ -380,7 +398,9 @@ def perform(a):
         plan = planned(a, w, s, goal, weights, factor)
         found |= {"plan_s": time.monotonic() - clock, "states": plan.states, "cell": plan.cell, "spacing": plan.spacing}
         refuse(plan, found, folder / "route.json", a.force)
-        some = tows.candidates(plan.routes, w["speeds"], s)
+        options = priced(a, w, s, weights, factor)
+        some = tows.candidates(plan.routes, w["speeds"], s,
+                               lambda route, speed: at_speed(route, speed, s, plan.cell, options))
         found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c) for c in some]}
         files = Files(folder, plan, some, s, goal, a.force)
         files.write_plan()

@@ -17,15 +17,18 @@ from bergtow.arguments import read
 from bergtow.case import Case
 from bergtow.errors import CASE, USAGE, BergtowError, Refused, RunError
 from bergtow.result.frames import lonlat_of, place as turned
+from bergtow.result.hdf5 import plain
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
 from bergtow.study.runs import MESSAGES, messages
 
+import h5py
 import numpy as np
 
 FIXED = 2  # bt_simulation: a body permanently at rest
 GRAVITY = 9.81  # m/s2
+ORIGIN = "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, unless the ice is outlines in metres"
 #: keys of the tow that each route sets itself
 OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
@@ -35,11 +38,12 @@ OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
 @dataclass(frozen=True)
 class Place:
-    """Geographic position of x = y = 0 of a case, and the directions of its axes. origin: longitude and latitude, rad,
-    or None if unknown."""
+    """Position of x = y = 0 of a case on the earth, and the directions of its axes. origin: longitude and latitude,
+    rad, or with a crs east and north there, m; None if unknown."""
 
     north_first: bool    #: the geographic frame: x north, y east
     origin: tuple = None
+    crs: str = ""        #: of the projection of outlines in metres
 
     def map(self, xy):
         """[n, 2] metres east and north from metres of the case; its own inverse."""
@@ -48,10 +52,20 @@ class Place:
 
     def degrees(self, xy):
         """[n, 2] longitude and latitude from metres of the case."""
+        if self.crs:
+            return np.column_stack(self._projection.transform(*(self.map(xy) + self.origin).T, direction="INVERSE"))
         return lonlat_of(self.map(xy), self.origin)
+
+    @property
+    def _projection(self):
+        import pyproj
+        return pyproj.Transformer.from_crs("OGC:CRS84", self.crs, always_xy=True)
 
     def metres(self, degrees):
         """Metres of the case, [n, 2], from longitude and latitude."""
+        if self.crs:
+            there = self._projection.transform(*np.asarray(degrees, dtype=float).reshape(-1, 2).T)
+            return self.map(np.column_stack(there) - self.origin)
         lib, north, east, out = _library.library(), c_double(), c_double(), []
         for lon, lat in np.radians(np.asarray(degrees, dtype=float).reshape(-1, 2)):
             lib.bt_outline_project(lon, lat, *self.origin, north, east)
@@ -83,8 +97,7 @@ def position(text, place, option):
                            "20.1E,76.5N", USAGE)
         if place.origin is None:
             raise RunError(f"{option} {text}", "is in degrees, but the map of this case has no place",
-                           "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, or write metres of the case",
-                           USAGE)
+                           f"{ORIGIN}, or write metres of the case", USAGE)
         values = dict(zip(sides, (number(part[:-1], "", option) for part in parts)))
         degrees = [values.get("E", -values.get("W", 0.0)), values.get("N", -values.get("S", 0.0))]
         if abs(degrees[0]) > 360 or abs(degrees[1]) > 90:
@@ -134,8 +147,8 @@ def no_go_file(path, place):
         raise RunError(path, f"its coordinates are {crs}", f"convert it with ogr2ogr -t_srs EPSG:4326, or give metres "
                        f"east and north of x = y = 0 the crs {local}", CASE)
     if crs != local and place.origin is None:
-        raise RunError(path, "is in degrees, but the map of this case has no place", "set ice.origin_lon and "
-                       f"ice.origin_lat, or give the file metres and the crs {local}", CASE)
+        raise RunError(path, "is in degrees, but the map of this case has no place",
+                       f"{ORIGIN}, or give the file metres and the crs {local}", CASE)
     return [place.map(ring) if crs == local else place.metres(ring) for ring in rings]
 
 
@@ -275,14 +288,21 @@ def checked(values):
                        "no map of it", "set domain.ends to open or wall", CASE)
 
 
-def place_of(path, sets):
-    """The Place of a case. Raises CaseError."""
-    return _place(Case(path, dict(text.partition("=")[::2] for text in sets)))
+def floes_of(program, case, values, folder):
+    """The file that holds the floes of a case. Raises RunError."""
+    return Path(case.parent, values["ice.field"]) if values["ice.field"] else field(program, case, folder)
 
 
-def _place(values):
-    origin = values["ice.origin_lon"], values["ice.origin_lat"]
-    return Place(values["domain.frame"] == "geographic", None if None in origin else origin)
+def place_of(values, file):
+    """The Place of a case, from the file of its floes, or from its own keys if the file gives none."""
+    with h5py.File(file) as f:
+        found = dict(f["floes"].attrs)
+    north_first, keys = values["domain.frame"] == "geographic", (values["ice.origin_lon"], values["ice.origin_lat"])
+    if "crs" in found:
+        return Place(north_first, (float(found["origin_east"]), float(found["origin_north"])), plain(found["crs"]))
+    if "origin_lon" in found:
+        keys = tuple(map(float, np.radians([found["origin_lon"], found["origin_lat"]])))
+    return Place(north_first, None if None in keys else keys)
 
 
 def of(program, case, folder, ramp=None, no_go=(), width=None):
@@ -290,9 +310,9 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     Raises RunError, CaseError."""
     values = Case(case)
     checked(values)
-    place = _place(values)
+    field_file = floes_of(program, case, values, folder)
+    place = place_of(values, field_file)
     areas = [polygon for file in no_go for polygon in no_go_file(file, place)]
-    field_file = Path(case.parent, values["ice.field"]) if values["ice.field"] else field(program, case, folder)
     with Simulation(Case(case, reading(values, field_file)), threads=1) as sim:
         body, motion, ice = sim.towed, sim.motions, sim.thicknesses > 0
         outlines = [sim.outline(i) for i in range(sim.n_bodies)]

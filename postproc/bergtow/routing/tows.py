@@ -2,12 +2,15 @@
 """Routes as cases, their tows through the members of the map, and the outcome of each tow.
 
 A route becomes a separate case: the path of the body (tow.mode speed) or of the towing end, tow.speed or tow.programme,
-and run.duration. In a steady turn the line carries the drag F along the path and the centripetal force across it, so it
-points inwards of the tangent by delta, tan(delta) = m kappa V² / F, with the mass m including added mass and the
-curvature kappa; then R_end² = R² - 2 R L sin(delta) + L². The end is placed accordingly at body + L (cos(delta) t +
-sin(delta) n): for a light body this is the inverse of the tractrix. kappa is smoothed over the length of the line,
-because a body cannot follow a jump in it; the simulation shows how the tow responds. Rejected: the tractrix alone, with
-which an iceberg of 3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
+and run.duration. Speeds of a route are through the ice, those of a case over the ground: where the ice drifts, a
+programme brings the tow to each point of its path at the planned time.
+
+In a steady turn the line carries the drag F along the path and the centripetal force across it, so it points inwards of
+the tangent by delta, tan(delta) = m kappa V² / F, with the mass m including added mass and the curvature kappa; then
+R_end² = R² - 2 R L sin(delta) + L². The end is placed accordingly at body + L (cos(delta) t + sin(delta) n): for a
+light body this is the inverse of the tractrix. kappa is smoothed over the length of the line, because a body cannot
+follow a jump in it; the simulation shows how the tow responds. Rejected: the tractrix alone, with which an iceberg of
+3e8 kg on 600 m of line swings out of a turn of 800 m by 150 m.
 
 The goal is reached where the body comes within ARRIVED of its width, at the moment when it is nearest. All numbers of a
 tow are for the time up to then, or to its end if the goal is missed.
@@ -16,15 +19,16 @@ from dataclasses import dataclass, field
 
 from bergtow.errors import CASE, RunError
 from bergtow.result.run import least
-from bergtow.routing import apart
+from bergtow.routing import apart, planner
 from bergtow.study.runs import CaseRuns
 
 import numpy as np
 
 ARRIVED = 1.0        # body widths from the goal
 LONGER = {"speed": 1.05, "line": 1.15, "thrust": 1.6}  # run.duration / the predicted time; a vessel may be slowed down
-PEAK = 99            # percentile of the step means that counts as peak
+PEAK = 99            # percentile of the step means after the ramp that counts as peak
 STRAIGHT = 5e-3      # body widths: how far a polyline may deviate from a path
+FINE = 1e-4          # the same of the path of a body whose speed is prescribed
 FRAMES = 150         # of the one tow per route that a page replays
 TOUCH = 1e-3         # body widths: counts as contact with a no-go area
 
@@ -40,6 +44,7 @@ class Candidate:
     keys: dict = field(default_factory=dict)  #: keys of its case, as texts
     track: np.ndarray = None                  #: [m, 2] planned track of the body over the ground, m
     tug: np.ndarray = None                    #: [m, 2] of the towing end, or None
+    swath: np.ndarray = None                  #: [k, 2] outline of what the body sweeps over the ground, m
     points: np.ndarray = None                 #: [k, 2] waypoints of the case, m
 
     @property
@@ -70,17 +75,32 @@ def simplified(xy, off):
     return xy[sorted(keep)]
 
 
-def pairs(points):
-    return "[" + ", ".join(f"[{a:.10g}, {b:.10g}]" for a, b in points) + "]"
+def polyline(track, situation):
+    """Points [k, 2] of the path that a case gives for a track [n, 2], m."""
+    return simplified(track, (FINE if situation.mode == "speed" else STRAIGHT) * situation.hull.width)
 
 
-def programme(legs, ramp):
-    """[(time s, speed m/s)] of a tow at the speeds of its legs: from rest, and from leg to leg. A change of speed takes
-    the share of the ramp that it is of the largest speed."""
-    speeds, lengths = legs["speed"].astype(float), legs["length"].astype(float)
-    top, out, time, at = speeds.max(), [(0.0, 0.0)], 0.0, 0.0
-    for v, length in zip(speeds, lengths):
-        change = ramp * abs(v - at) / top
+def pairs(points, text="{:.10g}".format):
+    return "[" + ", ".join(f"[{text(a)}, {text(b)}]" for a, b in points) + "]"
+
+
+def legs_of(route, track, time, situation):
+    """[(length m, speed m/s)] over the ground: of a route, or, where the ice drifts, of its track [n, 2], m, at the
+    times [n], s, to within STRAIGHT."""
+    if not any(situation.drift):
+        return [(float(length), float(v)) for length, v in zip(route.legs["length"], route.legs["speed"])]
+    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(track, axis=0).T)))
+    mean = way[-1] / time[-1]
+    at, way = simplified(np.column_stack([mean * time, way]), STRAIGHT * situation.hull.width).T
+    return [(float(length), float(mean * length / step)) for length, step in zip(np.diff(way), np.diff(at)) if length]
+
+
+def programme(legs, ramp, start=(0.0, 0.0)):
+    """[(time s, speed m/s)] of a tow at the speeds of its legs [(length m, speed m/s)], from a time and a speed on. A
+    change of speed takes the share of the ramp, s, that it is of the largest speed."""
+    top, out, (time, at) = max(v for _, v in legs), [start], start
+    for length, v in legs:
+        change = ramp * abs(v - at) / top * (1 + 1e-9)  # rounded, it is no steeper than the ramp
         way = change * (v + at) / 2
         if change > 0:
             time += change
@@ -91,8 +111,13 @@ def programme(legs, ramp):
     return out
 
 
+def paced(programme, end=np.inf):
+    """Keys of a programme: tow.speed must be its largest speed up to the end of the run, s."""
+    return {"tow.programme": pairs(programme, repr), "tow.speed": f"{max(v for t, v in programme if t <= end)!r} m/s"}
+
+
 def tug_track(route, situation):
-    """[m, 2] track of the towing end in the frame of the ice."""
+    """[m, 2] track of the towing end in the frame of the ice, and [n] of bool: the points of the route it is of."""
     s = situation
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y))))
     new = np.append(True, np.diff(way) > 1e-9 * way[-1])
@@ -111,52 +136,60 @@ def tug_track(route, situation):
     return np.column_stack([x + s.line * np.cos(heading + delta), y + s.line * np.sin(heading + delta)]), new
 
 
-def candidate(name, label, route, speed, situation):
-    """The case of a route. speed: m/s, NaN: as set by its legs."""
+def led(route, situation):
+    """([m, 2], [m]): track over the ground, m, of the body, or of the end that pulls it, and its times, s."""
     s = situation
-    by_legs = not np.isfinite(speed)
-    time = route.time if by_legs else np.append(0, np.cumsum(np.hypot(np.diff(route.x), np.diff(route.y)))) / speed
-    moved = np.outer(time, s.drift)
-    body = np.column_stack([route.x, route.y]) + moved
-    c = Candidate(name, label, route, speed, {}, body)
     if s.mode == "speed":
-        corners, radii = np.asarray(route.waypoints), np.asarray(route.radii)
-        if any(s.drift):
-            nearest = [int(np.argmin(np.hypot(route.x - x, route.y - y))) for x, y in corners]
-            corners, radii = corners + moved[nearest], 0.8 * radii
-        turns = radii[:-1][radii[:-1] > 0]
-        c.points = corners
-        c.keys = {"tow.waypoints": pairs(corners)} | ({"tow.turn_radius": f"{0.999 * turns.min():.10g} m"}
-                                                      if len(turns) else {})
+        track, time = np.column_stack([route.x, route.y]), route.time
     else:
-        c.tug, new = tug_track(route, s)
-        c.tug += moved[new]
-        c.points = simplified(c.tug, STRAIGHT * s.hull.width)[1:]
-        c.keys = {"tow.waypoints": pairs(c.points)}
-    if by_legs:
-        points = programme(route.legs, s.ramp)
+        track, new = tug_track(route, s)
+        time = route.time[new]
+    return track + np.outer(time, s.drift), time
+
+
+def candidate(name, label, route, situation):
+    """The case of a route, at the speeds of its legs."""
+    s = situation
+    speed = float(route.legs["speed"][0]) if len(set(route.legs["speed"].tolist())) == 1 else np.nan
+    body = np.column_stack([route.x, route.y]) + np.outer(route.time, s.drift)
+    course = np.arctan2(route.speed * np.sin(route.heading) + s.drift[1],
+                        route.speed * np.cos(route.heading) + s.drift[0])
+    c = Candidate(name, label, route, speed, {}, body, swath=planner.swath(body, course, s.hull.width))
+    track, time = led(route, s)
+    if s.mode == "speed" and not any(s.drift):
+        turns = route.radii[:-1][route.radii[:-1] > 0]
+        c.points = route.waypoints
+        c.keys = {"tow.turn_radius": f"{0.999 * turns.min():.10g} m"} if len(turns) else {}
+    else:  # where the ice drifts, an arc through it is none over the ground
+        c.points = polyline(track, s)[1:]
+    c.tug = None if s.mode == "speed" else track
+    c.keys["tow.waypoints"] = pairs(c.points)
+    dt = s.values["run.dt"]
+    if any(s.drift) or not np.isfinite(speed):
+        points = programme(legs_of(route, track, time, s), max(s.ramp, dt))
         total = points[-1][0]
-        c.keys["tow.programme"] = pairs(points)
+        c.keys |= paced(points)
     else:
         total = route.length / speed + s.ramp / 2
-        c.keys |= {"tow.speed": f"{speed:.10g} m/s", "tow.ramp": f"{s.ramp:.10g} s"}
-    dt = s.values["run.dt"]
+        c.keys |= {"tow.speed": f"{speed!r} m/s", "tow.ramp": f"{s.ramp!r} s"}
     c.keys["run.duration"] = f"{dt * np.ceil(LONGER[s.mode] * total / dt):.10g} s"
     c.keys["output.window_start"] = "-1 s"
     return c
 
 
-def candidates(routes, speeds, situation):
-    """Every route at every speed, and also at the speeds of its legs if these differ."""
+def candidates(routes, speeds, situation, at_speed):
+    """Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ.
+    at_speed(route, m/s): the route at that speed, or None."""
     out, k = [], 0
     for route in routes:
         k += route.kind != "straight"
         name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
         for speed in speeds:
             more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
-            out.append(candidate(name + more[0], label + more[1], route, speed, situation))
+            if same := at_speed(route, speed):
+                out.append(candidate(name + more[0], label + more[1], same, situation))
         if len(set(route.legs["speed"].tolist())) > 1:
-            out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, np.nan, situation))
+            out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, situation))
     return out
 
 
@@ -228,17 +261,18 @@ def outcome(run, c, goal, situation, force_limit=np.inf):
         along = np.sum(step * line, axis=1) / np.hypot(*line.T)
     there = np.isfinite(force) & np.isfinite(along)  # excludes the time after the line has parted
     work = float(np.sum((force * along)[there]))
-    steady = there & (time[:n] > s.ramp)
-    some = force[steady if steady.any() else there]
-    peak = float(np.percentile(some, PEAK)) if len(some) else np.nan
+    largest = float(np.max(force[there])) if there.any() else np.nan
+    late = there & (time[:n] > s.ramp)  # without the force that accelerates the body
+    late = late if late.any() else there
+    force, dt = force[late], dt[late]
     body = np.column_stack([xy, run["body_yaw"]])[:n]
     off = apart.to_edges(xy[:n], np.vstack([c.track, c.track[::-1]]))
     touch = apart.least(body, s.outline, s.no_go, TOUCH * s.hull.width)
     return {"arrived": end is not None, "time": float(time[n - 1]) if end is not None else np.nan,
-            "work": work, "length": float(np.sum(np.hypot(*step.T))), "peak": peak,
-            "largest": float(np.max(force[there])) if there.any() else np.nan,
-            "mean_force": float(np.sum((force * dt)[there]) / np.sum(dt[there])) if there.any() else np.nan,
-            "limit_exceeded": bool(peak > force_limit), "slack": bool(s.mode != "speed" and np.any(some <= 0)),
+            "work": work, "length": float(np.sum(np.hypot(*step.T))), "largest": largest,
+            "peak": float(np.percentile(force, PEAK)) if len(force) else np.nan,
+            "mean_force": float(np.sum(force * dt) / np.sum(dt)) if len(force) else np.nan,
+            "limit_exceeded": largest > force_limit, "slack": bool(s.mode != "speed" and np.any(force <= 0)),
             "parted": any(e["kind"] == "line_broken" for e in run.events),
             "no_go_contact": bool(touch <= TOUCH * s.hull.width), "off_track": float(off.max()),
             "missed_by": float(to_goal(xy, goal).min()), "no_load": bool(np.isnan(run["ice_resistance"][:n]).any()),
