@@ -351,7 +351,7 @@ def test_what_is_refused(tmp_path):
     case = changed(THRUST, ice__outlines="floes.geojson", ice__outlines_crs="frame", ice__concentration=None,
                    ice__size=None)
     assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=3)
-    assert "80 %: is not above 0 and at most" in found_in(tmp_path, THRUST, "--resolution", "80 %", code=2)  # but is read
+    assert "80 %: is not above 0 and at most" in found_in(tmp_path, THRUST, "--resolution", "80 %", code=2)  # read
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
     assert "4 is not a whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
     assert "each field has its own seed" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
