@@ -240,7 +240,7 @@ def test_commands_that_make_runs(tmp_path):
     for name, binary in (("plain", BERGTOW), ("other", str(program))):
         def made(script, *words):
             return script_copy.called([script, *words], tmp_path, environment()
-                                      | {"BERGTOW": binary, "OMP_NUM_THREADS": "1"}, 300)
+                                      | {"BERGTOW": binary, "OMP_NUM_THREADS": "1"}, 300, drawn=True)
         whole = made("converge", "case.yml", "-o", name, "--vary", "tolerance", "--jobs", "2")
         failed = made("converge", "fails.yml", "-o", f"{name}-fails", "--vary", "dt", "--jobs", "1")
         spent = made("converge", "case.yml", "-o", f"{name}-spent", "--vary", "dt", "--jobs", "1",
