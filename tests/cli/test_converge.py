@@ -110,7 +110,7 @@ def test_a_window_whose_runs_fail_leaves_the_other_rows(monkeypatch):
             raise RunError(Path("out/case/f021"), "a run of case failed: no sound state", "mend the case", 5)
         return True
     study = SimpleNamespace(there=failed, folder=Path("out"), end=np.inf, made=0)
-    monkeypatch.setattr(converge, "varied", lambda *a: {"dt": [{"name": "dt", "judged": "none"}]})
+    monkeypatch.setattr(converge, "varied", lambda *a: {"dt": [{"name": "dt", "judged": "none", "fields": 4}]})
     monkeypatch.setattr(converge, "window", lambda study, margin: study.there("case", 8, {}))
     rows = converge.converge(study, ["dt", "window"], 0.1)
     assert [(row["name"], row["judged"]) for row in rows] == [("dt", "none"), ("window", "open")]

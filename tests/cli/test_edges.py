@@ -192,7 +192,7 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
     def said(*words):
         return script("capability", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
     for words, wrong in ((("--resolution", "0"), "--resolution 0: is not above 0 and at most the range"),
-                         (("--resolution", "1 m"), "--resolution 1 m: \"m\" after the number; give a plain number"),
+                         (("--resolution", "1 m"), "--resolution 1 m: m is the unit of a length, but this is a ratio; use %"),
                          (("--speed", "0 m/s"), "--speed: 0 m/s is not above zero"),
                          (("--speed", "3 m"), "--speed: 3 m: m is the unit of")):
         done = said(*words)
