@@ -74,12 +74,8 @@ bool bt_comm_any(const bt_comm *comm, bool value);
 /// Collective. Returns when all ranks have called it; meanwhile the cores are free for the ranks that still work.
 void bt_comm_rest(const bt_comm *comm);
 
-/// Wait for n requests, one after the other: gcc takes MPI_STATUSES_IGNORE, the address 1 in MPICH, for an array of
-/// size 0 to which MPI_Waitall writes.
-static inline void bt_comm_wait(int n, MPI_Request *request)
-{
-    for (int i = 0; i < n; i++) MPI_Wait(&request[i], MPI_STATUS_IGNORE);
-}
+/// Wait for n requests; if it takes long, the core is free for other work meanwhile.
+void bt_comm_wait(int n, MPI_Request *request);
 
 /// Collective. Sums, largest values and bitwise ors of all ranks in one message. Sums are exact and pass `bad` on; NaN
 /// counts as the largest value. The result is the same on all ranks, for any distribution of the terms. NULL if n is 0.

@@ -73,7 +73,6 @@ def test_floes_stay_in_the_domain_however_far_they_go_in_a_step(tmp_path):
     np.testing.assert_allclose(np.diff(np.sort((x - x[:, :1]) % 200)), 50, atol=1e-6)
 
 
-@pytest.mark.ranks
 def test_a_place_is_taken_on_all_ranks_or_on_none(tmp_path):
     """Red when only ranks that hold the body look for what stands there: on two ranks it is put into another one."""
     path = write_case(tmp_path, changed(PAIR, run={"dt": 1, "duration": 60}, domain={"length": 2000}, floes=[
@@ -192,7 +191,7 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
     def said(*words):
         return script("capability", path, "-o", tmp_path / "out", "--budget", "0.0001", *words, cwd=tmp_path)
     for words, wrong in ((("--resolution", "0"), "--resolution 0: is not above 0 and at most the range"),
-                         (("--resolution", "1 m"), "--resolution 1 m: m is the unit of a length, but this is a ratio; use %"),
+                         (("--resolution", "1 m"), "--resolution 1 m: m is the unit of a length, but this is a ratio"),
                          (("--speed", "0 m/s"), "--speed: 0 m/s is not above zero"),
                          (("--speed", "3 m"), "--speed: 3 m: m is the unit of")):
         done = said(*words)
