@@ -69,24 +69,34 @@ while read -r what; do
     cat "$count"
 done <"$dir/list" >"$dir/counts"
 
+# tested NAME MARKERS ARGUMENTS...: leaves NAME.log, and "passed failed skipped" in NAME.count
+tested() {
+    log=$dir/$1.log
+    count=$dir/$1.count
+    markers="not slow and $2"
+    shift 2
+    ${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE --durations=25 -m "$markers" "$@" >"$log" 2>&1
+    code=$?
+    p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)
+    f=$(sed -n 's/.*\b\([0-9][0-9]*\) failed.*/\1/p' "$log" | tail -1)
+    e=$(sed -n 's/.*\b\([0-9][0-9]*\) error.*/\1/p' "$log" | tail -1)
+    s=$(sed -n 's/.*\b\([0-9][0-9]*\) skipped.*/\1/p' "$log" | tail -1)
+    f=$((${f:-0} + ${e:-0}))
+    if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
+    echo "${p:-0} $f ${s:-0}" >"$count"
+}
+# Ranks that wait for one another want the cores: with other tests beside them they take ten times as long.
+# shellcheck disable=SC2046 # one word a file
+tested ranks ranks tests/parallel $(grep -l 'mark\.ranks' tests/cli/test_*.py)
 # Those that take longest first: a file stays with one worker, and one begun last is waited for.
 first='tests/cli/test_\(route\|docs\|design\|converge\|properties\|random_cases\|at_least\)\.py'
 files=$(printf '%s\n' tests/cli/test_*.py | grep "$first"
-    printf '%s\n' tests/parallel/test_*.py tests/cli/test_*.py | grep -v "$first")
+    printf '%s\n' tests/parallel tests/cli/test_*.py | grep -v "$first")
 # one more than there are cores: what waits for a signal, a lock or a limit of time leaves a core to others
-log=$dir/python.log
 # shellcheck disable=SC2086 # one word a file
-${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE --durations=40 -m "not slow" -n $((workers + 1)) \
-    --dist loadfile $files >"$log" 2>&1
-code=$?
-p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)
-f=$(sed -n 's/.*\b\([0-9][0-9]*\) failed.*/\1/p' "$log" | tail -1)
-e=$(sed -n 's/.*\b\([0-9][0-9]*\) error.*/\1/p' "$log" | tail -1)
-s=$(sed -n 's/.*\b\([0-9][0-9]*\) skipped.*/\1/p' "$log" | tail -1)
-f=$((${f:-0} + ${e:-0}))
-if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
-echo "${p:-0} $f ${s:-0}" >>"$dir/counts"
-cat "$log"
+tested others "not ranks" -n $((workers + 1)) --dist loadfile $files
+cat "$dir/ranks.log" "$dir/others.log"
+cat "$dir/ranks.count" "$dir/others.count" >>"$dir/counts"
 
 awk '{ p += $1; f += $2; s += $3 } END { printf "%d passed, %d failed, %d skipped\n", p, f, s; exit f > 0 }' \
     "$dir/counts"

@@ -28,6 +28,7 @@ def test_the_list_of_keys_has_them():
     assert "capsule" in said and "capsule" not in call("--list-keys").stdout
 
 
+@pytest.mark.ranks
 def test_a_tow_of_it_and_the_same_again(tmp_path):
     whole, summary, _ = of_run(tmp_path / "whole", CAPSULE)
     resolved = yaml.safe_load((whole / "case.resolved.yml").read_text())

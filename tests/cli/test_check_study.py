@@ -191,6 +191,7 @@ def test_a_case_in_a_pipe_is_still_read(tmp_path):
     assert result.returncode == DONE and "/dev/stdin: valid" in result.stdout
 
 
+@pytest.mark.ranks
 def test_under_mpirun_it_is_said_once(tmp_path):
     alone = checked(tmp_path, STUDY)
     env = environment(OMP_NUM_THREADS=1)

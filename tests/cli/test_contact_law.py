@@ -82,6 +82,7 @@ LINE = changed(resuming.CASE, fender=FENDER, run__duration=9, output__checkpoint
                                            pytest.param(LINE, ((1, 2), (3, 1)), marks=pytest.mark.slow),
                                            pytest.param(WINDOW, ((2, 2), ), marks=pytest.mark.slow)],
                          ids=["line", "line, more layouts", "window"])
+@pytest.mark.ranks
 def test_same_bits_in_every_layout_and_after_a_stop(tmp_path, case, layouts):
     case = changed(case, output__sample_every=3)
     whole, summary, _ = of_run(tmp_path / "whole", case)

@@ -73,6 +73,7 @@ def test_floes_stay_in_the_domain_however_far_they_go_in_a_step(tmp_path):
     np.testing.assert_allclose(np.diff(np.sort((x - x[:, :1]) % 200)), 50, atol=1e-6)
 
 
+@pytest.mark.ranks
 def test_a_place_is_taken_on_all_ranks_or_on_none(tmp_path):
     """Red when only ranks that hold the body look for what stands there: on two ranks it is put into another one."""
     path = write_case(tmp_path, changed(PAIR, run={"dt": 1, "duration": 60}, domain={"length": 2000}, floes=[

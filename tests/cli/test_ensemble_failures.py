@@ -269,6 +269,7 @@ def test_members_that_cannot_be_read(tmp_path):
         assert ensemble(tmp_path).returncode == DONE and (folder / "ensemble.h5").read_bytes() == whole
 
 
+@pytest.mark.ranks
 def test_a_base_case_that_one_rank_cannot_read(tmp_path):
     """Red when the other goes on to share the cores with it: a message about MPI, or a call that hangs."""
     prepare(tmp_path)

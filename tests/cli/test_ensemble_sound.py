@@ -99,6 +99,7 @@ def test_a_damaged_member_is_run_again(quiet, copy, damage):
     assert ensemble(copy).stderr == "" and len(started(copy)) == before + 1
 
 
+@pytest.mark.ranks
 def test_on_two_ranks_damage_is_reported_once(quiet, copy):
     for k, damage in enumerate(("last byte", "summary cut", "record empty")):
         DAMAGES[damage](copy / f"all/members/c00{1 + k // 2}-r00{1 + k % 2}")

@@ -28,7 +28,8 @@ def scenarios(tmp_path_factory):
     return get
 
 
-@pytest.mark.parametrize("name", quick(SCENARIOS, "run", "resume", "run --force", "field", "ensemble", "2 ranks"))
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.ranks) if n == "2 ranks" else n for n in quick(
+    SCENARIOS, "run", "resume", "run --force", "field", "ensemble", "2 ranks")])
 def test_nothing_is_lost(scenarios, name):
     scenario, calls = scenarios(name)
     wrong = []
@@ -108,6 +109,7 @@ def test_what_is_made_stands_in_this_order(scenarios):
     assert names == ["case.resolved.yml.new", "case.resolved.yml", *checkpoint, *later, *later, "summary.json"]
 
 
+@pytest.mark.ranks
 def test_the_other_rank_syncs_its_frames_at_each_checkpoint(scenarios):
     """Two checkpoints and the end: what rank 0 syncs is not what another machine still holds."""
     _, calls = scenarios("2 ranks, the second")

@@ -342,6 +342,7 @@ def test_no_regular_file_is_opened(tmp_path, what, kind):
     assert name.split("/")[-1] in result.stderr and says in result.stderr, result.stderr
 
 
+@pytest.mark.ranks
 def test_nobody_hangs_under_mpirun(tmp_path):
     os.mkfifo(tmp_path / "field.h5")
     path = write_case(tmp_path, READ)

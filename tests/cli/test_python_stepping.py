@@ -239,6 +239,7 @@ except bergtow.BergtowError as error:
     assert go("resume", "left", "right").returncode == 0
 
 
+@pytest.mark.ranks
 def test_two_ranks_have_the_state_of_one(tmp_path):
     case = write_case(tmp_path, changed(SHORT, ice__concentration=0.7))
     script = tmp_path / "ranks.py"
@@ -261,6 +262,7 @@ with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1)
     assert any(int(held) < int(n) for held, n, _ in said)
 
 
+@pytest.mark.ranks
 def test_the_end_after_a_failed_step_has_its_texts_one_a_line(tmp_path):
     """On rank 0, which has those of all. Red when they are one line with question marks."""
     script = tmp_path / "ranks.py"

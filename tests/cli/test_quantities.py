@@ -284,6 +284,7 @@ def test_the_examples_are_what_they_say(tmp_path):
 
 
 @pytest.mark.parametrize("name", quick(CASES, "window"))
+@pytest.mark.ranks
 def test_everything_survives_stop_and_resume(tmp_path, name):
     """Samples of three steps, stopped within one; resumed on other ranks than the whole run has."""
     case = changed(CASES[name][0], output__sample_every=3)

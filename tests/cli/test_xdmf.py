@@ -255,7 +255,7 @@ TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, 
                     tow__speed=0.6, body__x=4, tow__line={"branches": 2}, output__frame_interval=0.5)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.ranks)])
 def test_the_line_of_a_run_that_goes_on(tmp_path, ranks):
     write_case(tmp_path, TWO_LINES)
     mpi = launcher(ranks) if ranks > 1 else []

@@ -9,6 +9,7 @@ import pytest
 
 from harness import BERGTOW, TOW, changed, environment, write_case
 
+pytestmark = pytest.mark.one_rank
 
 #: of glibc, chosen by the processor at the start
 MASKED = "glibc.cpu.hwcaps=-AVX,-AVX2,-AVX512F,-FMA,-FMA4,-ERMS,-SSE4_1,-SSE4_2"

@@ -7,7 +7,7 @@ import pytest
 
 from harness import call, changed, reading, run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.one_rank, pytest.mark.slow]
 
 # Loose enough that no jam decides on the force: in one, a single contact more or less is another history.
 CASE = {

@@ -13,6 +13,7 @@ import pytest
 
 from harness import PRESS, TOW, call, changed, differing, environment, reading, run
 
+pytestmark = pytest.mark.one_rank
 
 ROWS_FOR_THREADS, BODIES_FOR_THREADS = 3000, 2000
 

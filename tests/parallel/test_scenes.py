@@ -22,8 +22,10 @@ LEFT_OUT = {"run.threads": "said by the layout", "output.progress": "what is pri
 def both():
     """The layouts of each scene. What both must leave is stored, so that make test has one of them."""
     for n, name in enumerate(scenes.SCENES):
-        for k in range(len(scenes.layouts_of(name))):
-            yield pytest.param(name, k, marks=pytest.mark.slow if (n + k) % 2 == 0 else ())
+        for k, layout in enumerate(scenes.layouts_of(name)):
+            alone = all(ranks == 1 for ranks, _ in layout)
+            yield pytest.param(name, k, marks=[m for m, holds in ((pytest.mark.one_rank, alone),
+                                                                  (pytest.mark.slow, (n + k) % 2 == 0)) if holds])
 
 
 @pytest.mark.parametrize("name, layout", both())
@@ -35,6 +37,7 @@ def test_scene_is_what_it_was(tmp_path, name, layout):
                                                 "tests/scenes.py --compare shows how, --record takes it over")
 
 
+@pytest.mark.one_rank
 def test_what_is_stored_is_of_these_scenes():
     """Each by itself: two scenes that leave the same would be one, with a key that has no effect."""
     assert sorted(STORED) == sorted(scenes.SCENES)
@@ -66,6 +69,7 @@ def unused(keys, sections):
             yield key["name"]
 
 
+@pytest.mark.one_rank
 def test_the_scenes_use_every_key():
     """Every key away from its default, and every value of a choice; those of floes by hand, too."""
     p = subprocess.run([BERGTOW, "--list-keys", "--json"], capture_output=True, text=True)
@@ -75,6 +79,7 @@ def test_the_scenes_use_every_key():
     assert list(unused(listed["floe_keys"], [floe for case in cases for floe in case.get("floes", ())])) == []
 
 
+@pytest.mark.one_rank
 def test_the_scenes_use_every_layout():
     pairs = {scenes.layouts_of(name) for name in scenes.SCENES}
     assert all(first != second for first, second in pairs)

@@ -104,6 +104,7 @@ def test_what_is_recorded(alone):
     assert "moving window" in run(r.dir.parent, CASES[name], "--steps", 3, name="short").result.stdout
 
 
+@pytest.mark.one_rank
 def test_what_a_pair_has_crushed_stays_behind(tmp_path):
     """Two floes beside the track, one of which runs into the other, enter together as they were made."""
     squares = [{"shape": "square", "length": 20, "x": 100, "y": 120, "vy": 0.5},
@@ -122,6 +123,7 @@ def test_what_a_pair_has_crushed_stays_behind(tmp_path):
     assert np.all(depth[entered[0]:] == 0)
 
 
+@pytest.mark.one_rank
 def test_open_water_does_not_see_it(tmp_path):
     bare = changed(TOW, ice__concentration=0, body__x=6, run__duration=150, tow__ramp=3)
     still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))
@@ -132,6 +134,7 @@ def test_open_water_does_not_see_it(tmp_path):
                           "/series/window_waiting")) == []
 
 
+@pytest.mark.one_rank
 def test_no_lap_no_difference(tmp_path):
     """What is renewed is far from the body: at first the force is that in a periodic domain, but for the order of the
     contacts, within the tolerance of the solver."""
@@ -143,6 +146,7 @@ def test_no_lap_no_difference(tmp_path):
     np.testing.assert_allclose(still.series("ice_resistance"), moving.series("ice_resistance"), rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.one_rank
 def test_the_resolved_case_is_the_same_case(tmp_path):
     case = changed(LINE, run__duration=20)
     first = run(tmp_path, case, name="first")
@@ -153,6 +157,7 @@ def test_the_resolved_case_is_the_same_case(tmp_path):
     assert run(tmp_path, still.dir / "case.resolved.yml", name="still again").hash == still.hash
 
 
+@pytest.mark.one_rank
 def test_defaults(tmp_path):
     """The body stands where domain.ahead says, domain.ahead is where the body stands, and in the geographic frame the
     window lies about it."""
@@ -169,6 +174,7 @@ def test_defaults(tmp_path):
     np.testing.assert_allclose(check(domain__frame="geographic", tow__direction=180), (0, -15.6, 15.6), atol=0.1)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("changes, text", [
     ({"tow": {"mode": "none"}}, "domain.ends: moving follows a towed body"),
     ({"body": {"shape": "none"}, "tow": None}, "domain.ends: moving follows a towed body"),
@@ -187,12 +193,14 @@ def test_refused(tmp_path, changes, text):
     assert text in result.stderr, result.stderr
 
 
+@pytest.mark.one_rank
 def test_check_tells(tmp_path):
     run(tmp_path, changed(SPEED, run__duration=0.2))
     result = call("check", tmp_path / "case.yml")
     assert result.returncode == DONE and "moving window        the body keeps 15.6 m from its front" in result.stdout
 
 
+@pytest.mark.one_rank
 def test_ice_that_drifts_past_a_body_is_renewed_as_that_which_it_is_towed_through(tmp_path):
     """Red when the window goes by the way over ground: of a body that is held nothing was renewed, and the ice that it
     had opened came back as it was (a thirtieth of the force)."""
