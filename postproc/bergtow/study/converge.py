@@ -23,8 +23,8 @@ is too small where floes jam and too large where nothing happens; a last look at
 with an error of 2 % open while most of the budget was still there.
 
 The intervals do not hold for an effect that few fields feel, such as a jam: n nearly equal pairs have a narrow interval
-wherever the mean of all fields is. "No effect" therefore comes with the share of fields without one, of which n such
-fields are evidence at 95 % (stats/largest.py): 47 % from 4 fields, 91 % from 32. Rejected: no verdict from fewer than
+wherever the mean of all fields is. "No effect" therefore comes with the least share of fields without one that n such
+fields show at 95 % (stats/largest.py): 47 % from 4 fields, 91 % from 32. Rejected: no verdict from fewer than
 29 fields, which would show an effect in a tenth of them, because few budgets allow that many.
 
 A tow that starts at full speed (tow.ramp of 0) is compared with a ramp during which the body moves by its size.
