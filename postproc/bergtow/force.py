@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forces as Python functions, called with arrays of all bodies once per step, and again in a step in which floes split
+"""Forces as Python functions, called with arrays of all bodies once per step, and again if floes split in it
 (bergtow/applied.h)."""
 from __future__ import annotations
 

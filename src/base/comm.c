@@ -314,7 +314,7 @@ enum { TESTS = 5000 };
 // as alone; with this wait 2.3 times. So test TESTS times, for some tenths of a millisecond: most waits within a step
 // are shorter (with 1,000 tests a run alone took 1.14 times as long). Then sleep between tests, at last for `longest`
 // ns.
-static void wait(MPI_Request *request, int tests, long longest)
+static void await(MPI_Request *request, int tests, long longest)
 {
     int there = 0;
     for (long pause = 20000; MPI_Test(request, &there, MPI_STATUS_IGNORE), !there;) {
@@ -326,7 +326,7 @@ static void wait(MPI_Request *request, int tests, long longest)
 
 void bt_comm_wait(int n, MPI_Request *request)
 {
-    for (int i = 0; i < n; i++) wait(&request[i], TESTS, 20000);
+    for (int i = 0; i < n; i++) await(&request[i], TESTS, 20000);
 }
 
 void bt_comm_rest(const bt_comm *comm)
@@ -334,7 +334,7 @@ void bt_comm_rest(const bt_comm *comm)
     if (comm->size == 1) return;
     MPI_Request all;
     MPI_Ibarrier(comm->mpi, &all);
-    wait(&all, 0, 10000000);
+    await(&all, 0, 10000000);
 }
 
 enum { TAG_ITEMS = 90 }; // no other message between two ranks has it (partition/)
@@ -352,7 +352,7 @@ static void exchange(const bt_comm *comm, int rank, const item *out, item *in, i
 
 /// Combine the items of all ranks, in log2(size) exchanges: after each, a rank has those of twice as many ranks. Ranks
 /// beyond a power of two give theirs to another rank before, and take the result from it. other: [n], for messages.
-/// Rejected: MPI_Allreduce, which polls (see wait); MPI_Iallreduce, 2 µs between two ranks of one node, where both
+/// Rejected: MPI_Allreduce, which polls (see await); MPI_Iallreduce, 2 µs between two ranks of one node, where both
 /// others take 0.4 µs.
 static void combine_all(const bt_comm *comm, item *items, item *other, int n)
 {
