@@ -49,6 +49,7 @@ static const row rows[] = {
     {"collisions/panel_blocks", "N", "panel loads summed over blocks of steps", "panel_block panel_load"},
     {"record/entries", "1", "samples in result.h5", "one"},
     {"record/frames", "1", "frames in result.h5", "one"},
+    {"record/law_series", NULL, "added series that are forces of laws", "one"},
     {"record/merged_steps", "1", "steps merged into the sample under way", "one"},
     {"run/frames_due", "1", "frames that are due so far", "one"},
     {"run/unconverged_in_a_row", "1", "steps without convergence one after the other", "one"},

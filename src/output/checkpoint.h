@@ -53,7 +53,7 @@
 //   bt_impacts        S open
 //                     D rule, panels' places
 //                     - contact, closed, collision, largest_quasi_static_load, panels' loads
-//   bt_record         S history, numbers of entries and frames, the present entry
+//   bt_record         S history, numbers of entries and frames, the present entry, names of the forces of laws
 //                     in result.h5: the entries and frames themselves
 //   bt_impact_store   S numbers of rows, panel loads of the present entry and by blocks (src/loads/panel.h)
 //                     in result.h5: the rows

@@ -32,6 +32,7 @@
 
 #define CASE_FILE "case.resolved.yml"
 #define IDENTITY "run" // attribute of the root
+#define LAW_SERIES "record/law_series"
 
 bt_status bt_record_identify(bt_record *record, const char *identity, bt_errors *err)
 {
@@ -134,6 +135,21 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
 
 // --- recorded data ---------------------------------------------------------------------------------------------------
 
+/// Is an added series that the run did not have 0 before? The force of an added law is: a law that has acted must be
+/// there again (src/output/state.c).
+static bool was_zero(const bt_quantity *quantity) { return quantity->of_world == bt_force_of; }
+static bool may_lack(int k) { return k >= bt_n_program_series() && was_zero(bt_series(k)); }
+
+/// Names of the added series that are forces of laws, each between blanks.
+static char *law_series(void)
+{
+    bt_text text;
+    bt_text_begin(&text);
+    for (int k = 0; k < bt_n_added(); k++)
+        if (was_zero(bt_added(k))) fprintf(text.out, " %s ", bt_added(k)->name);
+    return bt_text_end(&text);
+}
+
 /// By name: a resumed program may have its series in another order.
 static const char *merged_name(int k, char name[BT_HISTORY_NAME])
 {
@@ -161,6 +177,9 @@ bt_status bt_record_save(bt_record *record, int64_t n_frames, bt_snapshot *snap,
     // Between two entries the sum is finished: its last value would only make equal states look different.
     for (int k = 0; k < record->n_series && record->n_merged > 0; k++)
         bt_snapshot_add(snap, merged_name(k, name), BT_ITEM_F64, 1, 1, &record->merged[k]);
+    char *of_laws = law_series();
+    if (*of_laws) bt_snapshot_add_text(snap, LAW_SERIES, of_laws);
+    free(of_laws);
     bt_impact_store_save(&record->impacts, snap);
     return record->h5.status;
 }
@@ -187,22 +206,13 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err)
 
 // --- resuming --------------------------------------------------------------------------------------------------------
 
-/// Is an added series that the run did not have 0 before? The force of an added law is: a law that has acted must be
-/// there again (src/output/state.c).
-static bool was_zero(const bt_quantity *quantity) { return quantity->of_world == bt_force_of; }
-static bool may_lack(int k) { return k >= bt_n_program_series() && was_zero(bt_series(k)); }
-
-/// Is it the series of a force, with all values 0 or NaN? A force on the towed body is NaN without a body.
-static bool never_acted(const bt_item *item)
+/// Was the added series `name` the force of a law? A law that has not acted may be left out; one that has is refused by
+/// its own name (src/output/state.c).
+static bool was_of_law(bt_snapshot *snap, const char *name)
 {
-    static const char force[] = "_force";
-    const size_t n = strlen(item->name), own = sizeof force - 1;
-    if (n < own || strcmp(item->name + n - own, force) != 0) return false;
-    for (int64_t k = 0; k < item->n; k++)
-        if (item->type != BT_ITEM_F64 ||
-            !(isnan(((const double *)item->data)[k]) || ((const double *)item->data)[k] == 0))
-            return false;
-    return true;
+    char between[BT_HISTORY_NAME];
+    snprintf(between, sizeof between, " %s ", name);
+    return bt_snapshot_find(snap, LAW_SERIES) && strstr(bt_snapshot_text(snap, LAW_SERIES), between);
 }
 
 /// Forces and quantities that programs have added must be the same as before: a run without one of its forces would be
@@ -216,9 +226,9 @@ static void check_added(bt_snapshot *snap)
         if (!bt_snapshot_find(snap, name) && !was_zero(bt_added(k))) missing = bt_added(k)->name;
     }
     for (int i = 0; i < snap->n && !left_over; i++) {
-        if (strncmp(snap->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || never_acted(&snap->item[i]))
-            continue;
+        if (strncmp(snap->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED))) continue;
         left_over = snap->item[i].name + strlen(BT_HISTORY_ADDED);
+        if (was_of_law(snap, left_over)) left_over = NULL;
         for (int k = 0; k < bt_n_added() && left_over; k++)
             if (!strcmp(bt_added(k)->name, left_over)) left_over = NULL;
     }

@@ -136,7 +136,7 @@ def test_a_quantity_that_was_zero_so_far_is_missed(built, tmp_path):
         assert not f["series/moving_ice"][:].any() and np.isnan(f["series/carried_water_force"][:]).all()
     (tmp_path / "out/summary.json").unlink()
     done = subprocess.run([BERGTOW, "resume", tmp_path / "out"], capture_output=True, text=True)
-    assert done.returncode == 3 and "the run had " in done.stderr, done.stderr
+    assert done.returncode == 3 and "the run had carried_water_force, " in done.stderr, done.stderr
 
 
 def test_a_faulty_case_is_a_message_and_not_the_end(program, tmp_path):
