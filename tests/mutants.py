@@ -324,7 +324,7 @@ MUTANTS = {
          "no rebound is ever lowered"),
         ("islands->share[i] > 0.2 ? 0.5 * islands->share[i] : 0",
          "islands->share[i] > 0.2 ? 0.9 * islands->share[i] : 0", "lowered by less"),
-        ("bt_contacts_unsolved_work(contact, world->stats.residual)", "0", "rounding lowers rebounds"),
+        ("bt_contacts_unsolved_gain(contact, world->stats.residual)", "0", "rounding lowers rebounds"),
         ("        any = 1;\n    }\n    bt_domain_maxima(world, &any, 1);", "        any = 1;\n    }",
          "ranks disagree whether to solve again"),
         ("if (contact->ln[0] + contact->ln[1] == 0 || contact->n == 0) continue;",

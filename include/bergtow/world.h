@@ -62,8 +62,8 @@ typedef struct bt_step_stats {
     bool no_load;            ///< some of these touch the towed body: its load is unbounded
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere, and were reduced
-    double contact_work;     ///< J
-    bool added_energy;       ///< contact_work exceeds 0 by more than residual and rounding explain
+    double contact_work;     ///< Σ λ·½(w1 + w2) from the velocities at the start of the step, J
+    bool added_energy;       ///< contacts gained more over the step without them than residual and rounding explain
     /// numbers of the program's contact laws, in their order (src/contact/law.h): series, with units and meaning there
     double laws[BT_MAX_LAW_NUMBERS];
     double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of added laws

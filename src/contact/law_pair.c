@@ -88,7 +88,30 @@ double bt_law_share(const bt_manifold *manifold, int i, bt_patch patch, const bt
 
 // --- work of its impulses --------------------------------------------------------------------------------------------
 
-// Work of the impulses of a contact, from velocities without and with contacts.
+/// Work of the impulses of a contact on the velocities of its bodies from (fa, fb) to the present ones.
+static double work_from(const bt_world *world, const bt_contact *contact, const bt_vel *fa, const bt_vel *fb)
+{
+    const bt_vel *va = &world->bodies.vel[contact->a], *vb = &world->bodies.vel[contact->b];
+    double work = 0.5 * contact->lt * (bt_tangent_velocity(contact, fa, fb) + bt_tangent_velocity(contact, va, vb));
+    const int n = contact->n > 0 ? contact->n : 1; // sheets have one component here
+    for (int i = 0; i < n; i++)
+        work += 0.5 * contact->ln[i] *
+            (bt_normal_velocity(contact, i, fa, fb) + bt_normal_velocity(contact, i, va, vb));
+    return work;
+}
+
+double bt_contacts_work(const bt_world *world, const bt_contact *contact)
+{
+    const bt_vel *start = world->bodies.vel_start;
+    return work_from(world, contact, &start[contact->a], &start[contact->b]);
+}
+
+double bt_contacts_normal_work(const bt_world *world, const bt_contact *contact, int i)
+{
+    const bt_vel *start = world->bodies.vel_start, *vel = world->bodies.vel;
+    return 0.5 * contact->ln[i] * (bt_normal_velocity(contact, i, &start[contact->a], &start[contact->b]) +
+                                   bt_normal_velocity(contact, i, &vel[contact->a], &vel[contact->b]));
+}
 
 /// Velocity without contacts: U*, plus, for the towed body, the change by the line.
 static bt_vel velocity_without_contacts(const bt_world *world, bt_idx i)
@@ -99,27 +122,13 @@ static bt_vel velocity_without_contacts(const bt_world *world, bt_idx i)
     return v;
 }
 
-double bt_contacts_normal_work(const bt_world *world, const bt_contact *contact, int i)
+double bt_contacts_gain(const bt_world *world, const bt_contact *contact)
 {
     const bt_vel fa = velocity_without_contacts(world, contact->a), fb = velocity_without_contacts(world, contact->b);
-    return 0.5 * contact->ln[i] *
-           (bt_normal_velocity(contact, i, &fa, &fb) + bt_normal_velocity(contact, i, &world->bodies.vel[contact->a],
-                                                                          &world->bodies.vel[contact->b]));
+    return work_from(world, contact, &fa, &fb);
 }
 
-double bt_contacts_work(const bt_world *world, const bt_contact *contact)
-{
-    const bt_vel fa = velocity_without_contacts(world, contact->a), fb = velocity_without_contacts(world, contact->b);
-    const bt_vel *va = &world->bodies.vel[contact->a], *vb = &world->bodies.vel[contact->b];
-    double work = 0.5 * contact->lt * (bt_tangent_velocity(contact, &fa, &fb) + bt_tangent_velocity(contact, va, vb));
-    const int n = contact->n > 0 ? contact->n : 1; // sheets have one component here
-    for (int i = 0; i < n; i++)
-        work += 0.5 * contact->ln[i] *
-            (bt_normal_velocity(contact, i, &fa, &fb) + bt_normal_velocity(contact, i, va, vb));
-    return work;
-}
-
-double bt_contacts_unsolved_work(const bt_contact *contact, double residual)
+double bt_contacts_unsolved_gain(const bt_contact *contact, double residual)
 {
     return (residual + 1e-12) * (fabs(contact->ln[0]) + fabs(contact->ln[1]) + fabs(contact->lt));
 }

@@ -57,16 +57,21 @@ static inline bt_memory bt_law_names(const bt_world *world, const bt_pair *pair,
                        .law = (uint16_t)law};
 }
 
-/// Work of the impulses of the contact in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
-/// the work of prescribed motion. w* is the velocity without contacts, with the tow line's impulse: of simultaneous
-/// impulses the line's counts first, or its pull into the ice would count as work of the ice.
+/// Work of the impulses of the contact in this step, Σ λ·½(w1 + w2), J, from the relative velocity at its start. With
+/// the work of loads and line taken alike, Σ J·½(U1 + U2), it adds up to the change of kinetic energy. Taken from the
+/// velocity after the loads (bt_contacts_gain), it would count ½ λᵀWλ of a contact at rest whose impulse only bears them.
 double bt_contacts_work(const bt_world *world, const bt_contact *contact);
 
 /// The part of that work done by the normal impulse of point i, J.
 double bt_contacts_normal_work(const bt_world *world, const bt_contact *contact, int i);
 
-/// The most work that the contact can have done in a step with this residual, m/s, J: an exact solution has λ·w <= 0,
-/// and λᵀ½(w* + w2) = λᵀw2 − ½ λᵀWλ <= Σ |λ| residual.
-double bt_contacts_unsolved_work(const bt_contact *contact, double residual);
+/// Energy that the impulses of the contact add to the step without contacts, Σ λ·½(w* + w2), J; never positive in an
+/// exact solution. w* is the velocity without contacts, with the tow line's impulse: of simultaneous impulses the line's
+/// counts first, or its pull into the ice would count as a gain by the ice.
+double bt_contacts_gain(const bt_world *world, const bt_contact *contact);
+
+/// The most that the contact can have gained in a step with this residual, m/s, J: an exact solution has λ·w <= 0, and
+/// λᵀ½(w* + w2) = λᵀw2 − ½ λᵀWλ <= Σ |λ| residual.
+double bt_contacts_unsolved_gain(const bt_contact *contact, double residual);
 
 #endif

@@ -36,7 +36,7 @@ static const bt_total totals[] = {
         "residuals of contacts that were taken, sum over the steps"),
     TOTAL(F64, sum_projected, SUM, position_updates, NULL, "1",
         "updates of contacts by the position projection, sum over the steps"),
-    TOTAL(F64, contact_work, SUM, contact_work, "contact_work_j", "J", "work of the contact impulses"),
+    TOTAL(F64, contact_work, SUM, contact_work, "contact_work_j", "J", "work of the contact impulses on the velocities from the start to the end of a step"),
     TOTAL(F64, max_overlap, MAX, overlap, "max_overlap_m", "m", "deepest overlap of two bodies"),
     TOTAL(F64, max_momentum_residual, MAX, momentum_residual, "momentum_residual", "1",
         "largest |momentum change - external impulse| / momentum exchanged of a step"),

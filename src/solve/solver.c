@@ -57,7 +57,7 @@ bool bt_restitution_lower(bt_world *world)
             // work lost by sheets must not hide energy gained by rebounds
             if (contact->ln[0] + contact->ln[1] == 0 || contact->n == 0) continue;
             bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
-                       bt_contacts_work(world, contact) - bt_contacts_unsolved_work(contact, world->stats.residual));
+                       bt_contacts_gain(world, contact) - bt_contacts_unsolved_gain(contact, world->stats.residual));
         }
     }
     bt_islands_add(world, islands);

@@ -125,9 +125,9 @@ static void advance(bt_world *world)
     bt_tow_advance(world);
 }
 
-#define WORK_ROUNDING 1e-10 // share of the kinetic energy: larger work of the contacts is not rounding
+#define WORK_ROUNDING 1e-10 // share of the kinetic energy: a larger gain by the contacts is not rounding
 
-enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, UNSOLVED, ENERGY, POINTS, ACTIVE,
+enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, GAIN, ENERGY, POINTS, ACTIVE,
        N_BALANCE };
 
 /// Momentum gained by bodies, and impulses received from bodies of infinite mass, separately. An energy with which the
@@ -162,7 +162,8 @@ static void balance_cell(bt_world *world, bt_idx k, const void *context, bt_tota
         bt_sum_add(&totals->sum[EXCHANGED], contact->n > 0 ? normal
                                                            : sqrt(normal * normal + contact->lt * contact->lt));
         bt_sum_add(&totals->sum[WORK], bt_contacts_work(world, contact));
-        bt_sum_add(&totals->sum[UNSOLVED], bt_contacts_unsolved_work(contact, world->stats.residual));
+        bt_sum_add(&totals->sum[GAIN],
+                   bt_contacts_gain(world, contact) - bt_contacts_unsolved_gain(contact, world->stats.residual));
         double jx, jy;
         if (!bt_impulse_from_outside(contact, bodies->inv, &jx, &jy)) continue;
         bt_sum_add(&totals->sum[APPLIED_X], jx);
@@ -196,7 +197,7 @@ static void balance(bt_world *world)
     st->momentum_residual = scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
     st->contact_work = x[WORK];
     st->kinetic_energy = x[ENERGY];
-    st->added_energy = x[WORK] - x[UNSOLVED] > WORK_ROUNDING * x[ENERGY];
+    st->added_energy = x[GAIN] > WORK_ROUNDING * x[ENERGY];
     st->n_points = (int64_t)x[POINTS];
     st->n_active = (int64_t)x[ACTIVE];
     st->overlap = all.most;

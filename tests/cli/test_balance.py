@@ -279,7 +279,7 @@ def test_momentum_every_step(balanced):
 @pytest.mark.parametrize("restitution, friction", quick([(0, 0), (0, 0.3), (0.5, 0), (0.5, 0.3), (1, 0), (1, 0.3)],
                                                         (0, 0), (0.5, 0.3), (1, 0.3)))
 def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
-    """With an exact solution λᵀ(w* + w2)/2 <= 0. A residual ε leaves up to Σλ ε: here 1.3e-8 m/s times some 100 N s.
+    """With an exact solution λᵀ(w* + w2)/2 <= 0; a residual ε leaves up to Σλ ε.
 
     Newton's law of restitution alone gains energy where several contacts, or friction, act at once (Kane's paradox).
     """
@@ -287,15 +287,40 @@ def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
                               solver__tolerance=1e-7, ice__concentration=0.4, solver__max_sweeps=3000))
     work = r.series("contact_work")
     assert work.min() < -1e-3, "nothing collided"
-    assert work.max() <= 1e-5
+    assert not r.series("added_energy").any()
     assert r.summary["contact_work_j"] == pytest.approx(work.sum(), rel=1e-12)
+
+
+HELD = {"run": {"dt": 5, "duration": 600},
+        "domain": {"frame": "geographic", "length": 1000, "width": 1000, "ends": "open", "sides": "open"},
+        "ice": {"concentration": 0, "thickness": 0.3, "size": 30}, "air": {"wind_x": 20}, "body": {"shape": "none"},
+        "floes": [{"shape": "rectangle", "length": 100, "width": 300, "x": 65, "y": 0, "fixed": True},
+                  {"shape": "square", "length": 30, "x": 0, "y": 0, "vx": 0, "vy": 0}],
+        "solver": {"reference_speed": 0.3}}
+
+
+def test_a_contact_at_rest_does_no_work(tmp_path):
+    """Red: work from the velocity after the loads, ½ λᵀWλ in each step of a floe that wind presses on fixed ice."""
+    r = run(tmp_path, HELD)
+    assert r.series("contacts").min() > 0 and abs(r.summary["contact_work_j"]) < 1e-6
+
+
+def test_the_work_of_crushing_is_load_times_depth(tmp_path):
+    """A berg that a line draws slowly into fixed ice: its load hardly changes. Red as above: 17 % too much."""
+    r = run(tmp_path, changed(HELD, run__duration=1500, air=None, ice={"concentration": 0, "thickness": 1, "size": 30,
+                                                                      "crushing": {"pressure": 10e3}},
+                              floes=[{"shape": "rectangle", "length": 100, "width": 300, "x": 90.1, "y": 0,
+                                      "fixed": True}],
+                              body={"shape": "square", "length": 80, "draft": 60, "x": 0, "y": 0},
+                              tow={"mode": "line", "speed": 0.02, "line_length": 400, "line_stiffness": 20e6,
+                                   "line_damping": 1e6, "ramp": 100}))
+    load = r.series("ice_resistance")[-1]
+    assert r.summary["crushed_work_j"] == pytest.approx(load * r.summary["max_crushed_depth_m"], rel=0.01)
 
 
 def test_work_that_is_positive_is_reported(tmp_path):
     r = run(tmp_path, changed(TOW, ice__restitution=1, solver__tolerance=1e-6))
-    work, energy, added = r.series("contact_work", "kinetic_energy", "added_energy")
-    gained = int(np.sum(added))
-    assert np.all(work[added > 0] > 1e-10 * energy[added > 0])
+    gained = int(np.sum(r.series("added_energy")))
     assert r.summary["positive_work_steps"] == gained
     assert bool(warned(r, f"in {gained} of 300 steps the contacts added energy")) == (gained > 0)
 
