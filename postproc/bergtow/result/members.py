@@ -12,7 +12,7 @@ its seal is intact. A member whose files do not match the record of its end (res
 enters no number until `bergtow ensemble` has run it again. Raises RunError.
 """
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -235,6 +235,16 @@ class Members:
     def folder(self, m):
         return self.path / "members" / self.name[m]
 
+    def each(self, rows, measure):
+        """Yield measure(run) for these members, one after the other; those that cannot be read are left out."""
+        for m in rows:
+            try:
+                with Run(self.folder(m)) as run:
+                    found = measure(run)
+            except RunError:
+                continue
+            yield found
+
     def has(self, name):
         """Does ensemble.h5 hold this series of the members?"""
         return name in self._series
@@ -391,15 +401,8 @@ class Members:
     @cached_property
     def builds(self):
         """A sentence on members of different builds, or of one that cannot be reproduced; "" if there are none."""
-        builds = {}
-        for m in np.flatnonzero(self.status == FINISHED):
-            try:
-                with Run(self.folder(m)) as run:
-                    build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
-                    builds[build] = builds.get(build, 0) + 1
-            except RunError:
-                continue
-        said = []
+        builds, said = Counter(self.each(np.flatnonzero(self.status == FINISHED), lambda run: tuple(
+            run.attributes.get(k) for k in ("version", "revision", "compiler", "flags")))), []
         if len(builds) > 1:
             of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
             said.append(f"The members come from {len(builds)} builds of the program, which may differ in the last bits "

@@ -161,12 +161,10 @@ def condition(e, c, k, o):
 
 def with_speed(row, e, c):
     """The row with its speed and concentration added, from a member."""
-    for m in c.members:
-        if e.status[m] == FINISHED and e.folder(m).is_dir():
-            with Run(e.folder(m)) as run:
-                return row | {"speed_m_s": run.value("tow.speed"), "concentration": float(run.number("concentration"))}
-    return row | {"speed_m_s": c.values.get("tow.speed", np.nan),
-                  "concentration": c.values.get("ice.concentration", np.nan)}
+    found = e.each(c.members[e.status[c.members] == FINISHED], lambda run: {
+        "speed_m_s": run.value("tow.speed"), "concentration": float(run.number("concentration"))})
+    return row | next(found, {"speed_m_s": c.values.get("tow.speed", np.nan),
+                              "concentration": c.values.get("ice.concentration", np.nan)})
 
 
 def conditions(e, **more):
@@ -184,11 +182,8 @@ def hardest(rows, speed=None):
 
 def case_of(e, row):
     """{key: text} of a condition's case, as the program reads it; {} if none of its members has a folder."""
-    for m in e.conditions()[int(row["id"].partition(".")[2]) - 1].members:
-        if e.status[m] == FINISHED and e.folder(m).is_dir():
-            with Run(e.folder(m)) as run:
-                return run.case
-    return {}
+    rows = e.conditions()[int(row["id"].partition(".")[2]) - 1].members
+    return next(e.each(rows[e.status[rows] == FINISHED], lambda run: run.case), {})
 
 
 def tow_of(e, row, line, vessel):
