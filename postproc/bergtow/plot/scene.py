@@ -257,17 +257,8 @@ class Scene:
             self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges, self._line,
             self._body, self._arrow
         ]
-        axes.add_patch(self._water)
-        axes.add_collection(self._floes, autolim=False)
-        axes.add_collection(self._rafted, autolim=False)
-        axes.add_collection(self._cracks, autolim=False)
-        axes.add_line(self._track)
-        axes.add_collection(self._solid, autolim=False)
-        axes.add_line(self._line)
-        axes.add_collection(self._body, autolim=False)
-        axes.add_patch(self._arrow)
-        for edge in edges:
-            axes.add_line(edge)
+        for artist in self.artists:
+            axes.add_artist(artist)
 
     @property
     def mappable(self):
