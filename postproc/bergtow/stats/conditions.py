@@ -201,11 +201,6 @@ def nothing_to_count(e, dropped):
                     "run the ensemble further" if not e.complete else "correct the study, and give it another folder")
 
 
-def waiting(e):
-    """Names of members that have not been run yet."""
-    return [e.name[m] for m in np.flatnonzero(e.status == WAITING) if e.name[m] not in e.unsound]
-
-
 def statistics(e, options):
     """The statistics of an ensemble as nested dicts; statistics.json."""
     dropped = e.exclude(options.exclude) if options.exclude else {}
@@ -216,7 +211,7 @@ def statistics(e, options):
     return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
             "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
             "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
-            "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
+            "unsound": e.unsound, "without_mean": e.without_mean, "waiting": e.waiting, "holes": e.holes(),
             "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
             "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
             "convergence": findings.read("converge", e.path)}

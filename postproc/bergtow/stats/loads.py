@@ -103,8 +103,8 @@ def of_member(e, m):
         with Run(e.folder(m)) as run:
             return of_run(run)
     except RunError:
-        there = [name for name in ALWAYS if e.has(name)]
-        return [(Load(name, *e.described(name)), e.series(m, name)[1]) for name in there], e.series(m)[0]
+        there = [name for name in ALWAYS if name in e.described]
+        return [(Load(name, *e.described[name]), e.series(m, name)[1]) for name in there], e.series(m)[0]
 
 
 def scaling(e, rows):
