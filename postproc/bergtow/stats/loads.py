@@ -180,11 +180,6 @@ def gather(e, rows, options):
     return found, why
 
 
-def in_open_water(e, rows):
-    """Do no members have floes? If files do not say so, they may have some."""
-    return bool(np.all(e.summary.get("n_floes", np.full(e.n, np.nan))[rows] == 0))
-
-
 def _of_a_constant(value, hours, total):
     """The design value of a load that nothing makes vary: itself, and there is no tail to extrapolate."""
     return {"value": value, "interval_95": (value, value), "model": CONSTANT, "return_hours": hours,
@@ -221,7 +216,7 @@ def statistics(e, rows, options, gathered=None):
             start_up |= {"inertia": _inertia(e, start["member"], start["time_s"], start["scale"])}
         why, constant = cut_off(e, rows, load), stat_load.constant(fields)
         # where there are floes, a tow that meets none of them does not know the load of one that does
-        itself = constant and not why and in_open_water(e, rows)
+        itself = constant and not why and bool(np.all(e.summary.get("n_floes", np.full(e.n, np.nan))[rows] == 0))
         if constant and not why:
             why = f"constant, {quantity(fields[0]['peak'][0], load.units)}, in {counted(len(fields), 'field')}"
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
