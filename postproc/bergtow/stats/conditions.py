@@ -134,9 +134,9 @@ def condition(e, c, members, options):
                        for kind in DOUBTS}, "doubtful": sum(bool(e.doubts(m)) for m in rows)
         }, "resistance": fields, "drift": drift(e, rows, fields.get("mean", np.nan)),
         "estimates": estimates(e, rows, fields.get("mean", np.nan)),
-        "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)], "samples": {
+        "fits_of_means": stat_fit.fit_all(means, options.resamples), "samples": {
             "independent": independent, "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
-            "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]
+            "fits": stat_fit.fit_all(values, options.resamples)
         }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options, gathered),
         "loads_left_out": left_out, "panels": loads.panels(e, rows)
     }
