@@ -68,21 +68,14 @@ def between(least, most, kind=float):
 #: the same for a whole number
 whole_from = functools.partial(between, kind=int)
 
-
-def finite(text):
-    return _within(text, float, math.isfinite, "not a finite number")
-
-
-def above_zero(text):
-    return _within(text, float, lambda x: 0 < x < math.inf, "not above zero and finite")
+finite = functools.partial(_within, number=float, fits=math.isfinite, words="not a finite number")
+above_zero = functools.partial(_within, number=float, fits=lambda x: 0 < x < math.inf,
+                               words="not above zero and finite")
+at_least_one = functools.partial(_within, number=int, fits=lambda x: x >= 1, words="below 1")
 
 
 def not_below_zero(text):
     return _within(finite(text), float, lambda x: x >= 0, "below zero")
-
-
-def at_least_one(text):
-    return _within(text, int, lambda x: x >= 1, "below 1")
 
 
 share = measure("%", lambda x: 0 < x < 1, "not between 0 and 1")

@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from ctypes import POINTER, c_double, c_void_p
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from .errors import SIGNAL, BergtowError
 from .case import Case, here
 from .force import Force, Forces
 from .result.dataset import Result
-
-_KINDS = {"place": (0, 3), "velocity": (1, 3), "mass": (2, 2), "inertia": (3, 1), "area": (4, 1), "radius": (5, 1),
-          "thickness": (6, 1), "motion": (7, 1), "drag": (8, 5)}
 
 #: a contact of the last step (bergtow/simulation.h): ids, points, unit normal from a to b, impulses on b in N s
 CONTACT = np.dtype([("a", "i8"), ("b", "i8"), ("n_points", "i8"), ("point", "f8", (2, 2)), ("normal", "f8", 2),
@@ -40,6 +37,21 @@ def _id(body: int) -> int:
     if not -2**63 <= body < 2**63:
         raise IndexError(f"body {body}: does not exist")
     return body
+
+
+class _Array(property):
+    """Numbers of all bodies, a copy: [n], or [n, width]; kind: of bt_simulation_read."""
+
+    def __init__(self, kind: int, width: int, doc: str) -> None:
+        def read(sim: Simulation) -> np.ndarray:
+            out = np.empty((sim.n_bodies, width))
+            sim._library.bt_simulation_read(sim._s, kind, _pointer(out))
+            return out[:, 0] if width == 1 else out
+        super().__init__(read)
+        self.__doc__ = doc
+
+    if TYPE_CHECKING:
+        def __get__(self, sim: Any, kind: Any = None) -> np.ndarray: ...
 
 
 class Simulation:
@@ -216,57 +228,21 @@ class Simulation:
 
     # --- bodies -------------------------------------------------------------------------------------------------------
 
-    def _read(self, name: str) -> np.ndarray:
-        kind, width = _KINDS[name]
-        out = np.empty((self.n_bodies, width))
-        self._library.bt_simulation_read(self._s, kind, _pointer(out))
-        return out[:, 0] if width == 1 else out
-
-    @property
-    def positions(self) -> np.ndarray:
-        """[n, 3] x, y, yaw, m, m, rad"""
-        return self._read("place")
-
-    @property
-    def velocities(self) -> np.ndarray:
-        """[n, 3] m/s, m/s, rad/s"""
-        return self._read("velocity")
-
-    @property
-    def masses(self) -> np.ndarray:
-        """[n, 2] with and without added mass, kg"""
-        return self._read("mass")
-
-    @property
-    def inertias(self) -> np.ndarray:
-        """[n] kg m²"""
-        return self._read("inertia")
-
-    @property
-    def areas(self) -> np.ndarray:
-        """[n] m²"""
-        return self._read("area")
-
-    @property
-    def radii(self) -> np.ndarray:
-        """[n] of the circle around the outline, m"""
-        return self._read("radius")
-
-    @property
-    def thicknesses(self) -> np.ndarray:
-        """[n] of ice, m"""
-        return self._read("thickness")
+    positions = _Array(0, 3, "[n, 3] x, y, yaw, m, m, rad")
+    velocities = _Array(1, 3, "[n, 3] m/s, m/s, rad/s")
+    masses = _Array(2, 2, "[n, 2] with and without added mass, kg")
+    inertias = _Array(3, 1, "[n] kg m²")
+    areas = _Array(4, 1, "[n] m²")
+    radii = _Array(5, 1, "[n] of the circle around the outline, m")
+    thicknesses = _Array(6, 1, "[n] of ice, m")
+    _motions = _Array(7, 1, "[n]")
+    drags = _Array(8, 5, "[n, 5] skin (kg/m) and form (kg/m²) drag of the water, of the air, drag of turning (kg m²)")
 
     @property
     def motions(self) -> np.ndarray:
         """[n] 0 moved by forces, 1 velocity prescribed, 2 permanently at rest, -1 absent: a floe that has split, or an
         unused piece; all its other numbers are NaN"""
-        return np.nan_to_num(self._read("motion"), nan=-1).astype(int)
-
-    @property
-    def drags(self) -> np.ndarray:
-        """[n, 5] skin (kg/m) and form (kg/m²) drag of the water, of the air, drag of turning (kg m²)"""
-        return self._read("drag")
+        return np.nan_to_num(self._motions, nan=-1).astype(int)
 
     def outline(self, body: int) -> np.ndarray:
         """[n, 2] m, anticlockwise, at the body's current position."""

@@ -80,7 +80,9 @@ def short(value, digits=3):
 
 
 def quantity(value, unit):
-    """A number with unit, in thousands if it is large: 12345, "N" gives 12.3 kN."""
+    """A number with unit, in thousands if it is large: 12345, "N" gives 12.3 kN; "–" if undefined."""
+    if value is None or not np.isfinite(value):
+        return "–"
     factor, name = scale([value], unit)
     return f"{short(value / factor)} {name}"
 

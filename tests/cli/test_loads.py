@@ -777,7 +777,7 @@ def test_what_comes_after_the_last_line_parted_is_in_no_number(tmp_path, monkeyp
         panels = {"mean_load": np.array([1.0, 2]), "max_load": np.array([9.0, 9]), "middle": np.ones((2, 2))}
         panel_series = {"units": "N"}
         __enter__, __exit__ = lambda self: self, lambda *a: None
-    monkeypatch.setattr(loads, "Run", lambda folder: Hull())
+    monkeypatch.setattr("bergtow.result.members.Run", lambda folder: Hull())
     assert loads.panels(e, e.used)["fields"] == 8
 
 

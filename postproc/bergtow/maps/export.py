@@ -215,13 +215,13 @@ class Trajectories:
         xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
         speed = np.stack([run.speed(f) for f in frames], axis=1)
         piece = _pieces(xy, np.array(run.period))
-        out = Trajectories([], time, [], [], [])
+        rows = []
         for i in range(run.n_floes):
             for k in range(piece[i].max() + 1):
                 at = (piece[i] == k) & np.isfinite(xy[i]).all(axis=1)
                 if at.any():
-                    out._add(f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
-                             np.where(at, speed[i], np.nan), run.thickness[i])
+                    rows.append((f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
+                                 np.where(at, speed[i], np.nan), run.thickness[i]))
         for name, x, y in TRACKS:
             if x in run and np.isfinite(run[x]).any():
                 if name == "iceberg":
@@ -229,16 +229,11 @@ class Trajectories:
                 else:  # frames lie between samples, and the first one before all of them
                     way = np.column_stack([np.interp(time, run["time"], run[c], np.nan, np.nan) for c in (x, y)])
                 speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
-                out._add(name, way, np.array(speeds), np.nan)
-        if not out.name:
+                rows.append((name, way, np.array(speeds), np.nan))
+        if not rows:
             raise RunError(run.result, "holds nothing that moves", "export a run with floes or a towed body")
-        return Trajectories(out.name, time, *(np.array(v) for v in (out.xy, out.speed, out.thickness)))
-
-    def _add(self, name, xy, speed, thickness):
-        self.name.append(name)
-        self.xy.append(xy)
-        self.speed.append(speed)
-        self.thickness.append(thickness)
+        names, *columns = zip(*rows)
+        return Trajectories(list(names), time, *map(np.array, columns))
 
 
 def _pieces(xy, period):

@@ -8,6 +8,7 @@ every change counted (maps/repair.py). They are written in degrees, or in metres
 or if a heading is given. A case reads the file through ice.outlines.
 """
 import argparse
+import functools
 import math
 from pathlib import Path
 
@@ -27,22 +28,20 @@ LEAST_SIZE = 0.01       # m, mean; if smaller, the metres are probably degrees
 EDGE = 64               # pieces per edge of the image, which is curved in the plane
 
 
-def finite(text):
-    """The numbers of a list; none if one of them is not finite."""
+def listed(text, kind, fits, words):
+    """Read finite numbers of a kind that commas separate. words: what is wrong if they do not fit, and the remedy."""
     try:
-        some = [float(part) for part in text.split(",")]
+        some = tuple(kind(part) for part in text.split(","))
     except ValueError:
-        return []
-    return some if all(map(math.isfinite, some)) else []
+        some = ()
+    if not (some and fits(len(some)) and all(abs(x) < math.inf for x in some)):
+        raise argparse.ArgumentTypeError(f"{text}: {words}")
+    return some
 
 
-def place(text):
-    """Read LON,LAT."""
-    if len(some := finite(text)) != 2:
-        raise argparse.ArgumentTypeError(f"{text}: is not a place; write two numbers, LON,LAT")
-    return tuple(some)
-
-
+place = functools.partial(listed, kind=float, fits=lambda n: n == 2,
+                          words="is not a place; write two numbers, LON,LAT")
+integers = functools.partial(listed, kind=int, fits=lambda n: True, words="are not labels; write whole numbers, 0,3")
 metres = arguments.measure("m")
 
 
@@ -53,18 +52,10 @@ def extent(text):
     return tuple(map(metres, parts))
 
 
-def integers(text):
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: are not labels; write whole numbers, 0,3") from None
-
-
 def corners(text):
     """Read X,Y,X,Y,..."""
-    some = finite(text)
-    if len(some) < 6 or len(some) % 2:
-        raise argparse.ArgumentTypeError(f"{text}: are not corners; write at least three, column,row,column,row,...")
+    some = listed(text, float, lambda n: n >= 6 and n % 2 == 0,
+                  "are not corners; write at least three, column,row,column,row,...")
     return tuple(zip(some[::2], some[1::2]))
 
 

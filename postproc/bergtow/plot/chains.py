@@ -142,7 +142,6 @@ def draw(run, c, whole=False):
     c = joined(run, c)
     lines, force = segments(run, c)
     floes, bodies = outlines(run, c)
-    turn = (lambda p: np.asarray(p)[..., ::-1]) if run.geographic else np.asarray
     x0, x1, y0, y1 = view(run, lines, bodies, whole)
     across, up = (y1 - y0, x1 - x0) if run.geographic else (x1 - x0, y1 - y0)
     width = 11.0
@@ -151,13 +150,13 @@ def draw(run, c, whole=False):
     axes = figure.add_axes((0.7 / width, 0.6 / height, (width - 2.1) / width, (height - 1.5) / height))
     axes.set_facecolor(style.WATER)
     axes.add_collection(
-        PolyCollection([turn(p) for p in with_images(run, floes)[0]], facecolor="#dfe9ef", edgecolor="#8fa3b3",
+        PolyCollection([run.on_page(p) for p in with_images(run, floes)[0]], facecolor="#dfe9ef", edgecolor="#8fa3b3",
                        linewidth=0.5))
     for shape, k in zip(*with_images(run, bodies)):
         body = run.bodies[k]
         colour = style.BODY if body.towed else style.WALL if body.wall else style.FIXED
         axes.add_collection(
-            PolyCollection([turn(shape)], facecolor=colour, edgecolor=style.BODY_EDGE if body.towed else colour,
+            PolyCollection([run.on_page(shape)], facecolor=colour, edgecolor=style.BODY_EDGE if body.towed else colour,
                            linewidth=0.8, zorder=2))
     top = force.max(initial=0.0)
     if top > 0:
@@ -168,8 +167,8 @@ def draw(run, c, whole=False):
         least = top * 10 ** -DECADES
         seen = force >= least
         widths = WIDEST * np.maximum(force[seen] / top, 1e-12) ** 0.5
-        drawn = LineCollection(turn(lines[seen]), array=force[seen], cmap=style.FORCE_MAP, norm=LogNorm(least, top),
-                               linewidths=np.maximum(widths, 0.4), capstyle="round", zorder=3)
+        drawn = LineCollection(run.on_page(lines[seen]), array=force[seen], cmap=style.FORCE_MAP,
+                               norm=LogNorm(least, top), linewidths=np.maximum(widths, 0.4), capstyle="round", zorder=3)
         axes.add_collection(drawn)
         factor, unit = style.scale([top], "N")
         bar = figure.colorbar(drawn,
@@ -178,7 +177,7 @@ def draw(run, c, whole=False):
                               format=lambda v, _: f"{v / factor:g}")
         bar.set_label(f"impulse / time step ({unit})")
     axes.set_aspect("equal")
-    low, high = turn(np.array([[x0, y0], [x1, y1]]))
+    low, high = run.on_page([[x0, y0], [x1, y1]])
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="y, east (m)" if run.geographic else "x (m)",
              ylabel="x, north (m)" if run.geographic else "y (m)")
     words = (

@@ -131,11 +131,6 @@ def draw_sensitivity(e, x):
     return figure
 
 
-def conditions_with_loads(e, options):
-    """The data of the conditions that draw_returns needs."""
-    return [{"label": c.label, "loads": loads.statistics(e, c.finished, options)} for c in e.conditions()]
-
-
 def pictures(e, options, conditions):
     """(name, function that draws it) of the pictures that the study allows. conditions: with "label" and "loads", and
     "extremes" if known, in the layout of bergtow statistics."""
@@ -179,7 +174,7 @@ def perform(a):
         raise nothing_to_count(e, dropped)
     if e.holes():
         print(f"bergtow plot-ensemble: warning: {e.holes()}", file=sys.stderr)
-    drawn = pictures(e, a, conditions_with_loads(e, a))
+    drawn = pictures(e, a, [{"label": c.label, "loads": loads.statistics(e, c.finished, a)} for c in e.conditions()])
     if not drawn:
         raise RunError(e.file, "varies no parameter that can be drawn", "read the tables of bergtow statistics")
     places = {name: (a.output or e.path) / f"{name}.{a.format}" for name, _ in drawn}

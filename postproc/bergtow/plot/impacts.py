@@ -44,12 +44,6 @@ def bars(outlines, values, scale):
     return shapes
 
 
-def _turn(points, run):
-    """From the body frame to the page: unchanged in the basin frame, bow up in the geographic frame."""
-    points = np.asarray(points, dtype=float)
-    return points[..., ::-1] if run.geographic else points
-
-
 def draw_hull(axes, run, values, colour, label):
     """Draw bars of the values around the hull, and rings as a scale."""
     hull = run.bodies[run.towed].vertices
@@ -60,21 +54,21 @@ def draw_hull(axes, run, values, colour, label):
     scale = 0.75 * size / top if top > 0 else 0.0
     outlines = along_hull(run)
     axes.add_collection(
-        PolyCollection([_turn(s, run) for s in bars(outlines, values, scale)], facecolor=colour, edgecolor=style.PAPER,
+        PolyCollection([run.on_page(s) for s in bars(outlines, values, scale)], facecolor=colour, edgecolor=style.PAPER,
                        linewidth=0.6))
-    axes.add_patch(Polygon(_turn(hull, run), closed=True, facecolor=style.WINDOW, edgecolor=style.INK, linewidth=1.0))
+    axes.add_patch(Polygon(run.on_page(hull), closed=True, facecolor=style.WINDOW, edgecolor=style.INK, linewidth=1.0))
     step = _round(top / factor)
     for level in np.arange(step, 1.001 * top / factor, step) if top > 0 else []:
         ring = np.vstack([line + level * factor * scale * line / np.hypot(*line.T)[:, None] for line in outlines])
-        axes.plot(*_turn(np.vstack([ring, ring[:1]]), run).T, color=style.GRID, linewidth=0.7, zorder=0)
-        axes.update_datalim(_turn(ring, run))
+        axes.plot(*run.on_page(np.vstack([ring, ring[:1]])).T, color=style.GRID, linewidth=0.7, zorder=0)
+        axes.update_datalim(run.on_page(ring))
     ahead = np.array([[0.0, 0.0], [0.55 * size, 0.0]])
-    axes.annotate("", _turn(ahead, run)[1], _turn(ahead, run)[0],
+    axes.annotate("", run.on_page(ahead)[1], run.on_page(ahead)[0],
                   arrowprops=dict(arrowstyle="->", color=style.FAINT, linewidth=1))
-    axes.annotate("body's own x", _turn(0.5 * ahead[1] - [0, 0.1 * size], run), fontsize=8.5, color=style.FAINT,
+    axes.annotate("body's own x", run.on_page(0.5 * ahead[1] - [0, 0.1 * size]), fontsize=8.5, color=style.FAINT,
                   ha="center", va="center")
     for shape in bars(outlines, values, scale):
-        axes.update_datalim(_turn(shape, run))
+        axes.update_datalim(run.on_page(shape))
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set_axis_off()

@@ -195,17 +195,16 @@ class Scene:
     def __init__(self, axes, run, colouring, view, follow=False, animated=False):
         self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
         x0, x1, y0, y1 = run.box
-        self._turn = run.geographic
         # everything within half a period of it is shown
         self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2
-        view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
+        view = run.on_page(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
         axes.set_ylim(*view[:, 1])
         axes.set(aspect="equal", facecolor=style.WATER if run.period[0] or run.period[1] or follow else style.PAPER)
         for spine in axes.spines.values():
             spine.set_visible(False)
         relative = " from the body" if follow else ""
-        names = (f"y east{relative} (m)", f"x north{relative} (m)") if self._turn else \
+        names = (f"y east{relative} (m)", f"x north{relative} (m)") if run.geographic else \
             (f"x{relative} (m)", f"y{relative} (m)")
         wide, high = view[1] - view[0]
         axes.xaxis.set_major_locator(MaxNLocator(9 if wide > 2 * high else 5, steps=(1, 2, 5, 10)))
@@ -220,7 +219,7 @@ class Scene:
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         self._corners = corners
         kept = dict(animated=animated)
-        self._water = Polygon(self._flat(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0,
+        self._water = Polygon(run.on_page(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0,
                               **kept)
         width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
@@ -257,25 +256,12 @@ class Scene:
             self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges, self._line,
             self._body, self._arrow
         ]
-        axes.add_patch(self._water)
-        axes.add_collection(self._floes, autolim=False)
-        axes.add_collection(self._rafted, autolim=False)
-        axes.add_collection(self._cracks, autolim=False)
-        axes.add_line(self._track)
-        axes.add_collection(self._solid, autolim=False)
-        axes.add_line(self._line)
-        axes.add_collection(self._body, autolim=False)
-        axes.add_patch(self._arrow)
-        for edge in edges:
-            axes.add_line(edge)
+        for artist in self.artists:
+            axes.add_artist(artist)
 
     @property
     def mappable(self):
         return self._floes
-
-    def _flat(self, xy):
-        """Convert world coordinates [..., 2] to (horizontal, vertical) of the picture."""
-        return xy[..., ::-1] if self._turn else xy
 
     def show(self, frame):
         """Update the artists to a frame."""
@@ -288,23 +274,23 @@ class Scene:
         if self.follow:
             origin, centre = position, position
         outlines, index = run.polygon_array(frame, position + self._middle if self.follow else None)
-        self._floes.set_verts(self._flat(outlines - origin))
+        self._floes.set_verts(run.on_page(outlines - origin))
         self._floes.set_array(self.colouring.values(frame)[index])
         if self._rafts:
             over = rafted.overlaps(outlines)
-            self._rafted.set_verts([self._flat(p - origin) for p in over])
+            self._rafted.set_verts([run.on_page(p - origin) for p in over])
             self.rafted = len(over) > 0
         if run.n_pieces:
             cracks = self._new_cracks(frame, position + self._middle if self.follow else None)
-            self._cracks.set_segments(self._flat(cracks - origin))
+            self._cracks.set_segments(run.on_page(cracks - origin))
             self.cracked = len(cracks) > 0
         bodies = run.body_polygons(frame, centre)
-        self._solid.set_verts([self._flat(p + shift - origin) for shift in self._images
+        self._solid.set_verts([run.on_page(p + shift - origin) for shift in self._images
                                for p, b in zip(bodies, run.bodies) if not b.towed])
-        self._water.set_xy(self._flat(self._unbounded(self._corners) - origin))
+        self._water.set_xy(run.on_page(self._unbounded(self._corners) - origin))
         if run.towed is None:
             return
-        self._body.set_verts([self._flat(bodies[run.towed] + shift - origin) for shift in self._images])
+        self._body.set_verts([run.on_page(bodies[run.towed] + shift - origin) for shift in self._images])
         self._show_track(frame, origin)
         self._show_line(frame, position - origin)
         if self._heading is not None:
@@ -330,7 +316,7 @@ class Scene:
             lines += [(a, d), (b, c)]
         if self.run.case.get("domain.sides") in ("open", "periodic"):
             lines += [(a, b), (d, c)]
-        return [Line2D(*self._flat(np.array(line)).T, color=style.FAINT, linewidth=1.0, linestyle=(0, (4, 3)), zorder=5,
+        return [Line2D(*self.run.on_page(line).T, color=style.FAINT, linewidth=1.0, linestyle=(0, (4, 3)), zorder=5,
                        clip_on=False, **kept) for line in lines]
 
     def _unbounded(self, corners):
@@ -358,14 +344,14 @@ class Scene:
             jump = np.flatnonzero((np.abs(np.diff(wrapped, axis=0)) > 0.5 * np.abs(self._corners[2] - self._corners[0]))
                                   .any(axis=1)) + 1
             way = np.insert(wrapped, jump, np.nan, axis=0)
-        self._track.set_data(*self._flat(way - origin).T)
+        self._track.set_data(*self.run.on_page(way - origin).T)
 
     def _show_line(self, frame, position):
         """Draw the line from the hull to its towing end, a square, where two branches meet; omit broken branches."""
         points = tow_line(self.run, frame, position)
         if points is not None:
             self._line.set_markevery([min(1, len(points) - 1)])  # only the towing end if all branches have broken
-            self._line.set_data(*self._flat(points).T)
+            self._line.set_data(*self.run.on_page(points).T)
 
     def _show_arrow(self, position, outline):
         """Draw an arrow ahead of the body, along the tow."""
@@ -375,4 +361,4 @@ class Scene:
         size = self._arrow_length
         shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]
                           ]) * size
-        self._arrow.set_xy(self._flat(ahead + shape[:, :1] * u + shape[:, 1:] * n))
+        self._arrow.set_xy(self.run.on_page(ahead + shape[:, :1] * u + shape[:, 1:] * n))

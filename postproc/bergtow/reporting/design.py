@@ -311,7 +311,7 @@ def beside(work, a, row, t):
             cases.append(load_cases.course_change(t, runs, math.degrees(a.bend), a.bend_radius))
             start, ramp = load_cases.start(t, runs, say)
         head = given and load_cases.head_sea(t, runs, a.head_current, a.head_wind)
-        ranges = [load_cases.effect(t, r, runs) for r in assumed.first_drag(some)]
+        ranges = [load_cases.effect(t, r, runs) for r in sorted(some, key=lambda r: r.key != "body.drag.water_form")]
         cases.insert(0, head or load_cases.head_sea(t, runs))
         if towed:
             cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]

@@ -102,7 +102,7 @@ def operation(s, cases, values, answer):
 
 
 def _row(what, by_hand, n, simulated):
-    return [what, by_hand, quantity(n, "N"), quantity(simulated, "N") if np.isfinite(simulated) else "–",
+    return [what, by_hand, quantity(n, "N"), quantity(simulated, "N"),
             number(simulated / n, 2) if n and np.isfinite(simulated) else "–"]
 
 

@@ -21,7 +21,6 @@ from bergtow.result import compared, findings
 from bergtow.result import origins as report_case
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, Members, reading, short_key
 from bergtow.result.origins import scrubbed
-from bergtow.result.run import Run
 from bergtow.stats import conditions as ensemble
 from bergtow.stats import design_value as statement
 from bergtow.stats.conditions import DEFAULTS as OPTIONS
@@ -218,14 +217,8 @@ def study_text(e):
 
 def provenance(e):
     """Rows for the first member that can be read."""
-    for m in np.flatnonzero(e.status == FINISHED):
-        try:
-            with Run(e.folder(m)) as run:
-                return [(name, value) for name, value in report_run.provenance(run)
-                        if name not in ("state hash", "wall time", "folder", "started", "host")]
-        except RunError:
-            continue
-    return []
+    found = next(e.each(np.flatnonzero(e.status == FINISHED), report_run.provenance), [])
+    return [row for row in found if row[0] not in ("state hash", "wall time", "folder", "started", "host")]
 
 
 def caption(name):
@@ -328,13 +321,9 @@ def first_runs(e, s):
     member of each condition that can be read."""
     out = []
     for c, of in zip(s["conditions"], e.conditions()):
-        for m in of.members[e.status[of.members] == FINISHED]:
-            try:
-                with Run(e.folder(m)) as run:
-                    out.append((c, report_case.values(run), run.case, run.attributes))
-                break
-            except RunError:
-                continue
+        found = next(e.each(of.members[e.status[of.members] == FINISHED],
+                            lambda run: (report_case.values(run), run.case, run.attributes)), None)
+        out += [(c, *found)] if found else []
     return out
 
 
@@ -383,14 +372,10 @@ def independent_check(e, s):
     """(blocks of the check, rows of the estimates) for the first field of the governing condition."""
     c = governs(s)
     rows = next(of.members for of in e.conditions() if of.index == c["index"])
-    for m in rows[e.status[rows] == FINISHED]:
-        try:
-            with Run(e.folder(m)) as run:
-                estimates = report_run.estimates(run)
-                return document.check(run, estimates), estimates
-        except RunError:
-            continue
-    return document.check(None, []), []
+    def checked(run):
+        estimates = report_run.estimates(run)
+        return document.check(run, estimates), estimates
+    return next(e.each(rows[e.status[rows] == FINISHED], checked), None) or (document.check(None, []), [])
 
 
 def replays(e, place):

@@ -42,7 +42,7 @@ UNSET = {"body.mass": "0 kg"}  #: values that mean "derived from other keys"
 
 def force(value):
     """A force in words, a dash if there is none."""
-    return style.quantity(value, "N") if value is not None and np.isfinite(value) else "–"
+    return style.quantity(value, "N")
 
 
 def with_interval(mean, low, high):

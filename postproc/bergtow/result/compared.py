@@ -9,9 +9,8 @@ import hashlib
 
 import numpy as np
 
-from bergtow.errors import RunError
 from bergtow.result.members import FINISHED
-from bergtow.result.run import Run, case_value
+from bergtow.result.run import case_value
 
 #: {quantity of bergtow converge: its key}
 KEYS = {"start": "tow.ramp", "width": "domain.width", "length": "domain.length", "dt": "run.dt",
@@ -25,14 +24,7 @@ PLACES = ("ice.seed", "ice.x_min", "ice.x_max", "ice.y_min", "ice.y_max", "ice.e
 
 def cases(e):
     """[{key: text}] of those members of an ensemble that can be read."""
-    out = []
-    for m in e.used:
-        try:
-            with Run(e.folder(m)) as run:
-                out.append(run.case)
-        except RunError:
-            continue
-    return out
+    return list(e.each(e.used, lambda run: run.case))
 
 
 def _one(values, slack):

@@ -216,6 +216,10 @@ class Frames:
         own = self.n_start  # this dataset does not contain pieces
         return self._frame("speed", frame, own + len(self.bodies))[own:]
 
+    def on_page(self, xy):
+        """Positions [..., 2] as (horizontal, vertical) of a picture: in the geographic frame as on a map."""
+        return np.asarray(xy, dtype=float)[..., ::-1 if self.geographic else 1]
+
     def wrap(self, xy, centre=None):
         """Shift positions [n, 2] m by whole periods to within half a period of centre (default: of the domain).
 

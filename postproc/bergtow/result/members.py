@@ -12,7 +12,7 @@ its seal is intact. A member whose files do not match the record of its end (res
 enters no number until `bergtow ensemble` has run it again. Raises RunError.
 """
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -178,8 +178,10 @@ class Members:
             self.summary = {key: data[()] for key, data in f["summary"].items()}
             self.meaning = {key: {k: plain(v) for k, v in data.attrs.items()} for key, data in f["summary"].items()}
             self._series = {key: data[()] for key, data in f["series"].items()}
-            self._described = {key: [plain(data.attrs.get(what, "")) for what in ("label", "units", "description")]
-                               for key, data in f["series"].items()}
+            #: {series: (label, units, description)}
+            self.described = {key: (plain(data.attrs.get("label", "")) or key.replace("_", " "), *(
+                plain(data.attrs.get(what, "")) for what in ("units", "description")))
+                              for key, data in f["series"].items()}
             self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
         self.study = plain(self.study)
         self.n = len(self.name)
@@ -235,14 +237,15 @@ class Members:
     def folder(self, m):
         return self.path / "members" / self.name[m]
 
-    def has(self, name):
-        """Does ensemble.h5 hold this series of the members?"""
-        return name in self._series
-
-    def described(self, name):
-        """(label, units, description) of a series."""
-        label, *rest = self._described[name]
-        return (label or name.replace("_", " "), *rest)
+    def each(self, rows, measure):
+        """Yield measure(run) for these members, one after the other; those that cannot be read are left out."""
+        for m in rows:
+            try:
+                with Run(self.folder(m)) as run:
+                    found = measure(run)
+            except RunError:
+                continue
+            yield found
 
     def series(self, m, name="ice_resistance"):
         """(time s, values) of a series over a member's whole run; steps without a load by least() of result/run.py."""
@@ -332,9 +335,7 @@ class Members:
     @cached_property
     def behind(self):
         """Members that have finished since ensemble.h5 was written."""
-        return [self.name[m]
-                for m in np.flatnonzero(self.status == WAITING)
-                if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()]
+        return [name for name in self.waiting if (self.path / "members" / name / "finished").exists()]
 
     def reasons(self, status):
         """{name: why} of the failed members, or of waiting members whose process died."""
@@ -345,20 +346,26 @@ class Members:
     @cached_property
     def without_folder(self):
         """Finished members whose folder is missing, so that their collisions are unknown."""
-        return [self.name[m] for m in np.flatnonzero(self.status == FINISHED) if not self.folder(m).is_dir()]
+        return [name for name in self._named(self.status == FINISHED) if not (self.path / "members" / name).is_dir()]
 
     @property
     def without_mean(self):
         """Finished members without a mean ice resistance."""
-        return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(self.mean))]
+        return self._named((self.status == FINISHED) & ~np.isfinite(self.mean))
+
+    @property
+    def waiting(self):
+        """Members that have not been run yet."""
+        return [name for name in self._named(self.status == WAITING) if name not in self.unsound]
+
+    def _named(self, there):
+        return [self.name[m] for m in np.flatnonzero(there)]
 
     def holes(self):
         """A sentence on members of the study that are missing from the numbers although nobody excluded them; "" if
         there are none."""
-        waiting = [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound]
-        kinds = (("not sound", list(self.unsound)), ("waiting", waiting),
-                 ("failed", [self.name[m]
-                             for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
+        kinds = (("not sound", list(self.unsound)), ("waiting", self.waiting),
+                 ("failed", self._named(self.status == FAILED)), ("without a mean", self.without_mean))
         parts = [f"{len(names)} {kind} ({listed(names)})" for kind, names in kinds if names]
         return (f"{sum(len(names) for _, names in kinds)} of {self.n} members enter no statistics: {', '.join(parts)}"
                 if parts else "")
@@ -391,15 +398,8 @@ class Members:
     @cached_property
     def builds(self):
         """A sentence on members of different builds, or of one that cannot be reproduced; "" if there are none."""
-        builds = {}
-        for m in np.flatnonzero(self.status == FINISHED):
-            try:
-                with Run(self.folder(m)) as run:
-                    build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
-                    builds[build] = builds.get(build, 0) + 1
-            except RunError:
-                continue
-        said = []
+        builds, said = Counter(self.each(np.flatnonzero(self.status == FINISHED), lambda run: tuple(
+            run.attributes.get(k) for k in ("version", "revision", "compiler", "flags")))), []
         if len(builds) > 1:
             of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
             said.append(f"The members come from {len(builds)} builds of the program, which may differ in the last bits "

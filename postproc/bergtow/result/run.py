@@ -92,20 +92,6 @@ class Estimate:
         return bool(self.numbers.get("compares")) and self.force > 0
 
 
-def estimates_of(summary):
-    """{name: Estimate} of a summary, in the order of the program's registry; {} if there are none."""
-    found, labels = summary.get("estimates"), summary.get("estimate_labels")
-    found = found if isinstance(found, dict) else {}
-    out = {}
-    for name, numbers in found.items():
-        if not (isinstance(numbers, dict) and "force_n" in numbers):
-            continue  # one of the conditions, or the curves
-        about = labels[name]
-        out[name] = Estimate(name, about["label"], about["kind"] == "on top", bool(about.get("uses_floe_size")),
-                             numbers)
-    return out
-
-
 def parse_case(text):
     """The values of a case file as {"section.key": text}, lists on one line; floes given by hand are left out."""
     out = {}
@@ -276,8 +262,15 @@ class Run(Frames):
 
     @property
     def estimates(self):
-        """{name: Estimate}."""
-        return estimates_of(self.summary)
+        """{name: Estimate}, in the order of the program's registry; {} if there are none."""
+        found, labels, out = self.summary.get("estimates"), self.summary.get("estimate_labels"), {}
+        for name, numbers in (found if isinstance(found, dict) else {}).items():
+            if not (isinstance(numbers, dict) and "force_n" in numbers):
+                continue  # one of the conditions, or the curves
+            about = labels[name]
+            out[name] = Estimate(name, about["label"], about["kind"] == "on top", bool(about.get("uses_floe_size")),
+                                 numbers)
+        return out
 
     @property
     def window(self):

@@ -19,6 +19,7 @@ import scipy.stats
 
 from .. import _library
 from ..errors import BergtowError
+from . import apart
 
 OBJECTIVES = ("work", "time", "peak", "length")  # bt_route_objective
 STATUS = ("ok", "fewer_routes", "no_route", "start_outside", "goal_outside", "start_no_go", "goal_no_go",
@@ -304,15 +305,8 @@ def plan(ice: Ice, hull: Hull, start: Iterable[float], goal: Points, **options: 
 
 def _nearest_polygon(task: _Task, x: float, y: float) -> int:
     """Index of the no-go polygon whose outline is nearest to a position."""
-    best, which = math.inf, -1
-    for k, (a, b) in enumerate(zip(task.no_go_first[:-1], task.no_go_first[1:])):
-        p = task.no_go[a:b]
-        e = np.roll(p, -1, axis=0) - p
-        f = np.clip(((x - p[:, 0]) * e[:, 0] + (y - p[:, 1]) * e[:, 1]) / np.maximum((e ** 2).sum(1), 1e-300), 0, 1)
-        far = np.hypot(*(np.array([x, y]) - p - f[:, None] * e).T).min()
-        if far < best:
-            best, which = far, k
-    return which
+    polygons = np.split(task.no_go, task.no_go_first[1:-1])
+    return int(np.argmin([apart.to_edges(np.array([[x, y]]), polygon)[0] for polygon in polygons]))
 
 
 def route_through(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[float], corners: Points = (), *,

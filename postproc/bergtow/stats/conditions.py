@@ -134,9 +134,9 @@ def condition(e, c, members, options):
                        for kind in DOUBTS}, "doubtful": sum(bool(e.doubts(m)) for m in rows)
         }, "resistance": fields, "drift": drift(e, rows, fields.get("mean", np.nan)),
         "estimates": estimates(e, rows, fields.get("mean", np.nan)),
-        "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)], "samples": {
+        "fits_of_means": stat_fit.fit_all(means, options.resamples), "samples": {
             "independent": independent, "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
-            "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]
+            "fits": stat_fit.fit_all(values, options.resamples)
         }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options, gathered),
         "loads_left_out": left_out, "panels": loads.panels(e, rows)
     }
@@ -201,11 +201,6 @@ def nothing_to_count(e, dropped):
                     "run the ensemble further" if not e.complete else "correct the study, and give it another folder")
 
 
-def waiting(e):
-    """Names of members that have not been run yet."""
-    return [e.name[m] for m in np.flatnonzero(e.status == WAITING) if e.name[m] not in e.unsound]
-
-
 def statistics(e, options):
     """The statistics of an ensemble as nested dicts; statistics.json."""
     dropped = e.exclude(options.exclude) if options.exclude else {}
@@ -216,7 +211,7 @@ def statistics(e, options):
     return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
             "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
             "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
-            "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
+            "unsound": e.unsound, "without_mean": e.without_mean, "waiting": e.waiting, "holes": e.holes(),
             "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
             "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
             "convergence": findings.read("converge", e.path)}

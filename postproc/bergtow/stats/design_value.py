@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bergtow import _library
-from bergtow.errors import RunError
 from bergtow.result.members import short_key
 from bergtow.result.origins import source_of_ice
 from bergtow.result.origins import short as in_short
-from bergtow.result.run import Run, case_value
+from bergtow.result.run import case_value
 from bergtow.stats import loads
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
@@ -88,17 +87,13 @@ def ice_as_read(run):
 
 def case_of(e, rows):
     """Case of the first member of a condition that can be read, None if none can."""
-    for m in rows:
-        try:
-            with Run(e.folder(m)) as run:
-                limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
-                mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
-                return Case(not any(x > 0 for x in limits), unbounded(e, rows), mode, _breaking_loads(run, mode),
-                            pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0),
-                            run.case | ice_as_read(run))
-        except RunError:
-            continue
-    return None
+    def of(run):
+        limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
+        mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
+        return Case(not any(x > 0 for x in limits), unbounded(e, rows), mode, _breaking_loads(run, mode),
+                    pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0),
+                    run.case | ice_as_read(run))
+    return next(e.each(rows, of), None)
 
 
 def cases(e, s):
@@ -109,14 +104,7 @@ def cases(e, s):
 
 def speed_made_good(e, rows):
     """Mean over fields of the speed in the window, m/s, with its interval; None if no member has one."""
-    speeds = []
-    for m in rows:
-        try:
-            with Run(e.folder(m)) as run:
-                speeds.append(run.speed_made_good)
-        except RunError:
-            continue
-    speeds = np.array([v for v in speeds if np.isfinite(v)])
+    speeds = np.array([v for v in e.each(rows, lambda run: run.speed_made_good) if np.isfinite(v)])
     return {"value": speeds.mean(), "interval_95": stat_mean.t_interval(speeds) if len(speeds) > 1 else (np.nan, np.nan)
             } if len(speeds) else None
 
@@ -246,14 +234,10 @@ def steps(e, rows):
     """({series of a branch's tension: largest mean over a step in the members' whole runs, N}, {series: label}).
     Numbers of the summaries are included, which cover the steps between samples and members without their folder."""
     out, labels = {}, {}
-    for m in rows:
-        try:
-            with Run(e.folder(m)) as run:
-                for name in [n for n in run.series_names if n.startswith(loads.TENSION)]:
-                    out[name] = np.fmax(out.get(name, np.nan), np.fmax.reduce(run[name], initial=-np.inf))
-                    labels[name] = run.label(name)
-        except RunError:
-            continue
+    for found in e.each(rows, lambda run: {name: (np.fmax.reduce(run[name], initial=-np.inf), run.label(name))
+                                           for name in run.series_names if name.startswith(loads.TENSION)}):
+        for name, (top, label) in found.items():
+            out[name], labels[name] = np.fmax(out.get(name, np.nan), top), label
     out = {name: top for name, top in out.items() if np.isfinite(top)}
     for name in (f"{loads.TENSION}{k}" for k in (1, 2)):
         some = [_numbers(e, f"window_series_{name}_{when}peak_n", rows) for when in ("", "start_")]

@@ -301,15 +301,15 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
     total = len(maxima) * length
     there = [x[np.isfinite(x)] for x in each]
     fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)
-    if fitted.refused:
-        return {"refused": f"block maxima: {fitted.refused}"}
-    location, scale, shape = (fitted.parameters[k] for k in ("location", "scale", "shape"))
+    if "refused" in fitted:
+        return {"refused": f"block maxima: {fitted['refused']}"}
+    location, scale, shape = (fitted["parameters"][k] for k in ("location", "scale", "shape"))
     levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in hours_of_levels])
     return {
         "blocks": len(maxima), "block_hours": length, "hours": total, "without_block": sum(len(x) == 0 for x in each),
         "empty": int(empty.sum()), "location": location, "scale": scale,
         "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
-        "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
+        "anderson_darling": fitted["anderson_darling"], "p_value": fitted["p_value"], "interval": interval_note(n),
         "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)}
                    for T, (z, ends) in zip(hours_of_levels, levels)]
     }

@@ -7,8 +7,6 @@ Samples are drawn from the fit and fitted again, because tables apply to given p
 for fitted ones [Stephens 1974, J. Am. Stat. Assoc. 69]. AIC = 2k - 2 ln L, and AICc with its small-sample correction,
 compare the fits with each other; neither shows that the best of them is good.
 """
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 
@@ -16,22 +14,6 @@ LEAST = 8            # with fewer values a fit is meaningless
 RESAMPLES = 199
 SEED = 20172
 LEAST_SHAPE = -0.95  # of GEV and GPD: the likelihood has no maximum at -1 and below
-
-
-@dataclass(frozen=True)
-class Fit:
-    """One fitted distribution."""
-
-    name: str
-    parameters: dict
-    log_likelihood: float
-    aic: float
-    aicc: float
-    anderson_darling: float
-    kolmogorov: float
-    p_value: float
-    frozen: object
-    refused: str = ""  #: why there is no fit; all other fields are then empty
 
 
 class Frozen:
@@ -162,7 +144,7 @@ def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):
 
 
 def fit(name, x, resamples=RESAMPLES):
-    """Fit one distribution to independent values x; the result has `refused` set if a fit makes no sense."""
+    """Fit one distribution to independent values x, as a dict; {"name", "refused": why} if a fit makes no sense."""
     make, k, positive = DISTRIBUTIONS[name]
     # Contiguous: for a strided view NumPy takes the range to end one stride after the last number. If the result
     # happens to lie there, NumPy assumes an overlap and calls the scalar log instead of the vector one, whose last bits
@@ -171,29 +153,19 @@ def fit(name, x, resamples=RESAMPLES):
     why = (f"{n} values, needs {LEAST}" if n < LEAST else "all values are the same" if np.ptp(x) == 0
            else f"{np.sum(x <= 0)} values are not positive" if positive and x.min() <= 0 else "")
     if why:
-        return Fit(name, {}, *[np.nan] * 6, None, why)
+        return {"name": name, "refused": why}
     with np.errstate(all="ignore"):
         parameters, frozen = make(x)
         likelihood = float(np.sum(frozen.logpdf(x)))
         statistic = anderson_darling(x, frozen.cdf)
         p = p_value(statistic, frozen, n, lambda y: make(y)[1], resamples) if resamples else np.nan
     aic = 2 * k - 2 * likelihood
-    aicc = aic + 2 * k * (k + 1) / (n - k - 1)
-    return Fit(name, {key: float(v) for key, v in parameters.items()}, likelihood, aic, aicc, float(statistic),
-               float(scipy.stats.kstest(x, frozen.cdf).statistic), p, frozen)
+    return {"name": name, "parameters": {key: float(v) for key, v in parameters.items()}, "log_likelihood": likelihood,
+            "aic": aic, "aicc": aic + 2 * k * (k + 1) / (n - k - 1), "anderson_darling": float(statistic),
+            "kolmogorov_smirnov": float(scipy.stats.kstest(x, frozen.cdf).statistic), "p_value": p}
 
 
 def fit_all(x, resamples=RESAMPLES):
     """All fits, best AICc first, refused ones last."""
     fits = [fit(name, x, resamples) for name in DISTRIBUTIONS]
-    return sorted(fits, key=lambda f: (bool(f.refused), f.aicc if np.isfinite(f.aicc) else np.inf))
-
-
-def as_dict(f):
-    """A fit as a dict for JSON."""
-    if f.refused:
-        return {"name": f.name, "refused": f.refused}
-    return {
-        "name": f.name, "parameters": f.parameters, "log_likelihood": f.log_likelihood, "aic": f.aic, "aicc": f.aicc,
-        "anderson_darling": f.anderson_darling, "kolmogorov_smirnov": f.kolmogorov, "p_value": f.p_value
-    }
+    return sorted(fits, key=lambda f: ("refused" in f, f["aicc"] if np.isfinite(f.get("aicc", np.nan)) else np.inf))

@@ -7,26 +7,14 @@ the share p of all tows of that length stay below the largest of the n, and the 
 + 1). Rejected: a normal quantile of the n values, which gives a narrower interval but assumes a distribution that was
 not checked.
 """
-import math
-
 import numpy as np
 
 CONFIDENCE = 0.95
 
 
-def confidence(n, share):
-    """Confidence that at least this share of tows stays below the largest of n: 1 - share^n."""
-    return 1 - share ** n
-
-
-def share_below(n, level=CONFIDENCE):
+def share_below(n):
     """The share of tows that stays below the largest of n with this confidence."""
-    return (1 - level) ** (1 / n)
-
-
-def tows_for(share, level=CONFIDENCE):
-    """The least n whose largest exceeds this share of tows with this confidence."""
-    return math.ceil(math.log(1 - level) / math.log(share) * (1 - 1e-12))
+    return (1 - CONFIDENCE) ** (1 / n)
 
 
 def largest_of(values, hours):

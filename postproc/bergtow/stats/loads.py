@@ -103,8 +103,8 @@ def of_member(e, m):
         with Run(e.folder(m)) as run:
             return of_run(run)
     except RunError:
-        there = [name for name in ALWAYS if e.has(name)]
-        return [(Load(name, *e.described(name)), e.series(m, name)[1]) for name in there], e.series(m)[0]
+        there = [name for name in ALWAYS if name in e.described]
+        return [(Load(name, *e.described[name]), e.series(m, name)[1]) for name in there], e.series(m)[0]
 
 
 def scaling(e, rows):
@@ -180,11 +180,6 @@ def gather(e, rows, options):
     return found, why
 
 
-def in_open_water(e, rows):
-    """Do no members have floes? If files do not say so, they may have some."""
-    return bool(np.all(e.summary.get("n_floes", np.full(e.n, np.nan))[rows] == 0))
-
-
 def _of_a_constant(value, hours, total):
     """The design value of a load that nothing makes vary: itself, and there is no tail to extrapolate."""
     return {"value": value, "interval_95": (value, value), "model": CONSTANT, "return_hours": hours,
@@ -221,7 +216,7 @@ def statistics(e, rows, options, gathered=None):
             start_up |= {"inertia": _inertia(e, start["member"], start["time_s"], start["scale"])}
         why, constant = cut_off(e, rows, load), stat_load.constant(fields)
         # where there are floes, a tow that meets none of them does not know the load of one that does
-        itself = constant and not why and in_open_water(e, rows)
+        itself = constant and not why and bool(np.all(e.summary.get("n_floes", np.full(e.n, np.nan))[rows] == 0))
         if constant and not why:
             why = f"constant, {quantity(fields[0]['peak'][0], load.units)}, in {counted(len(fields), 'field')}"
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
@@ -246,12 +241,10 @@ def statistics(e, rows, options, gathered=None):
 
 def _inertia(e, m, end, scale):
     """Mean inertia force of a member's body over the time scale before `end`, N; NaN if its folder is missing."""
-    try:
-        with Run(e.folder(m)) as run:
-            some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
-            return float(run["inertia_force"][some].mean()) if "inertia_force" in run and some.any() else np.nan
-    except RunError:
-        return np.nan
+    def mean(run):
+        some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
+        return float(run["inertia_force"][some].mean()) if "inertia_force" in run and some.any() else np.nan
+    return next(e.each([m], mean), np.nan)
 
 
 def panels(e, rows):
@@ -259,21 +252,15 @@ def panels(e, rows):
     end of the window: {"mean", "mean_95", "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of
     panel midpoints from the body's x axis towards y, "units", "fields"}; None if members have no panels, or different
     numbers of them."""
-    mean, largest, units, middle = [], [], "", None
-    for m in [m for m in rows if not e.cut(m)]:
-        try:
-            with Run(e.folder(m)) as run:
-                found, units = run.panels, run.panel_series["units"]
-        except RunError:
-            continue
-        middle = found["middle"] if middle is None else middle
-        mean.append(found["mean_load"])
-        largest.append(found["max_load"])
+    found = list(e.each([m for m in rows if not e.cut(m)], lambda run: run.panels | {
+        "units": run.panel_series["units"]}))
+    mean, largest = ([x[name] for x in found] for name in ("mean_load", "max_load"))
     if not mean or len({len(x) for x in mean}) > 1 or not np.isfinite(mean).all():
         return None
     def over(x):
         return np.array([stat_load.mean_over_fields(column, 0.0) for column in np.array(x).T])
-    return {"units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
+    middle = found[0]["middle"]
+    return {"units": found[-1]["units"], "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
             "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
             "mean_of_largest_95": over(largest),
             "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360}

@@ -17,7 +17,7 @@ import json
 import math
 from types import SimpleNamespace
 
-from bergtow import table
+from bergtow import table, towing
 from bergtow.result.members import FINISHED
 from bergtow.result.run import Run, case_value, parse_case
 from bergtow.stats import conditions as stat_conditions
@@ -89,9 +89,7 @@ def case_numbers(program, path, given):
 
 def options(**more):
     """Options of the statistics, as in bergtow statistics, without p-values."""
-    return SimpleNamespace(**({"time_scale": None, "tow_hours": None, "probability": stat_loads.PROBABILITY,
-                               "hours": [], "resamples": 1, "error": 0.05, "gap": None, "blocks": None,
-                               "threshold": None} | more))
+    return SimpleNamespace(**stat_conditions.DEFAULTS | {"hours": [], "resamples": 1} | more)
 
 
 def value_of(e, c, found, fields):
@@ -161,12 +159,10 @@ def condition(e, c, k, o):
 
 def with_speed(row, e, c):
     """The row with its speed and concentration added, from a member."""
-    for m in c.members:
-        if e.status[m] == FINISHED and e.folder(m).is_dir():
-            with Run(e.folder(m)) as run:
-                return row | {"speed_m_s": run.value("tow.speed"), "concentration": float(run.number("concentration"))}
-    return row | {"speed_m_s": c.values.get("tow.speed", np.nan),
-                  "concentration": c.values.get("ice.concentration", np.nan)}
+    found = e.each(c.members[e.status[c.members] == FINISHED], lambda run: {
+        "speed_m_s": run.value("tow.speed"), "concentration": float(run.number("concentration"))})
+    return row | next(found, {"speed_m_s": c.values.get("tow.speed", np.nan),
+                              "concentration": c.values.get("ice.concentration", np.nan)})
 
 
 def conditions(e, **more):
@@ -184,11 +180,8 @@ def hardest(rows, speed=None):
 
 def case_of(e, row):
     """{key: text} of a condition's case, as the program reads it; {} if none of its members has a folder."""
-    for m in e.conditions()[int(row["id"].partition(".")[2]) - 1].members:
-        if e.status[m] == FINISHED and e.folder(m).is_dir():
-            with Run(e.folder(m)) as run:
-                return run.case
-    return {}
+    rows = e.conditions()[int(row["id"].partition(".")[2]) - 1].members
+    return next(e.each(rows[e.status[rows] == FINISHED], lambda run: run.case), {})
 
 
 def tow_of(e, row, line, vessel):
@@ -339,11 +332,12 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
               "speed_m_s": asked["speed_m_s"], "free_speed_m_s": v.free_speed, "free_speed_from": v.free_from,
               "efficiency": efficiency, "given_n": v.pull, "has_n": pull,
               "holds": gear.verdict(n, top and bounds(top), pull), "own_resistance": None, "needed_with_ice_n": None}
-    own = gear.own_resistance(v, case_value(t.case, "ice.thickness", 0.0), worst["concentration"],
-                              asked["speed_m_s"]) if t else None
-    if own:
-        vessel |= {"own_resistance": {"low_n": own[0], "high_n": own[1], "source": own[2]}, "needed_with_ice_n": [
-            gear.needed_pull(v, n, asked["speed_m_s"], efficiency, x) for x in own[:2]]}
+    thickness = case_value(t.case, "ice.thickness", 0.0) if t else 0.0
+    if np.isfinite(v.beam) and thickness > 0:  # of the vessel itself: an order of magnitude
+        own = towing.ice_resistance(v.beam, thickness, worst["concentration"], asked["speed_m_s"])
+        vessel |= {"own_resistance": {"low_n": own.low, "high_n": own.high, "source": own.source},
+                   "needed_with_ice_n": [gear.needed_pull(v, n, asked["speed_m_s"], efficiency, x)
+                                         for x in (own.low, own.high)]}
     l, load = asked["line_found"], hold["n"] if hold else np.nan
     line = {"id": "line", "name": l.name or None, "row": hold and hold["id"], "design_tension_n": load,
             "factor": factor, "needed_breaking_load_n": load * (factor or 1.0), "given_n": l.breaking,

@@ -74,10 +74,6 @@ def applies(some, value, wind):
     return [r for r in some if on(r)]
 
 
-def first_drag(some):
-    return sorted(some, key=lambda r: r.key != "body.drag.water_form")
-
-
 def ratio(base, other):
     """(R'/R, (low, high) of 95 %) from paired means of fields; without an interval for fewer than two."""
     base, other = np.asarray(base, dtype=float), np.asarray(other, dtype=float)

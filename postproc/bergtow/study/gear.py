@@ -124,14 +124,6 @@ def verdict(load, interval, has):
     return "yes" if high <= has else "no" if low > has else "open"
 
 
-def own_resistance(v, thickness, concentration, speed):
-    """(low, high, source) of the ice resistance of the vessel itself, N, an order of magnitude; None without a beam."""
-    if not (np.isfinite(v.beam) and thickness > 0):
-        return None
-    found = towing.ice_resistance(v.beam, thickness, concentration, speed)
-    return found.low, found.high, found.source
-
-
 def limit_speed(speeds, needs, has):
     """Speed, m/s, at which the required pull first exceeds the vessel's, linear between speeds; None if it never does,
     or already does at the first speed."""

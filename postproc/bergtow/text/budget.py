@@ -9,14 +9,10 @@ import numpy as np
 TRUSTED_Q2 = 0.7  # below this, shares are only a rough guide
 
 
-def _force(found, x):
-    return "–" if x is None or not np.isfinite(x) else quantity(x, found["units"])
-
-
 def _ends(found, ends):
     if ends is None or None in ends:
         return ""
-    return f" ({_force(found, ends[0])} to {_force(found, ends[1])})"
+    return f" ({' to '.join(quantity(x, found['units']) for x in ends)})"
 
 
 def _percent(x):
@@ -36,11 +32,11 @@ def _index(i, what):
 
 def rows(found):
     """The lines of the table."""
-    out = [["mean", _force(found, found["mean"]) + _ends(found, found["mean_95"]), "", "", "", "", ""]]
+    out = [["mean", quantity(found["mean"], found["units"]) + _ends(found, found["mean_95"]), "", "", "", "", ""]]
     one = found["fields"]["sd"] is None
     parts = [("fields: one tow", found["fields"]), ("parameters" + (" and fields" if one else ""), found["parameters"])]
     for name, p in parts[one:]:
-        out.append([name, _force(found, p["sd"]) + _ends(found, p["sd_95"]), of_mean(found, p["sd"]),
+        out.append([name, quantity(p["sd"], found["units"]) + _ends(found, p["sd_95"]), of_mean(found, p["sd"]),
                     _percent(p["share"]), "", "", ""])
     indices = found["shares"].get("indices", {})
     for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
@@ -50,7 +46,7 @@ def rows(found):
                     "; ".join(t for t in (given["distribution"], source) if t)])
     out += _numerics(found)
     together = found["together"]["sd"]
-    out.append(["together", _force(found, together), of_mean(found, together), "", "", "", ""])
+    out.append(["together", quantity(together, found["units"]), of_mean(found, together), "", "", "", ""])
     return out
 
 
@@ -61,10 +57,10 @@ def _numerics(found):
         return [["numerics", "not known" if n else "not studied", *[""] * 5]]
     bound = "" if n["unknown"] else "at most "
     known = n["sd"] is not None and np.isfinite(n["sd"])
-    out = [["numerics", bound + _force(found, n["sd"]) if known else "not known",
+    out = [["numerics", bound + quantity(n["sd"], found["units"]) if known else "not known",
             of_mean(found, n["sd"]) if known else "", _percent(n["share"]) if known else "", "", "", ""]]
     if n.get("bias"):
-        out.append([f"bias of {', '.join(n['biases'])}", _force(found, abs(n["bias"])),
+        out.append([f"bias of {', '.join(n['biases'])}", quantity(abs(n["bias"]), found["units"]),
                     of_mean(found, abs(n["bias"])), _percent(n["bias_share"]), "", "", ""])
     return out
 
@@ -183,5 +179,6 @@ def figure(found):
         axes.set_xlim(left=0)
         axes.grid(True, axis="x")
     style.head(fig, f"{style.plain(found['title'])}: uncertainty budget",
-               f"{found['meaning']}: {_force(found, found['mean'])} on average; black: 95 %", left=0.15 / width)
+               f"{found['meaning']}: {quantity(found['mean'], found['units'])} on average; black: 95 %",
+               left=0.15 / width)
     return fig

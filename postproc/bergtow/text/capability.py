@@ -16,10 +16,6 @@ def value(found, x):
     return quantity(x, "N") if unit == "N" else f"{short(factor * x)} {unit}".strip()
 
 
-def force(x):
-    return "–" if x is None or not np.isfinite(x) else quantity(x, "N")
-
-
 def condition(found, c):
     """Words for a condition, under a heading that names its key."""
     return c["label"].removeprefix(f"{found['for']} ")
@@ -52,8 +48,8 @@ def curve(found):
             made = f"{p['made']} of {p['fields']}"
             rows.append([condition(found, c), value(found, p["value"]), made, str(p.get("stood_still", "–")),
                          str(p["failed"]), str(p["parted"]),
-                         number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
-                         force(max(tension, default=None))])
+                         number(p["mean_speed"]) + band, quantity(p["mean_tow_force"], "N"),
+                         quantity(p["mean_tension"], "N"), quantity(max(tension, default=None), "N")])
     return Table(head, rows)
 
 

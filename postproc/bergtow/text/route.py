@@ -12,9 +12,7 @@ PLANNED = {"no_go": "crosses a no-go area", "outside": "leaves the domain",
 
 
 def amount(x, unit):
-    if x is None:
-        return "–"
-    if unit == "s":
+    if unit == "s" and x is not None:
         return f"{number(x)} s" if x < 7200 else f"{number(x / 3600)} h"
     return quantity(x, unit)
 
