@@ -213,8 +213,8 @@ static void cut_map(bt_world *world)
     if (domain->distributed && !domain->undivided) { // the first division did not know the work
         domain->stats.repartition_imbalance += fresh;
         domain->stats.worst_repartition_imbalance = bt_max(domain->stats.worst_repartition_imbalance, fresh);
+        domain->stats.divisions++;
     }
-    domain->stats.divisions++;
 }
 
 void bt_division_map(bt_world *world, bool cut)

@@ -62,8 +62,10 @@ void bt_domain_free(bt_domain *domain)
 bt_domain_stats bt_domain_get_stats(const bt_world *world)
 {
     bt_domain_stats stats = world->domain ? world->domain->stats : (bt_domain_stats){0};
-    if (stats.checks > 0) stats.imbalance /= (double)stats.checks;
-    if (stats.divisions > 1) stats.repartition_imbalance /= (double)(stats.divisions - 1);
+    stats.imbalance /= (double)stats.checks;
+    stats.repartition_imbalance /= (double)stats.divisions;
+    if (stats.checks == 0) stats.worst_imbalance = NAN;
+    if (stats.divisions == 0) stats.worst_repartition_imbalance = NAN;
     return stats;
 }
 
@@ -192,7 +194,7 @@ void bt_domain_note(bt_world *world)
         const double mean = bt_sum_value(&total) * 0x1p-40 / domain->comm->size,
                      imbalance = mean > 0 ? mine / mean - 1 : 0;
         const bool for_one = bt_division_is_for_one(world, mean * domain->comm->size / (double)domain->steps);
-        if (!domain->undivided && (domain->stats.divisions > 1 || imbalance <= IMBALANCE)) {
+        if (!domain->undivided && (domain->stats.divisions > 0 || imbalance <= IMBALANCE)) {
             domain->stats.checks++;
             domain->stats.imbalance += imbalance;
             domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);

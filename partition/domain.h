@@ -13,12 +13,12 @@ typedef struct bt_domain bt_domain;
 
 /// Costs of the division.
 typedef struct bt_domain_stats {
-    int64_t divisions;       ///< times cells were divided anew
-    /// work of the busiest rank / mean − 1 over the checks, mean of those after the first division
+    int64_t divisions;       ///< after the first
+    /// work of the busiest rank / mean − 1 over the checks, mean of those after the first division; NaN without one
     double imbalance;
     double worst_imbalance;  ///< largest of them
     int64_t checks;
-    /// the same just after a division, of the work from which it was made: mean over those after the first
+    /// the same just after a division, of the work from which it was made: mean over `divisions`, NaN if there was none
     double repartition_imbalance;
     double worst_repartition_imbalance;
     double cut;              ///< share of neighbouring cell pairs that lie on different ranks, last division

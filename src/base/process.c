@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The launcher of this process, and the cores that it may use.
+// The launcher of this process, its memory, and the cores that it may use.
 #include "base/process.h"
 
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -87,6 +88,32 @@ double bt_launcher_began(void)
     const double age = (double)since_boot.tv_sec + 1e-9 * (double)since_boot.tv_nsec -
                        ticks / (double)sysconf(_SC_CLK_TCK);
     return now - bt_max(0, age);
+}
+
+// --- its memory ------------------------------------------------------------------------------------------------------
+
+// getrusage keeps the peak of the process that forked this one, before it became this program: of a run that Python
+// starts, that of Python. The system's own count of this image, VmHWM of proc(5), does not, and can begin anew.
+
+void bt_memory_forget_peak(void)
+{
+    FILE *f = fopen("/proc/self/clear_refs", "w");
+    if (!f) return;
+    fputs("5", f);
+    fclose(f);
+}
+
+double bt_memory_peak(void)
+{
+    double kilobytes = 0;
+    char text[256];
+    FILE *f = fopen("/proc/self/status", "r");
+    while (f && kilobytes == 0 && fgets(text, sizeof text, f))
+        if (!strncmp(text, "VmHWM:", 6)) kilobytes = strtod(text + 6, NULL);
+    if (f) fclose(f);
+    struct rusage use;
+    if (kilobytes == 0 && getrusage(RUSAGE_SELF, &use) == 0) kilobytes = (double)use.ru_maxrss;
+    return 1024 * kilobytes;
 }
 
 // --- the cores -------------------------------------------------------------------------------------------------------

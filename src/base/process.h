@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// This process: its launcher, and the cores that it may use.
+// This process: its launcher, its memory, and the cores that it may use.
 #ifndef BT_PROCESS_H
 #define BT_PROCESS_H
 
@@ -26,6 +26,14 @@ double bt_launcher_began(void);
 
 /// Unset the launcher's variables: processes that this one starts would otherwise take themselves for its rank.
 void bt_launcher_forget(void);
+
+// --- its memory ------------------------------------------------------------------------------------------------------
+
+/// Forget the peak of memory so far, where the system allows it.
+void bt_memory_forget_peak(void);
+
+/// Peak resident memory since then, or since the program was started, B.
+double bt_memory_peak(void);
 
 // --- the cores -------------------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@
 
 #include "base/checksum.h"
 #include "base/fileio.h"
+#include "base/process.h"
 #include "case/case_files.h"
 #include "output/checkpoint.h"
 #include "output/folder.h"
@@ -120,6 +121,7 @@ void bt_resume_end(bt_resume *resume)
 static bt_status run_case(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
                           bt_run_manner *manner, int64_t *failed, bt_errors *err)
 {
+    bt_memory_forget_peak(); // of the run before, in an ensemble
     bt_running running;
     bt_status status = bt_running_begin(&running, comm, input, options, manner, err);
     while (status == BT_OK && bt_running_goes_on(&running)) status = bt_running_step(&running, err);

@@ -9,7 +9,6 @@
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 #include <time.h>
 
 #include "output/checkpoint.h"
@@ -413,15 +412,13 @@ static void note_division(run *running)
 static void measure_memory(run *running)
 {
     const bt_cells *cells = running->w->cells;
-    struct rusage u;
-    getrusage(RUSAGE_SELF, &u);
     double bytes = 0, points = 0;
     for (bt_idx k = 0; k < cells->n; k++) {
         bytes += (double)cells->cell[k].n_contacts * (double)bt_batch_bytes(&cells->cell[k]);
         points += (double)cells->cell[k].n_points;
     }
     bt_sum sums[3] = {{0}, {0}, {0}};
-    bt_sum_add(&sums[0], 1024.0 * (double)u.ru_maxrss);
+    bt_sum_add(&sums[0], bt_memory_peak());
     bt_sum_add(&sums[1], bytes);
     bt_sum_add(&sums[2], points);
     bt_comm_reduce(running->comm, sums, 3, NULL, 0, NULL, 0);

@@ -159,6 +159,13 @@ def test_memory_beyond_the_machine(tmp_path):
     assert studied.returncode == CASE and "GB of memory, but this machine has" in studied.stderr
 
 
+def test_the_memory_of_a_run_is_its_own(tmp_path):
+    """Not that of the process which started it: getrusage keeps that over exec."""
+    mine = bytearray(b"x" * (200 << 20))
+    r = run(tmp_path, changed(TOW, run__duration=2))
+    assert 10e6 < r.summary["memory_per_floe_b"] * r.summary["n_floes"] < 0.6 * len(mine)
+
+
 def test_a_field_of_another_domain(tmp_path):
     assert call("field", write_case(tmp_path, TOW), "-o", tmp_path / "field.h5").returncode == DONE
     checked, ran = both(tmp_path, changed(reading(TOW, "field.h5"), domain__x0=4, body__x=7))

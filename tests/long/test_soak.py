@@ -114,7 +114,7 @@ def test_memory_residual_and_time_stay(tmp_path):
     r = Run(tmp_path / "soak", None)
     s = r.summary
     assert s["n_steps"] == STEPS and s["n_floes"] >= FLOES and s["ranks"] == 2
-    assert s["divisions"] > 2 and s["moved_floes"] > 0, "cells were never assigned anew"
+    assert s["divisions"] > 1 and s["moved_floes"] > 0, "cells were never assigned anew"
     assert s["moving_window"]["renewed"] > 0.2 * FLOES, "the berg met no fresh ice"
 
     step, spent, memory = rows[:, 0], rows[:, 1], rows[:, 2:]

@@ -163,7 +163,7 @@ def test_the_same_bits(alone, name, ranks, threads):
     if ranks == 1:
         return
     # Otherwise nothing was assigned, or nothing went over.
-    assert r.summary["divisions"] >= 2 and r.summary["moved_floes"] > 50, r.summary
+    assert r.summary["divisions"] >= 1 and r.summary["moved_floes"] > 50, r.summary
     assert 0 < r.summary["edge_cut"] <= 1 and 0 < r.summary["halo_share"] < 3
     assert 0 <= r.summary["imbalance"] <= r.summary["worst_imbalance"]
     assert 0 <= r.summary["repartition_imbalance"] <= r.summary["worst_repartition_imbalance"]
