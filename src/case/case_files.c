@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/checksum.h"
+#include "base/largest.h"
 
 #define ITSELF "case" // no key has this name: all have a section
 #define GIVEN "#> "   // before each line of the case as given
@@ -91,7 +92,10 @@ char *bt_case_with_comments(const char *resolved, const char *digests, const cha
     for (const char *at = given; at && *at; at += piece_length(at))
         fprintf(text.out, GIVEN "%.*s", (int)piece_length(at), at);
     fputs(given ? "\n" : "", text.out); // ends the last line, which may have no end of its own
-    return bt_text_end(&text);
+    char *whole = bt_text_end(&text);
+    if (!given || strlen(whole) <= BT_MOST_TEXT_BYTES) return whole;
+    free(whole); // a case that could not be read would be worse than one without its source
+    return bt_case_with_comments(resolved, digests, NULL);
 }
 
 char *bt_case_given_in(const char *text)

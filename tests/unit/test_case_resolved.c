@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The resolved file of a case reads back to the same bits.
+#include "base/largest.h"
 #include "case/case_files.h"
 #include "case/schema.h"
 #include "case_text.h"
@@ -209,6 +210,13 @@ TEST(the_case_as_given_comes_back)
     }
     char *alone = bt_case_with_comments(resolved, NULL, NULL);
     assert_null(bt_case_given_in(alone));
+    char *large = calloc(1, BT_MOST_TEXT_BYTES + 1); // with which the text could not be read
+    assert_non_null(large);
+    memset(large, '#', BT_MOST_TEXT_BYTES);
+    char *without = bt_case_with_comments(resolved, NULL, large);
+    assert_string_equal(without, alone);
+    free(without);
+    free(large);
     free(alone);
     free(resolved);
     bt_case_free(&c);
