@@ -65,7 +65,12 @@
 // long as a hundred sweeps, and the wedge needs one step for each contact that changes its state. At equal work more
 // steps missed the tolerance with them than without. Extrapolation of two rounds of plain sweeps along their difference
 // (Aitken; it shrinks by 2 % a round): contacts change their state all along that way, and the rounds after it are back
-// where they started. Going back to the best unknowns whenever the residual has risen: more steps missed.
+// where they started. Going back to the best unknowns whenever the residual has risen: more steps missed. Every round
+// over a part of the field while few contacts are bad, not every second: where walls close on 100,000 floes it saves a
+// third of the updates, around a berg in 90 and 95 % ice it takes 4 to 6 % more, and 1.6 to 1.8 times the sweeps. A
+// coarse level over clusters of cells: what grows with the size of a field is the number of hard spots (from 30,000 to
+// 100,000 floes between the same walls, 5.3 to 8.4 updates of a contact in a step, half of them in rounds with fewer
+// than 40 bad contacts), and these are smaller than a cluster.
 #ifndef BERGTOW_ROUNDS_H
 #define BERGTOW_ROUNDS_H
 
