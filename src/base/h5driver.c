@@ -394,7 +394,7 @@ static const H5FD_class_t driver = {
 #endif
     .name = "bergtow",
     .maxaddr = MAX_ADDRESS,
-    .fc_degree = H5F_CLOSE_WEAK,
+    .fc_degree = H5F_CLOSE_STRONG, // datasets that are still open close with the file
     .fapl_size = sizeof(driver_info),
     .open = driver_open,
     .close = driver_close,

@@ -135,7 +135,6 @@ bt_status bt_snapshot_close(bt_snapshot *snap, bt_errors *err)
 
 static void drop(bt_snapshot *snap)
 {
-    if (snap->file->dataset >= 0) H5Dclose(snap->file->dataset);
     snap->file->h.err = NULL;
     if (!snap->file->ended) bt_h5_close(&snap->file->h);
     release(snap, false);

@@ -222,9 +222,9 @@ void bt_frames_create(bt_frames *frames, bt_h5 *h5, const bt_comm *comm, const b
                       const bt_map_axes *axes)
 {
     *frames = (bt_frames){.h = h5, .comm = comm, .axes = *axes, .n_floes = bodies->n_floes,
-                          .n_others = bodies->n_bodies - bodies->n_floes, .time = -1,
+                          .n_others = bodies->n_bodies - bodies->n_floes,
                           .towed = bodies->towed < 0 ? -1 : bodies->towed - bodies->n_floes,
-                          .branches = bodies->branches, .line_points = -1, .line_tension = -1};
+                          .branches = bodies->branches};
     frames->first = bt_comm_first(comm, comm->rank, bodies->n_floes);
     frames->own_floes = bt_comm_first(comm, comm->rank + 1, bodies->n_floes) - frames->first;
     frames->own_others = comm->rank == comm->size - 1 ? frames->n_others : 0;
@@ -404,12 +404,9 @@ void bt_frames_close(bt_frames *frames)
 {
     for (int k = 0; k < BT_FRAME_COLUMNS; k++)
         if (frames->column[k].h) bt_slab_close(&frames->column[k]);
-    const hid_t datasets[] = {frames->time, frames->line_points, frames->line_tension};
-    for (int k = 0; k < 3; k++)
-        if (frames->h && datasets[k] >= 0) H5Dclose(datasets[k]);
     free(frames->lines);
     free(frames->vertices);
     free(frames->n_vertices);
     free(frames->times);
-    *frames = (bt_frames){.time = -1, .line_points = -1, .line_tension = -1};
+    *frames = (bt_frames){0};
 }

@@ -26,7 +26,7 @@ typedef struct bt_frames {
     bt_slab column[BT_FRAME_COLUMNS]; ///< pose, ...: frames.c
     int64_t towed;                  ///< index among the other bodies, −1 = none
     int branches;                   ///< of the tow line
-    hid_t line_points, line_tension;///< −1 without a line
+    hid_t line_points, line_tension;///< with a line
     double *times;                  ///< [n] s
     bt_frame_line *lines;           ///< [n]; NULL without a line
     int64_t n, cap;                 ///< frames
@@ -45,6 +45,6 @@ bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows
 /// Read frame k of an older file, for bt_frames_add: rows of all bodies.
 void bt_frames_read(const bt_frames *frames, bt_h5_reader *old, int64_t k, double *time, bt_frame_row *rows,
                     bt_frame_line *line);
-void bt_frames_close(bt_frames *frames); ///< datasets and memory
+void bt_frames_close(bt_frames *frames); ///< release its memory; datasets close with the file
 
 #endif

@@ -366,10 +366,6 @@ void bt_impact_store_load(bt_impact_store *store, bt_snapshot *from, bt_h5_reade
 void bt_impact_store_close(bt_impact_store *store)
 {
     if (!store->h) return;
-    for (int k = 0; k < BT_IMPACT_COLUMNS; k++)
-        if (store->column[k] >= 0) H5Dclose(store->column[k]);
-    if (store->force >= 0) H5Dclose(store->force);
-    if (store->normal >= 0) H5Dclose(store->normal);
     free(store->rows);
     free(store->forces);
     free(store->normals);

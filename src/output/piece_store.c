@@ -206,14 +206,6 @@ bt_piece_row *bt_piece_store_read(bt_h5_reader *old, int64_t k, int64_t *n)
 
 void bt_piece_store_close(bt_piece_store *store)
 {
-    if (!store->h) return;
-    const hid_t others[] = {store->area, store->offsets, store->vertices, store->end};
-    for (int k = 0; k < BT_SPLIT_COLUMNS; k++)
-        if (store->split[k] >= 0) H5Dclose(store->split[k]);
-    for (int k = 0; k < BT_PIECE_COLUMNS; k++)
-        if (store->piece[k] >= 0) H5Dclose(store->piece[k]);
-    for (int k = 0; k < 4; k++)
-        if (others[k] >= 0) H5Dclose(others[k]);
     free(store->frame);
     *store = (bt_piece_store){0};
 }

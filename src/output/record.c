@@ -95,13 +95,9 @@ static void record_free(bt_record *record)
     free(record);
 }
 
-/// Close datasets and file; returns the status of all writes to the file.
+/// Close the file, and with it its datasets; returns the status of all writes to the file.
 static bt_status close_file(bt_record *record)
 {
-    for (int k = 0; k < record->n_series; k++)
-        if (record->series[k] >= 0) H5Dclose(record->series[k]);
-    for (int k = 0; k < 4; k++)
-        if (record->events[k] >= 0) H5Dclose(record->events[k]);
     bt_frames_close(&record->frames);
     bt_impact_store_close(&record->impacts);
     bt_piece_store_close(&record->pieces);
@@ -152,8 +148,6 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     record->merged = bt_alloc((size_t)record->n_series, sizeof *record->merged);
     record->buffer = bt_alloc((size_t)record->n_series * BT_RECORD_BUFFER, sizeof *record->buffer);
     record->series = bt_alloc((size_t)record->n_series, sizeof *record->series);
-    for (int k = 0; k < record->n_series; k++) record->series[k] = -1;
-    for (int k = 0; k < 4; k++) record->events[k] = -1;
 
     const char *path = BT_PATH(dir, BT_RESULT_PART);
     char *resolved = bt_case_resolved(input);

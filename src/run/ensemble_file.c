@@ -193,7 +193,6 @@ static void write_series(bt_h5 *h5, const table *t, const char *dir)
             free(x);
         }
         free(row);
-        if (set >= 0) H5Dclose(set);
         bt_h5_describe(h5, name, "member sample", bt_series_find(series[k])->units,
                        bt_series_find(series[k])->description);
     }
