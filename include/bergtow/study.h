@@ -66,12 +66,13 @@ typedef struct bt_study_parameter {
     int64_t *stratum;    ///< [n_conditions] stratum of each condition in a Latin hypercube; NULL in a grid
 } bt_study_parameter;
 
+/// Keys that only the members with one value of a parameter get: a variant, or an entry of `with`.
 typedef struct bt_study_variant {
-    char *name;
+    char *name;          ///< that value; in `with`, "key=value"
     char **set;          ///< [n_set] "key=value"
     char **at;           ///< [n_set] place of each
     int n_set;
-    int axis;            ///< the parameter with this value
+    int axis;            ///< the parameter
 } bt_study_variant;
 
 typedef struct bt_study {
@@ -84,10 +85,8 @@ typedef struct bt_study {
     int n_set;
     bt_study_parameter parameter[BT_MAX_PARAMETERS];
     int n_parameters;
-    bt_study_variant *variant;
+    bt_study_variant *variant; ///< [n_variants] those of `variants`, then those of `with`
     int n_variants;
-    bt_study_variant *with; ///< [n_with] name: "key=value" of a parameter
-    int n_with;
     bt_sampling sampling;
     bt_study_fields fields;
     int64_t samples, repeats, seed, ranks;

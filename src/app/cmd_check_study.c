@@ -198,12 +198,9 @@ static void print_varied(const bt_study *study)
     for (int i = 0; i < study->n_parameters; i++) print_parameter(study, &study->parameter[i]);
     char label[CELL + 8];
     for (int i = 0; i < study->n_variants; i++) {
-        snprintf(label, sizeof label, "  %.46s", study->variant[i].name);
+        const bool with = bt_is_with(study, &study->variant[i]);
+        snprintf(label, sizeof label, with ? "  with %.42s" : "  %.46s", study->variant[i].name);
         print_sets(label, study->variant[i].set, study->variant[i].n_set);
-    }
-    for (int i = 0; i < study->n_with; i++) {
-        snprintf(label, sizeof label, "  with %.42s", study->with[i].name);
-        print_sets(label, study->with[i].set, study->with[i].n_set);
     }
 }
 

@@ -23,16 +23,6 @@ static void free_texts(char **text, int n)
     free(text);
 }
 
-static void free_sets(bt_study_variant *variant, int n)
-{
-    for (int i = 0; i < n; i++) {
-        free(variant[i].name);
-        free_texts(variant[i].set, variant[i].n_set);
-        free_texts(variant[i].at, variant[i].n_set);
-    }
-    free(variant);
-}
-
 void bt_study_free(bt_study *study)
 {
     for (int i = 0; i < study->n_parameters; i++) {
@@ -42,8 +32,12 @@ void bt_study_free(bt_study *study)
         free(study->parameter[i].stratum);
         free_texts(study->parameter[i].value, study->parameter[i].n);
     }
-    free_sets(study->variant, study->n_variants);
-    free_sets(study->with, study->n_with);
+    for (int i = 0; i < study->n_variants; i++) {
+        free(study->variant[i].name);
+        free_texts(study->variant[i].set, study->variant[i].n_set);
+        free_texts(study->variant[i].at, study->variant[i].n_set);
+    }
+    free(study->variant);
     free_texts(study->set, study->n_set);
     free_texts(study->set_at, study->n_set);
     free(study->path);
@@ -72,24 +66,20 @@ void bt_study_member(const bt_study *study, int64_t m, bt_member *out)
                                                     : (int64_t)(bt_rng_bits(&rng) >> 2); // below 4.7e18
     int most = study->n_set + study->n_parameters + 1;
     for (int i = 0; i < study->n_variants; i++) most += study->variant[i].n_set;
-    for (int i = 0; i < study->n_with; i++) most += study->with[i].n_set;
     out->set = bt_alloc((size_t)most, sizeof *out->set);
     out->at = bt_alloc((size_t)most, sizeof *out->at);
     for (int i = 0; i < study->n_set; i++) add_override(out, bt_text_copy(study->set[i]), study->set_at[i]);
     for (int p = 0; p < study->n_parameters; p++) {
-        out->value[p] = bt_study_value(study, p, out->condition);
+        const char *value = out->value[p] = bt_study_value(study, p, out->condition);
         if (study->parameter[p].key >= 0) {
-            char *given = bt_text_of("%s=%s", study->parameter[p].name, out->value[p]);
-            add_override(out, given, study->parameter[p].at);
-            for (int i = 0; i < study->n_with; i++)
-                for (int k = 0; study->with[i].axis == p && k < study->with[i].n_set &&
-                     !strcmp(study->with[i].name, given); k++)
-                    add_override(out, bt_text_copy(study->with[i].set[k]), study->with[i].at[k]);
-            continue;
+            add_override(out, bt_text_of("%s=%s", study->parameter[p].name, value), study->parameter[p].at);
+            value = out->set[out->n_set - 1];
         }
-        for (int i = 0; i < study->n_variants; i++)
-            for (int k = 0; k < study->variant[i].n_set && !strcmp(study->variant[i].name, out->value[p]); k++)
-                add_override(out, bt_text_copy(study->variant[i].set[k]), study->variant[i].at[k]);
+        for (int i = 0; i < study->n_variants; i++) {
+            const bt_study_variant *variant = &study->variant[i];
+            for (int k = 0; k < variant->n_set && variant->axis == p && !strcmp(variant->name, value); k++)
+                add_override(out, bt_text_copy(variant->set[k]), variant->at[k]);
+        }
     }
     add_override(out, bt_text_of("ice.seed=%" PRId64, out->seed), NULL);
 }
@@ -194,10 +184,8 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err)
     }
     for (int i = 0; i < study->n_variants; i++)
         for (int k = 0; k < study->variant[i].n_set; k++)
-            fprintf(out, "variant %s: %s\n", study->variant[i].name, study->variant[i].set[k]);
-    for (int i = 0; i < study->n_with; i++)
-        for (int k = 0; k < study->with[i].n_set; k++)
-            fprintf(out, "with %s: %s\n", study->with[i].name, study->with[i].set[k]);
+            fprintf(out, "%s %s: %s\n", bt_is_with(study, &study->variant[i]) ? "with" : "variant",
+                    study->variant[i].name, study->variant[i].set[k]);
     fprintf(out, "# base case with `set`\n%s", base);
     free(base);
     return bt_text_end(&text);
@@ -207,29 +195,23 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err)
 
 // Keys that only some members get; reasons in study.h.
 
-static bt_study_setting *add_sets(bt_study_setting *to, const bt_study_variant *variant, int n, const char *section)
-{
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < variant[i].n_set; k++)
-            *to++ = (bt_study_setting){variant[i].set[k], (int)strcspn(variant[i].set[k], "="), variant[i].at[k],
-                                       section, variant[i].axis};
-    return to;
-}
-
 /// List all such keys, those of parameters first; the caller frees the list.
 static bt_study_setting *study_settings(const bt_study *study, int *n)
 {
     size_t most = (size_t)study->n_parameters + 1;
     for (int i = 0; i < study->n_variants; i++) most += (size_t)study->variant[i].n_set;
-    for (int i = 0; i < study->n_with; i++) most += (size_t)study->with[i].n_set;
     bt_study_setting *list = bt_alloc(most, sizeof *list), *to = list;
     for (int p = 0; p < study->n_parameters; p++) {
         const bt_study_parameter *parameter = &study->parameter[p];
         if (parameter->key >= 0)
             *to++ = (bt_study_setting){parameter->name, (int)strlen(parameter->name), parameter->at, "parameters", p};
     }
-    to = add_sets(to, study->variant, study->n_variants, "variants");
-    to = add_sets(to, study->with, study->n_with, "with");
+    for (int i = 0; i < study->n_variants; i++) {
+        const bt_study_variant *variant = &study->variant[i];
+        for (int k = 0; k < variant->n_set; k++)
+            *to++ = (bt_study_setting){variant->set[k], (int)strcspn(variant->set[k], "="), variant->at[k],
+                                       bt_is_with(study, variant) ? "with" : "variants", variant->axis};
+    }
     *n = (int)(to - list);
     return list;
 }

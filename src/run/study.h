@@ -22,6 +22,12 @@ typedef struct {
     int axis;            ///< the parameter that decides who gets it
 } bt_study_setting;
 
+/// Is it an entry of `with`, and not a variant?
+static inline bool bt_is_with(const bt_study *study, const bt_study_variant *variant)
+{
+    return study->parameter[variant->axis].key >= 0;
+}
+
 /// The section in which a key is given to only some members, NULL = none.
 const char *bt_study_varied(const bt_study *study, const char *key);
 

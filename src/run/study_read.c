@@ -150,9 +150,18 @@ static void read_parameters(const bt_study_reader *reader, const bt_node *map, i
     }
 }
 
-static void read_variants(const bt_study_reader *reader, const bt_node *map, int line)
+/// Add keys for the members with one value of a parameter. where: for messages.
+static void add_variant(const bt_study_reader *reader, const bt_node *map, int i, int axis, const char *where)
 {
     bt_study *study = reader->s;
+    study->variant = bt_realloc(study->variant, (size_t)study->n_variants + 1, sizeof *study->variant);
+    bt_study_variant *variant = &study->variant[study->n_variants++];
+    *variant = (bt_study_variant){.name = bt_text_copy(map->key[i]), .axis = axis};
+    read_set(reader, map->item[i], map->key_line[i], where, &variant->set, &variant->at, &variant->n_set);
+}
+
+static void read_variants(const bt_study_reader *reader, const bt_node *map, int line)
+{
     if (map->kind != BT_NODE_MAP || map->n == 0) {
         bt_study_complain(reader, line,
                           "variants: needs names with keys; write variants: {squares: {ice.shape: rectangles}}");
@@ -160,16 +169,12 @@ static void read_variants(const bt_study_reader *reader, const bt_node *map, int
     }
     bt_study_parameter *parameter = add_parameter(reader, line, "variant", -1);
     if (!parameter) return;
-    study->variant = bt_alloc((size_t)map->n, sizeof *study->variant);
     parameter->value = bt_alloc((size_t)map->n, sizeof *parameter->value);
     for (int i = 0; i < map->n; i++) {
-        bt_study_variant *variant = &study->variant[study->n_variants++];
         char where[96];
         snprintf(where, sizeof where, "variants: %.60s", map->key[i]);
-        variant->name = bt_text_copy(map->key[i]);
-        variant->axis = study->n_parameters - 1;
-        parameter->value[parameter->n++] = bt_text_copy(variant->name);
-        read_set(reader, map->item[i], map->key_line[i], where, &variant->set, &variant->at, &variant->n_set);
+        parameter->value[parameter->n++] = bt_text_copy(map->key[i]);
+        add_variant(reader, map, i, reader->s->n_parameters - 1, where);
     }
 }
 
@@ -204,22 +209,16 @@ static int axis_of(const bt_study_reader *reader, int line, const char *name)
 
 static void read_with(const bt_study_reader *reader, const bt_node *map, int line)
 {
-    bt_study *study = reader->s;
     if (map->kind != BT_NODE_MAP || map->n == 0) {
         bt_study_complain(reader, line,
                           "with: needs values with keys; write with: {ice.concentration=0.2: {domain.width: 5 km}}");
         return;
     }
-    study->with = bt_alloc((size_t)map->n, sizeof *study->with);
     for (int i = 0; i < map->n; i++) {
         const int axis = axis_of(reader, map->key_line[i], map->key[i]);
-        if (axis < 0) continue;
         char where[160];
         snprintf(where, sizeof where, "with: %.120s", map->key[i]);
-        bt_study_variant *variant = &study->with[study->n_with++];
-        variant->name = bt_text_copy(map->key[i]);
-        variant->axis = axis;
-        read_set(reader, map->item[i], map->key_line[i], where, &variant->set, &variant->at, &variant->n_set);
+        if (axis >= 0) add_variant(reader, map, i, axis, where);
     }
 }
 
