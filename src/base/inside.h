@@ -34,7 +34,8 @@ static inline int bt_ascending(const void *a, const void *b)
 }
 static inline int bt_descending(const void *a, const void *b) { return bt_ascending(b, a); }
 
-/// Define an order of structs, for qsort: by one number of theirs, and where that is the same by another.
+/// Define an order of structs, for qsort: by one number of theirs; the second: where that is the same, by another.
+#define BT_ASCENDING(name, type, first) BT_ASCENDING_BY(name, type, first, first)
 #define BT_ASCENDING_BY(name, type, first, second)                                                                     \
     static int name(const void *p, const void *q)                                                                      \
     {                                                                                                                  \

@@ -15,6 +15,7 @@
 #include "bergtow/fclib.h"
 #include "base/fileio.h"
 #include "base/h5dataset.h"
+#include "base/inside.h"
 #include "contact/law.h"
 #include "contact/pack.h"
 #include "solve/limit.h"
@@ -275,11 +276,7 @@ static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
                              .pose = pose};
 }
 
-static int by_contact(const void *a, const void *b)
-{
-    const incidence *p = a, *q = b;
-    return (p->contact > q->contact) - (p->contact < q->contact);
-}
+BT_ASCENDING(by_contact, incidence, contact)
 
 /// The contacts at each movable body: those of body i are entries first[i] to first[i + 1] − 1 of the result.
 static incidence *incidences_of(const bt_bodies *bodies, const row *rows, int n, int64_t *first)

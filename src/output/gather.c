@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/inside.h"
 #include "output/observe.h"
 #include "partition/domain.h"
 #include "step/splitting.h"
@@ -165,11 +166,7 @@ static bt_frame_row row_of(const bt_bodies *bodies, int64_t k, const double *for
         .fx = net[k][0], .fy = net[k][1]};
 }
 
-static int by_piece(const void *p, const void *q)
-{
-    const bt_piece_row *a = p, *b = q;
-    return (a->piece > b->piece) - (a->piece < b->piece);
-}
+BT_ASCENDING(by_piece, bt_piece_row, piece)
 
 /// Collective. The existing pieces, in the order of their ids, on rank 0.
 static bt_piece_row *gather_pieces(const bt_comm *comm, const bt_world *world, const double *force, double (*net)[2],

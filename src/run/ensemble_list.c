@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
 #include "field/field_kept.h"
@@ -366,10 +367,7 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
     return status;
 }
 
-static int by_index(const void *a, const void *b)
-{
-    return ((const bt_entry *)a)->index < ((const bt_entry *)b)->index ? -1 : 1;
-}
+BT_ASCENDING(by_index, bt_entry, index)
 
 /// Report the warnings of members: for each code the text of the first, and the number of others.
 static void report_warnings(const bt_ensemble *ensemble)
