@@ -39,47 +39,29 @@ char *bt_case_resolved(const bt_case *input)
     return bt_case_text(input, BT_CASE_RESOLVED_HEAD);
 }
 
-/// Copy the member of a key, `size` bytes.
-static void member_of(const bt_case *input, const bt_key *key, void *out, size_t size)
-{
-    memcpy(out, (const char *)input + key->offset, size);
-}
-
 static void json_value(bt_json *json, const bt_key *key, const bt_case *input)
 {
-    union {
-        int64_t whole;
-        unsigned choice;
-        const char *text;
-        const double *points;
-    } v;
+    const bt_value value = bt_value_of(key, input);
     switch (key->type) {
-    case BT_KEY_REAL: bt_json_number(json, key->name, bt_value_number(key, input)); break;
-    case BT_KEY_INT: member_of(input, key, &v.whole, sizeof v.whole), bt_json_int(json, key->name, v.whole); break;
-    case BT_KEY_BOOL: bt_json_bool(json, key->name, bt_value_number(key, input) != 0); break;
+    case BT_KEY_REAL: bt_json_number(json, key->name, value.number); break;
+    case BT_KEY_INT: bt_json_int(json, key->name, value.whole); break;
+    case BT_KEY_BOOL: bt_json_bool(json, key->name, value.number != 0); break;
     case BT_KEY_CHOICE:
-        member_of(input, key, &v.choice, sizeof v.choice);
-        bt_json_string(json, key->name, key->choices[v.choice]);
-        break;
-    case BT_KEY_TEXT: member_of(input, key, &v.text, sizeof v.text), bt_json_string(json, key->name, v.text); break;
+    case BT_KEY_TEXT: bt_json_string(json, key->name, value.text); break;
     case BT_KEY_MAP: break;
-    case BT_KEY_POINTS: {
-        int n;
-        member_of(input, key, &v.points, sizeof v.points);
-        memcpy(&n, (const char *)input + key->offset_count, sizeof n);
-        if (!n) {
-            bt_json_raw(json, key->name, "null");
+    case BT_KEY_POINTS:
+        if (!value.n) {
+            bt_json_string(json, key->name, NULL);
             break;
         }
         bt_json_open(json, key->name, '[');
-        for (int i = 0; i < n; i++) {
+        for (int i = 0; i < value.n; i++) {
             bt_json_open(json, NULL, '[');
-            bt_json_number(json, NULL, v.points[2 * i]);
-            bt_json_number(json, NULL, v.points[2 * i + 1]);
+            bt_json_number(json, NULL, value.points[2 * i]);
+            bt_json_number(json, NULL, value.points[2 * i + 1]);
             bt_json_close(json, ']');
         }
         bt_json_close(json, ']');
-    }
     }
 }
 

@@ -171,7 +171,7 @@ const char *bt_case_why_unused(const bt_case *input, const char *key)
 bool bt_case_changed(const bt_case *c, const char *key)
 {
     const bt_key *k = row_of(key);
-    if (k->type == BT_KEY_POINTS) return *(const int *)(const void *)((const char *)c + k->offset_count) > 0;
+    if (k->type == BT_KEY_POINTS) return bt_value_of(k, c).n > 0;
     if (k->type == BT_KEY_REAL && isnan(bt_value_number(k, c))) return false;
     const bt_case d = with_default(c, k);
     return memcmp((const char *)c + k->offset, (const char *)&d + k->offset, size_of(k)) != 0;

@@ -92,7 +92,16 @@ bool bt_value_range(const bt_key *key, bt_range *range);
 /// the member keeps its value, and why gives the reason and the remedy. Not for points.
 bool bt_value_read(const bt_key *key, void *base, const char *text, bool plain, char why[BT_WHY]);
 
-/// The member of a number or a switch (0 or 1) as a double; NaN of other keys.
+/// The member of a key, by its type.
+typedef struct bt_value {
+    double number;        ///< of a number or a switch (0 or 1); NaN of other keys
+    int64_t whole;        ///< of a whole number
+    const char *text;     ///< of a choice its word; NULL = none
+    const double *points; ///< [n][2]
+    int n;
+} bt_value;
+bt_value bt_value_of(const bt_key *key, const void *base);
+/// Its number.
 double bt_value_number(const bt_key *key, const void *base);
 
 /// Read the coordinate of a point, with the key's unit and range.

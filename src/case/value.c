@@ -46,17 +46,28 @@ static void suggest_percent(const bt_key *key, const bt_range *range, double val
     snprintf(meant, 80, "did you mean %g or %g %%? ", ratio, value);
 }
 
-double bt_value_number(const bt_key *key, const void *base)
+bt_value bt_value_of(const bt_key *key, const void *base)
 {
     const char *member = (const char *)base + key->offset;
-    double real = NAN;
-    int64_t whole;
+    bt_value value = {.number = NAN};
     bool yes;
-    if (key->type == BT_KEY_REAL) memcpy(&real, member, sizeof real);
-    else if (key->type == BT_KEY_INT) memcpy(&whole, member, sizeof whole), real = (double)whole;
-    else if (key->type == BT_KEY_BOOL) memcpy(&yes, member, sizeof yes), real = yes;
-    return real;
+    unsigned choice;
+    switch (key->type) {
+    case BT_KEY_REAL: memcpy(&value.number, member, sizeof value.number); break;
+    case BT_KEY_INT: memcpy(&value.whole, member, sizeof value.whole), value.number = (double)value.whole; break;
+    case BT_KEY_BOOL: memcpy(&yes, member, sizeof yes), value.number = yes; break;
+    case BT_KEY_CHOICE: memcpy(&choice, member, sizeof choice), value.text = key->choices[choice]; break;
+    case BT_KEY_TEXT: memcpy(&value.text, member, sizeof value.text); break;
+    case BT_KEY_POINTS:
+        memcpy(&value.points, member, sizeof value.points);
+        memcpy(&value.n, (const char *)base + key->offset_count, sizeof value.n);
+        break;
+    case BT_KEY_MAP: break;
+    }
+    return value;
 }
+
+double bt_value_number(const bt_key *key, const void *base) { return bt_value_of(key, base).number; }
 
 static bool in_range(const bt_key *key, double value, const char *text, char *why)
 {
@@ -218,50 +229,32 @@ static void write_text(const char *text, FILE *out)
 
 void bt_value_write(const bt_key *key, const void *base, FILE *out)
 {
-    const char *member = (const char *)base + key->offset;
+    const bt_value value = bt_value_of(key, base);
     char number[64];
     switch (key->type) {
     case BT_KEY_REAL:
-        bt_units_format(bt_value_number(key, base), key->unit, number, sizeof number);
+        bt_units_format(value.number, key->unit, number, sizeof number);
         fputs(number, out);
         break;
-    case BT_KEY_INT: {
-        int64_t v;
-        memcpy(&v, member, sizeof v);
-        fprintf(out, "%" PRId64, v);
-        break;
-    }
-    case BT_KEY_BOOL: fputs(bt_value_number(key, base) != 0 ? "true" : "false", out); break;
-    case BT_KEY_CHOICE: {
-        unsigned v;
-        memcpy(&v, member, sizeof v);
-        fputs(key->choices[v], out);
-        break;
-    }
-    case BT_KEY_TEXT: {
-        const char *text;
-        memcpy(&text, member, sizeof text);
-        if (text) write_text(text, out);
+    case BT_KEY_INT: fprintf(out, "%" PRId64, value.whole); break;
+    case BT_KEY_BOOL: fputs(value.number != 0 ? "true" : "false", out); break;
+    case BT_KEY_CHOICE: fputs(value.text, out); break;
+    case BT_KEY_TEXT:
+        if (value.text) write_text(value.text, out);
         else fputs("none", out);
         break;
-    }
     case BT_KEY_MAP: break;
-    case BT_KEY_POINTS: {
-        const double *p;
-        int n;
-        memcpy(&p, member, sizeof p);
-        memcpy(&n, (const char *)base + key->offset_count, sizeof n);
-        if (!n) fputs("none", out);
-        for (int i = 0; i < n; i++) {
+    case BT_KEY_POINTS:
+        if (!value.n) fputs("none", out);
+        for (int i = 0; i < value.n; i++) {
             fputs(i ? ", [" : "[[", out);
             for (int j = 0; j < 2; j++) {
-                bt_units_format(p[2 * i + j], bt_schema_column(key, j).unit, number, sizeof number);
+                bt_units_format(value.points[2 * i + j], bt_schema_column(key, j).unit, number, sizeof number);
                 fprintf(out, "%s%s", j ? ", " : "", number);
             }
-            fputs(i == n - 1 ? "]]" : "]", out);
+            fputs(i == value.n - 1 ? "]]" : "]", out);
         }
         break;
-    }
     }
 }
 
