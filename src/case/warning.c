@@ -8,33 +8,25 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/name.h"
+
 const struct bt_warning_row bt_warning_rows[BT_N_WARNINGS] = {
 #define BT_WARNING_ROW(name, code, values, meaning) {code, values, meaning},
     BT_WARNINGS(BT_WARNING_ROW)
 #undef BT_WARNING_ROW
 };
 
-/// Take the next word of a list separated by spaces; false at its end.
-static bool next_word(const char **list, char word[32])
-{
-    *list += strspn(*list, " ");
-    const size_t n = strcspn(*list, " ");
-    snprintf(word, 32, "%.*s", (int)n, *list);
-    *list += n;
-    return n > 0;
-}
-
 /// Write the values of a text as members of the open object: each conversion takes the argument that printf takes.
 static void put_values(bt_json *json, const char *names, const char *text, va_list ap)
 {
-    char name[32];
+    char name[BT_LONGEST_KEY];
     for (const char *at = strchr(text, '%'); at; at = strchr(at, '%')) {
         at += 1 + strspn(at + 1, "-+ #0123456789.");
         const size_t longs = strspn(at, "l");
         at += longs;
         const char conversion = *at++;
         if (conversion == '%') continue;
-        const bool wanted = next_word(&names, name) && strcmp(name, "-") != 0;
+        const bool wanted = bt_next_name(&names, name) && strcmp(name, "-") != 0;
         if (conversion == 's') {
             const char *value = va_arg(ap, const char *);
             if (wanted) bt_json_string(json, name, value);
