@@ -6,9 +6,7 @@ use nor change the backend and fonts that a program has chosen. To draw on your 
 """
 from __future__ import annotations
 
-import contextlib
 import html
-import io
 import json
 import os
 import tempfile
@@ -18,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Union
 
 from .case import setting
 from .errors import IO, BergtowError
+from .said import collected
 
 if TYPE_CHECKING:
     from .result.dataset import Result
@@ -67,9 +66,9 @@ def _perform(command: str, *words: str | os.PathLike[str]) -> None:
 
 def _call(command: str, *words: str | os.PathLike[str]) -> str:
     """The text that a command prints. Raises BergtowError."""
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    with collected() as text:
         _perform(command, *words)
-    return said.getvalue()
+    return text.getvalue()
 
 
 class Picture:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The Python package on libbergtow: cases, results and ensembles as datasets, its page, its installation."""
+import ast
 import ctypes
 import copy
 import inspect
@@ -12,6 +13,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import h5py
@@ -19,6 +21,7 @@ import numpy as np
 import pytest
 from harness import BERGTOW, IO, ROOT, call, changed, differing, heard, run, write_case
 from bergtow import cli
+from bergtow.said import say
 from python_package import LINE, SHORT, WINDOW, bergtow, installed_by_pip, python
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -392,6 +395,28 @@ def test_modules_use_those_below_them():
             for used in [module.split(".")[0]] if module else [name.split()[0] for name in names.split(", ")]:
                 assert used not in place or place[used] <= place[own], (file, used)
         assert own in place, file
+
+
+def test_a_function_in_a_thread_takes_nothing_from_standard_output(monkeypatch, capsys):
+    """What another thread prints meanwhile is there, what the command says is not. Red: sys.stdout is replaced."""
+    begun, over = threading.Event(), threading.Event()
+    monkeypatch.setattr(cli, "perform", lambda *words: (say("x.csv"), begun.set(), over.wait(9)))
+    thread = threading.Thread(target=bergtow.export, args=("run", "x.csv"))
+    thread.start()
+    begun.wait(9)
+    print("of the caller")
+    over.set()
+    thread.join()
+    assert capsys.readouterr().out == "of the caller\n"
+
+
+def test_commands_of_functions_print_through_say():
+    """Red: a command that a function calls prints on standard output."""
+    names = re.findall(r'_(?:call|picture)\("([\w-]+)"', inspect.getsource(bergtow.functions))
+    for module in {"writing"} | {cli.COMMANDS[name][0] for name in names}:
+        path = ROOT / "postproc/bergtow" / f"{module.replace('.', '/')}.py"
+        assert not [node.lineno for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call) and
+                    ast.unparse(node.func) == "print" and "file" not in [k.arg for k in node.keywords]], path
 
 
 def test_the_program_and_the_package_have_the_same_commands():

@@ -18,6 +18,7 @@ from bergtow.reporting import run as report_run
 from bergtow.reporting.replay import LIMIT
 from bergtow.result.origins import TITLE_BLOCK
 from bergtow.result.run import Run
+from bergtow.said import say
 from bergtow.study import analysis
 
 import jinja2
@@ -154,4 +155,4 @@ def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True,
                 writing.write_csv([{k: m[k] for k in MEMBER} for m in members], path.with_name("members.csv"), force)
         else:
             writing.write_text(text, path, force)
-        print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
+        say(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
