@@ -7,10 +7,13 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 
 import h5py
+import matplotlib
 import numpy as np
 import pytest
+from bergtow.plot import style
 from harness import ROOT, TOW, call, changed, environment, make, run, script, write_case
 from python_package import bergtow, installed_by_pip
 
@@ -90,6 +93,23 @@ def test_the_callers_matplotlib_is_left_alone(towed):
               "hashlib.sha256(drawn).hexdigest())")
     said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment())
     assert said.stdout.split() == ["True", "False", "None", hashlib.sha256(plain).hexdigest()], said.stderr
+
+
+def test_threads_draw_one_after_another():
+    """Red: the second restores the settings of the first, which has ended, instead of the caller's."""
+    before, inside, over = dict(matplotlib.rcParams), threading.Event(), threading.Event()
+
+    def draw():
+        with style.look():
+            inside.set()
+            over.wait(9)
+    second = threading.Thread(target=draw)
+    with style.look():
+        second.start()
+        inside.wait(0.2)
+    over.set()
+    second.join()
+    assert before == dict(matplotlib.rcParams)
 
 
 def test_a_package_that_is_missing_is_named(towed, tmp_path):

@@ -170,6 +170,7 @@ def options(p):
     arguments.add_force(p)
 
 
+@style.look()
 def perform(a):
     a = argparse.Namespace(**DEFAULTS | vars(a) | {"resamples": 1})
     e = Members(a.folder)

@@ -180,6 +180,7 @@ def options(p):
                    help="width in pixels (default: 1280, 900 for a GIF)")
 
 
+@style.look()
 def perform(a):
     path = arguments.output(a, "film.mp4", (".mp4", ".gif"))
     gif = path.suffix.lower() == ".gif"

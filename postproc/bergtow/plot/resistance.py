@@ -345,6 +345,7 @@ def options(p):
     arguments.add_force(p)
 
 
+@style.look()
 def perform(a):
     path = a.output or Path(a.run[0]).resolve().parent / "resistance.png"
     arguments.ends_in(path, writing.PICTURES)

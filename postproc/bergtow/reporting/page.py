@@ -12,7 +12,7 @@ from pathlib import Path
 
 from bergtow import arguments, progress, writing
 from bergtow.errors import USAGE, BergtowError, RunError
-from bergtow.plot import vector
+from bergtow.plot import style, vector
 from bergtow.reporting import pdf
 from bergtow.reporting import run as report_run
 from bergtow.reporting.replay import LIMIT
@@ -120,6 +120,7 @@ def perform(a):
           a.force)
 
 
+@style.look()
 def pages(folder, paths, given, also, size, compressed):
     """({path: text}, members) for the report of a folder, as HTML or, for a PDF, in print layout. Raises RunError."""
     # study.resolved.yml alone: the ensemble has only just begun
