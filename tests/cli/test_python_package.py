@@ -46,6 +46,12 @@ def test_a_case_is_read_checked_and_changed(tmp_path):
     with pytest.raises(bergtow.CaseError, match="body.x"):
         case["domain.length"] = 15
     assert (case["domain.length"], case["body.x"]) == (30, 20)
+    case["tow.speed"] = 0.2
+    assert case.popitem() == ("tow.speed", 0.2) and list(case.overrides) == ["domain.length", "body.x"]
+    case.clear()
+    assert dict(case) == dict(bergtow.Case(case.path))
+    with pytest.raises(KeyError, match="no value has been set"):
+        case.popitem()
     speeds = bergtow.Case(changed(SHORT, tow={"programme": [[0, 0], [2, 0.4]]}))
     assert speeds["tow.programme"] == [[0, 0], [2, 0.4]]
     speeds["tow.programme"] = np.array([[0, 0.1], [3, 0.25]])
