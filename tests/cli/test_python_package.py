@@ -176,7 +176,7 @@ def test_a_dataset_is_copied_pickled_and_cut_to_nothing(tmp_path):
     with bergtow.open_result(there.dir) as d:
         ice = d.ice_resistance.values
         for copied in (d.copy(deep=True).ice_resistance, copy.deepcopy(d.ice_resistance), d.ice_resistance.copy(),
-                       pickle.loads(pickle.dumps(d.ice_resistance))):
+                       pickle.loads(pickle.dumps(d.ice_resistance)), pickle.loads(pickle.dumps(d)).ice_resistance):
             np.testing.assert_array_equal(copied.values, ice)
         np.testing.assert_array_equal(d.sortby("time", ascending=False).ice_resistance.values, ice[::-1])
         assert math.isfinite(float(d.tow_force.interp(time=1.05)))
@@ -243,6 +243,8 @@ def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
             with r.open() as one:
                 np.testing.assert_array_equal(d.ice_resistance[k], one.ice_resistance)
         assert all(v.attrs["long_name"] for n, v in d.variables.items())
+        with pickle.loads(pickle.dumps(d)) as again:
+            assert d.identical(again)
     assert "<table" in e._repr_html_() and "&lt;bergtow.Ensemble" in e._repr_html_()
 
 

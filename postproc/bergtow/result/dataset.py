@@ -99,6 +99,7 @@ def _stored_class() -> Any:
     class Stored(BackendArray):
         def __init__(self, dataset: h5py.Dataset, column: int | None, part: slice | None) -> None:
             self.dataset, self.column, self.part = dataset, column, part
+            self.path = os.path.abspath(dataset.file.filename)  # the working folder may change before it is pickled
             shape = dataset.shape if column is None else dataset.shape[:-1]
             self.shape = shape if part is None else (shape[0], part.stop - part.start, *shape[2:])
             self.dtype = dataset.dtype
@@ -107,7 +108,7 @@ def _stored_class() -> Any:
             return self  # a copy is not needed: it only reads
 
         def __reduce__(self) -> Any:
-            return _stored_again, (self.dataset.file.filename, self.dataset.name, self.column, self.part)
+            return _stored_again, (self.path, self.dataset.name, self.column, self.part)
 
         def __getitem__(self, key: Any) -> Any:
             if any(getattr(k, "size", 1) == 0 for k in key.tuple):  # HDF5 does not support empty indices
@@ -141,6 +142,28 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
     from xarray.core import indexing
 
     return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(_stored_class()(dataset, column, part))
+
+
+class _Closer:
+    """Closes the file of a Dataset. Pickled it closes nothing, because an unpickled array opens the file itself."""
+
+    def __init__(self, file: h5py.File | None = None) -> None:
+        self.file = file
+
+    def __call__(self) -> None:
+        if self.file is not None:
+            self.file.close()
+
+    def __reduce__(self) -> Any:
+        return _Closer, ()
+
+
+def _dataset(variables: dict[str, Any], coordinates: list[str], attributes: dict[str, Any],
+             file: h5py.File) -> xarray.Dataset:
+    """A Dataset that closes the file with itself."""
+    dataset = _imported("xarray").Dataset(variables, attrs=attributes).set_coords(coordinates)
+    dataset.set_close(_Closer(file))
+    return dataset
 
 
 #: groups of result.h5, and the prefixes of their variables
@@ -225,6 +248,4 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     if summary.exists():
         attributes["summary"] = summary.read_text(encoding="utf-8")
     coordinates = "time", "frame_time", "collision_time", "event_time", "other_body_name"
-    dataset = xarray.Dataset(variables, attrs=attributes).set_coords([n for n in coordinates if n in variables])
-    dataset.set_close(file.close)
-    return dataset
+    return _dataset(variables, [n for n in coordinates if n in variables], attributes, file)

@@ -13,7 +13,7 @@ from bergtow._program import program_path
 from bergtow.case import setting
 from bergtow.errors import IO, OK, BergtowError
 from bergtow.functions import Picture, plot_ensemble, report, statistics
-from bergtow.result.dataset import Result, _imported, _wrapper
+from bergtow.result.dataset import Result, _dataset, _imported, _wrapper
 from bergtow.study.workers import on_workers
 
 if TYPE_CHECKING:
@@ -117,9 +117,7 @@ class Ensemble:
                     coordinates.append(name)
         attributes = {name: plain(value) for name, value in file.attrs.items()}
         attributes["study"] = plain(file["study"][()])
-        dataset = xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
-        dataset.set_close(file.close)
-        return dataset
+        return _dataset(variables, coordinates, attributes, file)
 
     @property
     def dataframe(self) -> pandas.DataFrame:
