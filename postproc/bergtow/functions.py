@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-from .case import setting
+from .case import here, setting
 from .errors import IO, BergtowError
 from .said import collected
 
@@ -27,7 +27,8 @@ Of = Union[str, "os.PathLike[str]", "Result", "Ensemble"]
 
 
 def _folder(of: Of) -> str:
-    return os.fspath(of if isinstance(of, (str, os.PathLike)) else of.folder)
+    """Its path, absolute because a Picture may be drawn again from another working folder."""
+    return os.path.join(here(), of if isinstance(of, (str, os.PathLike)) else of.folder)
 
 
 #: options that a command line repeats, instead of giving several values to one
@@ -133,7 +134,7 @@ def plot_resistance(runs: Of | list[Of] | tuple[Of, ...], **options: Any) -> Pic
 
 def plot_chains(run: Of, contacts: str | os.PathLike[str], **options: Any) -> Picture:
     """The contact forces of one step. contacts: the file that --dump-contacts wrote. options: whole=True."""
-    return _picture("plot-chains", options, _folder(run), contacts)
+    return _picture("plot-chains", options, _folder(run), os.path.join(here(), contacts))
 
 
 def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:

@@ -220,17 +220,22 @@ def study(folder, **more):
     return folder / "study.yml"
 
 
-def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
+def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, monkeypatch, capfd):
     """What the program has written, number by number, and the same folder as the command's."""
     path = study(tmp_path)
-    e = bergtow.Ensemble.run(path, tmp_path / "ours", overrides={"ice.friction": 0.1, "tow.direction": math.pi / 2,
-                                                                 "guard.escape": True})
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    monkeypatch.chdir(tmp_path)
+    e = bergtow.Ensemble.run(path, "ours", overrides={"ice.friction": 0.1, "tow.direction": math.pi / 2,
+                                                      "guard.escape": True})
     assert "4 members finished" in capfd.readouterr().out
     assert call("ensemble", path, "-o", tmp_path / "theirs", "--set", "ice.friction=0.1", "--set",
                 "tow.direction=90 deg").returncode == 0
     assert differing(tmp_path / "ours/ensemble.h5", tmp_path / "theirs/ensemble.h5") == []
+    one = bergtow.Result("ours/members/c001-r001")
+    monkeypatch.chdir("/")  # which no relative folder goes by
     assert e.counts == {"finished": 4, "failed": 0, "waiting": 0} and "4 finished" in repr(e)
     table = e.dataframe
+    assert one.summary["n_steps"] == table["n_steps"]["c001-r001"]
     assert list(table.index) == ["c001-r001", "c001-r002", "c002-r001", "c002-r002"]
     assert list(table["tow.speed"]) == [0.1, 0.1, 0.2, 0.2]
     with e.dataset as d:

@@ -58,10 +58,13 @@ def test_a_picture_is_that_of_the_command(towed, tmp_path, name, words, options)
     assert picture.save(tmp_path / "ours.svg").read_text().startswith("<?xml")
 
 
-def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path):
+def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path, monkeypatch):
     """Whatever has become of the folder since."""
     shutil.copytree(towed, tmp_path / "out")
-    picture = bergtow.plot_force(tmp_path / "out", max=50)
+    monkeypatch.chdir(tmp_path)
+    picture = bergtow.plot_force("out", max=50)
+    monkeypatch.chdir("/")
+    assert picture.save(tmp_path / "kept.svg").exists()
     shutil.rmtree(tmp_path / "out")
     assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
     os.mkfifo(tmp_path / "pipe.png")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bergtow.case import here
 from bergtow.errors import IO, BergtowError
 from bergtow.functions import report
 from bergtow.result import integrity
@@ -25,7 +26,7 @@ class Result:
     """The output folder of a run."""
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.folder = Path(folder)
+        self.folder = Path(here(), folder)  # the working folder may change
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bergtow._calls import called
 from bergtow._program import program_path
-from bergtow.case import setting
+from bergtow.case import here, setting
 from bergtow.errors import IO, OK, BergtowError
 from bergtow.functions import Picture, plot_ensemble, report, statistics
 from bergtow.result.dataset import Result, _dataset, _imported, _wrapper
@@ -36,7 +36,7 @@ class Ensemble:
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.folder = Path(folder)
+        self.folder = Path(here(), folder)  # the working folder may change
         if not (self.folder / "ensemble.h5").is_file():
             raise BergtowError(f"{self.folder}: holds no ensemble.h5; give the folder that `bergtow ensemble` has left",
                                IO)
