@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Union
 from .case import here, setting
 from .errors import IO, BergtowError
 from .said import collected
+from .writing import written
 
 if TYPE_CHECKING:
     from .result.dataset import Result
@@ -72,6 +73,11 @@ def _call(command: str, *words: str | os.PathLike[str]) -> str:
     return text.getvalue()
 
 
+def _write(data: bytes, path: Path) -> None:
+    with written(path, force=True) as new:
+        new.write_bytes(data)
+
+
 class Picture:
     """A picture: notebooks display it, save() writes it."""
 
@@ -88,14 +94,13 @@ class Picture:
         return self._kept[kind]
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Write the picture to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as
-        displayed; the other formats are drawn again from the current contents of the folder."""
+        """Write the picture to a file that ends in .png, .pdf or .svg, with its folder if that is missing, and return
+        its path. A .png is the picture as displayed; the other formats are drawn again from the current contents of the
+        result folder."""
         path = Path(file)
-        if path.exists() and not path.is_file():
-            raise BergtowError(f"{path}: is not a regular file and is not replaced; give another name", IO)
         kind = path.suffix.lstrip(".")
-        if kind in self._kept and path.parent.is_dir():
-            path.write_bytes(self._kept[kind])
+        if kind in self._kept:
+            _write(self._kept[kind], path)
         else:
             self._draw(path)
         return path
@@ -152,7 +157,7 @@ def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
             kind = path.suffix.lower().lstrip(".")
             if kind not in drawn:
                 drawn[kind] = draw_all(kind)
-            path.write_bytes(drawn[kind][name])
+            _write(drawn[kind][name], path)
         return Picture(draw)
 
     return {name: of(name) for name in drawn["png"]}

@@ -66,9 +66,10 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path, monkeypatch):
     monkeypatch.chdir("/")
     assert picture.save(tmp_path / "kept.svg").exists()
     shutil.rmtree(tmp_path / "out")
-    assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
+    for path in tmp_path / "kept.png", tmp_path / "new/kept.png":
+        assert picture.save(path).read_bytes() == picture._repr_png_()
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(bergtow.BergtowError, match="pipe.png: is not a regular file"):
+    with pytest.raises(bergtow.BergtowError, match="pipe.png: already exists and is not a file"):
         picture.save(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="out: no such"):
         picture.save(tmp_path / "kept.pdf")
@@ -187,7 +188,9 @@ def test_pictures_of_an_ensemble(speeds, tmp_path):
     drawn_by("plot-ensemble", speeds, "-o", tmp_path)
     theirs = {p.stem: p.read_bytes() for p in tmp_path.glob("*.png")}
     assert {name: p._repr_png_() for name, p in pictures.items()} == theirs and "sweep-tow-speed" in theirs
-    assert pictures["sweep-tow-speed"].save(tmp_path / "x.svg").read_text().startswith("<?xml")
+    assert pictures["sweep-tow-speed"].save(tmp_path / "new/x.svg").read_text().startswith("<?xml")
+    with pytest.raises(bergtow.BergtowError, match="x.png: cannot be written"):
+        pictures["sweep-tow-speed"].save(tmp_path / "new/x.svg/x.png")
 
 
 # --- reports ----------------------------------------------------------------------------------------------------------
