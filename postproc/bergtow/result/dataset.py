@@ -191,9 +191,9 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     Dimensions: time (samples of the series), frame, floe, other_body (the towed body, walls), collision, event, and
     panel of the hull if the case has panels. Series keep their names; frames are floe_x, floe_y, floe_yaw, floe_speed,
     floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices come from the
-    groups of result.h5. Every variable has units, long_name and, where available, a label. Values are read from the
-    file on first use; close it like any Dataset. The attribute `summary` holds the text of summary.json. Raises
-    BergtowError.
+    groups of result.h5. Every variable has a long_name and, where available, a label. Numbers have units, except
+    event_value (its unit depends on the kind) and frame_piece_pose (m, m, rad). Values are read from the file on first
+    use; close it like any Dataset. The attribute `summary` holds the text of summary.json. Raises BergtowError.
     """
     xarray, _ = _imported("xarray"), _imported("h5py")
     from bergtow.result.hdf5 import opened, plain
@@ -243,7 +243,7 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
             put("line_points", ("frame", "line_point", "xy"), frames["line_points"])
             put("branch_tension", ("frame", "branch"), frames["line_tension"])
     if any("xy" in v.dims for v in variables.values()):
-        variables["xy"] = xarray.Variable(("xy",), ["x", "y"])
+        variables["xy"] = xarray.Variable(("xy",), ["x", "y"], {"long_name": "component of a vector"})
     attributes = {name: plain(value) for name, value in file.attrs.items()}
     summary = path.with_name("summary.json")
     if summary.exists():

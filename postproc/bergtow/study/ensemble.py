@@ -97,7 +97,7 @@ class Ensemble:
 
         Dimensions: member, and sample (samples of the series). Coordinates: name, condition, repeat, seed of each
         member, and the keys that the study varies. Variables: the numbers of summary.json, the series, state_hash,
-        status and reason. All have units and a long_name.
+        status and reason. All have a long_name, numbers also units.
         """
         xarray, file = _imported("xarray"), self._open()
         from bergtow.result.hdf5 import plain
