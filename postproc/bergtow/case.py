@@ -170,6 +170,17 @@ class Case(MutableMapping[str, Any]):
             raise KeyError(f"{key}: has not been set")
         self._resolve({k: v for k, v in self.overrides.items() if k != key})
 
+    def popitem(self) -> tuple[str, Any]:
+        """Remove the value set last, and return its key and value."""
+        if not self.overrides:
+            raise KeyError("no value has been set")
+        key = next(reversed(self.overrides))
+        return key, self.pop(key)
+
+    def clear(self) -> None:
+        """Remove all values set here, together, because some may be valid only with others."""
+        self._resolve({})
+
     def __iter__(self) -> Iterator[str]:
         return iter(_keys())
 

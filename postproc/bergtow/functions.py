@@ -6,9 +6,7 @@ use nor change the backend and fonts that a program has chosen. To draw on your 
 """
 from __future__ import annotations
 
-import contextlib
 import html
-import io
 import json
 import os
 import tempfile
@@ -16,8 +14,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
-from .case import setting
+from .case import here, setting
 from .errors import IO, BergtowError
+from .said import collected
+from .writing import written
 
 if TYPE_CHECKING:
     from .result.dataset import Result
@@ -28,7 +28,8 @@ Of = Union[str, "os.PathLike[str]", "Result", "Ensemble"]
 
 
 def _folder(of: Of) -> str:
-    return os.fspath(of if isinstance(of, (str, os.PathLike)) else of.folder)
+    """Its path, absolute because a Picture may be drawn again from another working folder."""
+    return os.path.join(here(), of if isinstance(of, (str, os.PathLike)) else of.folder)
 
 
 #: options that a command line repeats, instead of giving several values to one
@@ -67,9 +68,14 @@ def _perform(command: str, *words: str | os.PathLike[str]) -> None:
 
 def _call(command: str, *words: str | os.PathLike[str]) -> str:
     """The text that a command prints. Raises BergtowError."""
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    with collected() as text:
         _perform(command, *words)
-    return said.getvalue()
+    return text.getvalue()
+
+
+def _write(data: bytes, path: Path) -> None:
+    with written(path, force=True) as new:
+        new.write_bytes(data)
 
 
 class Picture:
@@ -88,14 +94,13 @@ class Picture:
         return self._kept[kind]
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Write the picture to a file that ends in .png, .pdf or .svg, and return its path. A .png is the picture as
-        displayed; the other formats are drawn again from the current contents of the folder."""
+        """Write the picture to a file that ends in .png, .pdf or .svg, with its folder if that is missing, and return
+        its path. A .png is the picture as displayed; the other formats are drawn again from the current contents of the
+        result folder."""
         path = Path(file)
-        if path.exists() and not path.is_file():
-            raise BergtowError(f"{path}: is not a regular file and is not replaced; give another name", IO)
         kind = path.suffix.lstrip(".")
-        if kind in self._kept and path.parent.is_dir():
-            path.write_bytes(self._kept[kind])
+        if kind in self._kept:
+            _write(self._kept[kind], path)
         else:
             self._draw(path)
         return path
@@ -134,7 +139,7 @@ def plot_resistance(runs: Of | list[Of] | tuple[Of, ...], **options: Any) -> Pic
 
 def plot_chains(run: Of, contacts: str | os.PathLike[str], **options: Any) -> Picture:
     """The contact forces of one step. contacts: the file that --dump-contacts wrote. options: whole=True."""
-    return _picture("plot-chains", options, _folder(run), contacts)
+    return _picture("plot-chains", options, _folder(run), os.path.join(here(), contacts))
 
 
 def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
@@ -152,7 +157,7 @@ def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
             kind = path.suffix.lower().lstrip(".")
             if kind not in drawn:
                 drawn[kind] = draw_all(kind)
-            path.write_bytes(drawn[kind][name])
+            _write(drawn[kind][name], path)
         return Picture(draw)
 
     return {name: of(name) for name in drawn["png"]}

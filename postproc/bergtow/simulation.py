@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from ctypes import POINTER, c_double, c_void_p
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -194,6 +194,10 @@ class Simulation:
     def __del__(self) -> None:
         if getattr(self, "_address", None) is not None and self._process == os.getpid():
             self.drop()
+
+    def __reduce__(self) -> NoReturn:
+        """For copies, too: two objects would own the same memory of the library."""
+        raise TypeError("a simulation can be neither copied nor pickled; copy its case")
 
     def checkpoint(self) -> None:
         """Write a checkpoint into the folder, for `bergtow resume`."""

@@ -14,6 +14,7 @@ import os
 from contextlib import contextmanager, suppress
 
 from bergtow.errors import RunError
+from bergtow.said import say
 
 import numpy as np
 
@@ -112,4 +113,4 @@ def save(figure, path, force=False):
     """Write a figure; its folder is created if missing. Raises RunError."""
     with written(path, force) as new:
         figure.savefig(new, metadata={PLACES[path.suffix.lower()]: MARK})
-    print(path)
+    say(path)

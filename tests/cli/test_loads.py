@@ -114,6 +114,22 @@ def test_intervals_over_fields_are_the_jackknife():
     assert np.isnan(stat_load.over_fields(np.mean, samples[:1])["interval_95"]).all()
 
 
+def test_equal_counts_are_no_certainty():
+    """Fields of one cluster each, of ten samples. Red: an interval without width."""
+    found = stat_load.ratio_over_fields([1] * 10, [0.01] * 10)
+    exact = np.array([stats.gamma.ppf(0.025, 10), stats.gamma.ppf(0.975, 11)]) / 0.1  # Garwood 1936
+    assert found["value"] == pytest.approx(100) and found["interval_95"] == pytest.approx(exact)
+    share = stat_load.ratio_over_fields([10] * 10, [100] * 10, 1.0, stat_load.LOGIT, 10)["interval_95"]
+    assert share == pytest.approx(exact / 1000)
+    assert stat_load.ratio_over_fields([9, 9], [10, 10], 1.0)["interval_95"][1] == 1
+    assert np.isnan(stat_load.ratio_over_fields([1], [0.01])["interval_95"]).all()
+    rng, inside = np.random.default_rng(4), []
+    for counts in rng.poisson(3, (500, 2)):  # of two fields every sixth pair is equal
+        low, high = stat_load.ratio_over_fields(counts, [1, 1])["interval_95"]
+        inside.append(low <= 3 <= high)
+    assert np.mean(inside) >= 0.95
+
+
 def test_no_interval_reaches_where_its_number_cannot_be():
     """Two fields, of which one has nearly no load: standard deviation and rate are above 0, a load that is never
     negative not below it, a share of the time within 0 and 1."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The Python package on libbergtow: cases, results and ensembles as datasets, its page, its installation."""
+import ast
 import ctypes
 import copy
 import inspect
@@ -12,6 +13,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import h5py
@@ -19,6 +21,7 @@ import numpy as np
 import pytest
 from harness import BERGTOW, IO, ROOT, call, changed, differing, heard, run, write_case
 from bergtow import cli
+from bergtow.said import say
 from python_package import LINE, SHORT, WINDOW, bergtow, installed_by_pip, python
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -43,6 +46,12 @@ def test_a_case_is_read_checked_and_changed(tmp_path):
     with pytest.raises(bergtow.CaseError, match="body.x"):
         case["domain.length"] = 15
     assert (case["domain.length"], case["body.x"]) == (30, 20)
+    case["tow.speed"] = 0.2
+    assert case.popitem() == ("tow.speed", 0.2) and list(case.overrides) == ["domain.length", "body.x"]
+    case.clear()
+    assert dict(case) == dict(bergtow.Case(case.path))
+    with pytest.raises(KeyError, match="no value has been set"):
+        case.popitem()
     speeds = bergtow.Case(changed(SHORT, tow={"programme": [[0, 0], [2, 0.4]]}))
     assert speeds["tow.programme"] == [[0, 0], [2, 0.4]]
     speeds["tow.programme"] = np.array([[0, 0.1], [3, 0.25]])
@@ -154,8 +163,9 @@ def test_a_result_is_a_dataset(tmp_path):
                 np.testing.assert_array_equal(d[f"floe_{axis}"], f["frames/pose"][:, :, k])
                 np.testing.assert_array_equal(d[f"other_body_{axis}"], f["frames/body_pose"][:, :, k])
                 np.testing.assert_array_equal(d[f"floe_{axis}"][1:, ::7], f["frames/pose"][1:, ::7, k])
-        numbers = {name: set(v.attrs) for name, v in d.variables.items() if v.dtype.kind not in "OU"}
-        assert all({"units", "long_name"} <= found or name == "event_value" for name, found in numbers.items())
+        assert all("long_name" in v.attrs for v in d.variables.values())
+        assert [name for name, v in d.variables.items() if v.dtype.kind not in "OU" and "units" not in v.attrs
+                ] == ["event_value"]
         assert math.isclose(float(d.ice_resistance.sel(time=slice(1, 3)).mean()), d.ice_resistance.values[9:30].mean())
         assert json.loads(d.attrs["summary"])["state_hash"] == there.hash
         assert d.other_body_name.values[0] == "towed body"
@@ -167,7 +177,7 @@ def test_a_dataset_is_copied_pickled_and_cut_to_nothing(tmp_path):
     with bergtow.open_result(there.dir) as d:
         ice = d.ice_resistance.values
         for copied in (d.copy(deep=True).ice_resistance, copy.deepcopy(d.ice_resistance), d.ice_resistance.copy(),
-                       pickle.loads(pickle.dumps(d.ice_resistance))):
+                       pickle.loads(pickle.dumps(d.ice_resistance)), pickle.loads(pickle.dumps(d)).ice_resistance):
             np.testing.assert_array_equal(copied.values, ice)
         np.testing.assert_array_equal(d.sortby("time", ascending=False).ice_resistance.values, ice[::-1])
         assert math.isfinite(float(d.tow_force.interp(time=1.05)))
@@ -211,17 +221,22 @@ def study(folder, **more):
     return folder / "study.yml"
 
 
-def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
+def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, monkeypatch, capfd):
     """What the program has written, number by number, and the same folder as the command's."""
     path = study(tmp_path)
-    e = bergtow.Ensemble.run(path, tmp_path / "ours", overrides={"ice.friction": 0.1, "tow.direction": math.pi / 2,
-                                                                 "guard.escape": True})
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    monkeypatch.chdir(tmp_path)
+    e = bergtow.Ensemble.run(path, "ours", overrides={"ice.friction": 0.1, "tow.direction": math.pi / 2,
+                                                      "guard.escape": True})
     assert "4 members finished" in capfd.readouterr().out
     assert call("ensemble", path, "-o", tmp_path / "theirs", "--set", "ice.friction=0.1", "--set",
                 "tow.direction=90 deg").returncode == 0
     assert differing(tmp_path / "ours/ensemble.h5", tmp_path / "theirs/ensemble.h5") == []
+    one = bergtow.Result("ours/members/c001-r001")
+    monkeypatch.chdir("/")  # which no relative folder goes by
     assert e.counts == {"finished": 4, "failed": 0, "waiting": 0} and "4 finished" in repr(e)
     table = e.dataframe
+    assert one.summary["n_steps"] == table["n_steps"]["c001-r001"]
     assert list(table.index) == ["c001-r001", "c001-r002", "c002-r001", "c002-r002"]
     assert list(table["tow.speed"]) == [0.1, 0.1, 0.2, 0.2]
     with e.dataset as d:
@@ -234,6 +249,8 @@ def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
             with r.open() as one:
                 np.testing.assert_array_equal(d.ice_resistance[k], one.ice_resistance)
         assert all(v.attrs["long_name"] for n, v in d.variables.items())
+        with pickle.loads(pickle.dumps(d)) as again:
+            assert d.identical(again)
     assert "<table" in e._repr_html_() and "&lt;bergtow.Ensemble" in e._repr_html_()
 
 
@@ -392,6 +409,28 @@ def test_modules_use_those_below_them():
             for used in [module.split(".")[0]] if module else [name.split()[0] for name in names.split(", ")]:
                 assert used not in place or place[used] <= place[own], (file, used)
         assert own in place, file
+
+
+def test_a_function_in_a_thread_takes_nothing_from_standard_output(monkeypatch, capsys):
+    """What another thread prints meanwhile is there, what the command says is not. Red: sys.stdout is replaced."""
+    begun, over = threading.Event(), threading.Event()
+    monkeypatch.setattr(cli, "perform", lambda *words: (say("x.csv"), begun.set(), over.wait(9)))
+    thread = threading.Thread(target=bergtow.export, args=("run", "x.csv"))
+    thread.start()
+    begun.wait(9)
+    print("of the caller")
+    over.set()
+    thread.join()
+    assert capsys.readouterr().out == "of the caller\n"
+
+
+def test_commands_of_functions_print_through_say():
+    """Red: a command that a function calls prints on standard output."""
+    names = re.findall(r'_(?:call|picture)\("([\w-]+)"', inspect.getsource(bergtow.functions))
+    for module in {"writing"} | {cli.COMMANDS[name][0] for name in names}:
+        path = ROOT / "postproc/bergtow" / f"{module.replace('.', '/')}.py"
+        assert not [node.lineno for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call) and
+                    ast.unparse(node.func) == "print" and "file" not in [k.arg for k in node.keywords]], path
 
 
 def test_the_program_and_the_package_have_the_same_commands():

@@ -7,10 +7,13 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 
 import h5py
+import matplotlib
 import numpy as np
 import pytest
+from bergtow.plot import style
 from harness import ROOT, TOW, call, changed, environment, make, run, script, write_case
 from python_package import bergtow, installed_by_pip
 
@@ -55,14 +58,18 @@ def test_a_picture_is_that_of_the_command(towed, tmp_path, name, words, options)
     assert picture.save(tmp_path / "ours.svg").read_text().startswith("<?xml")
 
 
-def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path):
+def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path, monkeypatch):
     """Whatever has become of the folder since."""
     shutil.copytree(towed, tmp_path / "out")
-    picture = bergtow.plot_force(tmp_path / "out", max=50)
+    monkeypatch.chdir(tmp_path)
+    picture = bergtow.plot_force("out", max=50)
+    monkeypatch.chdir("/")
+    assert picture.save(tmp_path / "kept.svg").exists()
     shutil.rmtree(tmp_path / "out")
-    assert picture.save(tmp_path / "kept.png").read_bytes() == picture._repr_png_()
+    for path in tmp_path / "kept.png", tmp_path / "new/kept.png":
+        assert picture.save(path).read_bytes() == picture._repr_png_()
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(bergtow.BergtowError, match="pipe.png: is not a regular file"):
+    with pytest.raises(bergtow.BergtowError, match="pipe.png: already exists and is not a file"):
         picture.save(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="out: no such"):
         picture.save(tmp_path / "kept.pdf")
@@ -90,6 +97,23 @@ def test_the_callers_matplotlib_is_left_alone(towed):
               "hashlib.sha256(drawn).hexdigest())")
     said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment())
     assert said.stdout.split() == ["True", "False", "None", hashlib.sha256(plain).hexdigest()], said.stderr
+
+
+def test_threads_draw_one_after_another():
+    """Red: the second restores the settings of the first, which has ended, instead of the caller's."""
+    before, inside, over = dict(matplotlib.rcParams), threading.Event(), threading.Event()
+
+    def draw():
+        with style.look():
+            inside.set()
+            over.wait(9)
+    second = threading.Thread(target=draw)
+    with style.look():
+        second.start()
+        inside.wait(0.2)
+    over.set()
+    second.join()
+    assert before == dict(matplotlib.rcParams)
 
 
 def test_a_package_that_is_missing_is_named(towed, tmp_path):
@@ -164,7 +188,9 @@ def test_pictures_of_an_ensemble(speeds, tmp_path):
     drawn_by("plot-ensemble", speeds, "-o", tmp_path)
     theirs = {p.stem: p.read_bytes() for p in tmp_path.glob("*.png")}
     assert {name: p._repr_png_() for name, p in pictures.items()} == theirs and "sweep-tow-speed" in theirs
-    assert pictures["sweep-tow-speed"].save(tmp_path / "x.svg").read_text().startswith("<?xml")
+    assert pictures["sweep-tow-speed"].save(tmp_path / "new/x.svg").read_text().startswith("<?xml")
+    with pytest.raises(bergtow.BergtowError, match="x.png: cannot be written"):
+        pictures["sweep-tow-speed"].save(tmp_path / "new/x.svg/x.png")
 
 
 # --- reports ----------------------------------------------------------------------------------------------------------

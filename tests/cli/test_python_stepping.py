@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Simulations stepped from Python: the same bits as the command, what is saved and taken up, bodies and contacts."""
+import copy
 import math
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -557,6 +559,13 @@ def test_errors_of_numbers_and_of_what_has_ended():
             sim.checkpoint()
     with pytest.raises(bergtow.BergtowError, match="has ended"):
         sim.step()
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_simulation_is_never_duplicated(duplicate):
+    """Red: two objects with the same memory of the library, which the first to go frees."""
+    with bergtow.Simulation(SHORT, threads=1) as sim, pytest.raises(TypeError, match="neither copied nor pickled"):
+        duplicate(sim)
 
 
 def test_a_result_is_not_replaced_unless_asked(tmp_path):

@@ -6,7 +6,6 @@ passed unchanged to the compiled program.
 """
 import os
 import sys
-from contextlib import nullcontext
 from importlib import import_module
 
 from bergtow.cli import command
@@ -77,9 +76,7 @@ def arguments(name, *words):
 def perform(name, *words):
     """Run a command in this process. Raises the same errors as arguments()."""
     a = arguments(name, *words)
-    style = sys.modules.get("bergtow.plot.style")  # a command that need not draw loads it when it does
-    with style.look() if style else nullcontext():
-        a.perform(a)
+    a.perform(a)
 
 
 def main():

@@ -28,6 +28,7 @@ from bergtow.maps import plane as map_plane
 from bergtow.maps import read as map_read
 from bergtow.result.frames import lonlat_of
 from bergtow.result.run import Run
+from bergtow.said import say
 
 import numpy as np
 
@@ -462,21 +463,21 @@ def perform(a):
                 write_table(t, place, path, a.force)
             else:
                 write_netcdf(t, place, path, a.force, a.start, run.attributes.get("title", "") or "tow through ice")
-            print(f"{path}: {len(t.name)} trajectories, {len(t.time)} times")
+            say(f"{path}: {len(t.name)} trajectories, {len(t.time)} times")
             if kind == ".nc" and not a.start:
-                print("time: seconds since 1970, assumed: the case gives no date; give it with --start")
+                say("time: seconds since 1970, assumed: the case gives no date; give it with --start")
         else:
             layers = [MAKE[name](run, frames) for name in names]
             layers = [layer for layer in layers if layer.places]
             if not layers:
                 raise RunError(run.result, f"has no {a.layer or 'floes'}", "choose another --layer")
             _write(layers, place, path, kind, a.force)
-            print(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
+            say(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
             if any(layer.name in FRAMED for layer in layers):
                 at = run.frame_times[frames]
-                print(f"frame: t = {at[0]:.6g} s" if len(at) == 1 else
-                      f"frames: {len(at)}, t = {at[0]:.6g} to {at[-1]:.6g} s")
-        print(f"coordinates: {place.words}")
+                say(f"frame: t = {at[0]:.6g} s" if len(at) == 1 else
+                    f"frames: {len(at)}, t = {at[0]:.6g} to {at[-1]:.6g} s")
+        say(f"coordinates: {place.words}")
 
 
 def frames_of(run, time):
@@ -506,5 +507,5 @@ def _write(layers, place, path, kind, force):
         raise RunError(path, f"cannot be written ({map_read.first_line(error)})", "choose another place with -o",
                        IO) from None
     if renamed:
-        print("columns: names in a shapefile have only ten characters: "
-              + ", ".join(f"{ours} is {theirs}" for ours, theirs in renamed.items()))
+        say("columns: names in a shapefile have only ten characters: "
+            + ", ".join(f"{ours} is {theirs}" for ours, theirs in renamed.items()))

@@ -19,6 +19,7 @@ from bergtow.maps import plane as map_plane
 from bergtow.maps import read as map_read
 from bergtow.maps import repair as map_repair
 from bergtow.maps import text as map_text
+from bergtow.said import say
 
 import numpy as np
 
@@ -217,9 +218,9 @@ def perform(a):
     bend = in_plane(found, plane)
     rules = rules_of(a, found)
     floes = map_repair.repaired(found.shapes, rules, book)
-    print("\n".join(map_text.map_lines(found, crs, a.crs)))
+    say("\n".join(map_text.map_lines(found, crs, a.crs)))
     if not floes:
-        print("\n".join(map_text.change_lines(book)))
+        say("\n".join(map_text.change_lines(book)))
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
     distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
     farthest = _library.limit("map_farthest_m")
@@ -231,20 +232,20 @@ def perform(a):
         raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m on average, as degrees look in "
                        "metres",
                        "say its crs: --crs EPSG:4326")
-    print("\n".join(map_text.plane_lines(plane, distortion, bend)))
-    print(f"tolerance: {map_text.length(rules.tolerance)}")
-    print("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
+    say("\n".join(map_text.plane_lines(plane, distortion, bend)))
+    say(f"tolerance: {map_text.length(rules.tolerance)}")
+    say("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
     writing.write_text(geojson(floes, found, plane), a.output, a.force)
     doubts = map_doubts.doubts(found, floes, book)
     for doubt in doubts:
-        print(f"warning: {doubt['text']}")
-    print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN,
-                                        None if isinstance(crs, str) else plane.centre[1])))
-    print(a.output)
+        say(f"warning: {doubt['text']}")
+    say("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN,
+                                      None if isinstance(crs, str) else plane.centre[1])))
+    say(a.output)
     if a.record:
         record = map_text.record(found, plane, crs, distortion, bend, book, rules, numbers) | {"warnings": doubts}
         writing.write_json(record, a.record, a.force)
-        print(a.record)
+        say(a.record)
     if a.picture:
         from bergtow.maps import picture as map_picture
         map_picture.draw(found, floes, rules, plane, a.picture, a.force)

@@ -206,6 +206,7 @@ def options(p):
     arguments.add_force(p)
 
 
+@style.look()
 def perform(a):
     path = arguments.output(a, "chains.png", writing.PICTURES)
     with Run(a.run) as run:

@@ -23,6 +23,7 @@ from bergtow.plot.axes import axis_label, headline, numeric, wants_log
 from bergtow.plot.loads import MOST_LINES, draw_above, draw_exceedance, draw_returns
 from bergtow.plot.sweep import draw_scatter, draw_sweep
 from bergtow.result.members import Members, reading, short_key
+from bergtow.said import say
 from bergtow.stats import loads
 from bergtow.stats import mean as stat_mean
 from bergtow.stats.conditions import DEFAULTS, member, nothing_to_count, sensitivity
@@ -164,12 +165,13 @@ def options(p):
     arguments.add_force(p)
 
 
+@style.look()
 def perform(a):
     a = argparse.Namespace(**DEFAULTS | vars(a) | {"resamples": 1})
     e = Members(a.folder)
     dropped = e.exclude(a.exclude) if a.exclude else {}
     for name, kinds in dropped.items():
-        print(f"left out: {name} ({', '.join(kinds)})")
+        say(f"left out: {name} ({', '.join(kinds)})")
     if not len(e.used):
         raise nothing_to_count(e, dropped)
     if e.holes():

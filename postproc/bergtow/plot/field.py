@@ -122,6 +122,7 @@ def options(p):
                    help="draw the frames nearest to these times, s, in place of first, middle and last")
 
 
+@style.look()
 def perform(a):
     path = arguments.output(a, "field.png", writing.PICTURES)
     with Run(a.run) as run:

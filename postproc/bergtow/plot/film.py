@@ -14,6 +14,7 @@ from bergtow.plot import style
 from bergtow.plot.force import draw_ice, running_mean, smoothing
 from bergtow.plot.scene import Colouring, Scene, add_options, framed
 from bergtow.result.run import Run
+from bergtow.said import say
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -179,6 +180,7 @@ def options(p):
                    help="width in pixels (default: 1280, 900 for a GIF)")
 
 
+@style.look()
 def perform(a):
     path = arguments.output(a, "film.mp4", (".mp4", ".gif"))
     gif = path.suffix.lower() == ".gif"
@@ -189,4 +191,4 @@ def perform(a):
         film = Film(run, frames, a.colour, a.width or (900 if gif else 1280), a.window)
         with writing.written(path, a.force) as new:
             (write_gif if gif else write_mp4)(film, frames, a.fps, new)
-    print(path)
+    say(path)

@@ -226,6 +226,7 @@ def options(p):
     p.add_argument("--max", metavar="N", type=arguments.above_zero, help="upper end of the force axes, N")
 
 
+@style.look()
 def perform(a):
     path = arguments.output(a, "force.png", writing.PICTURES)
     second = path.with_name(f"{path.stem}-diagnostics{path.suffix}")

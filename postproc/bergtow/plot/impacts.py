@@ -149,6 +149,7 @@ def options(p):
     arguments.add_run(p, "impacts.png")
 
 
+@style.look()
 def perform(a):
     path = arguments.output(a, "impacts.png", writing.PICTURES)
     with Run(a.run) as run:

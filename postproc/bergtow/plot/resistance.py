@@ -15,6 +15,7 @@ from bergtow.plot import style
 from bergtow.result import at_least, compared
 from bergtow.result.origins import source_of_ice
 from bergtow.result.run import Run
+from bergtow.said import say
 from bergtow.stats import drift as stat_drift
 from bergtow.table import quantity, scale, short
 
@@ -344,6 +345,7 @@ def options(p):
     arguments.add_force(p)
 
 
+@style.look()
 def perform(a):
     path = a.output or Path(a.run[0]).resolve().parent / "resistance.png"
     arguments.ends_in(path, writing.PICTURES)
@@ -353,6 +355,6 @@ def perform(a):
     writing.save(draw(points, not a.linear), path, a.force)
     if a.table:
         writing.write_markdown(table(points), a.table, a.force)
-        print(a.table)
+        say(a.table)
     if a.words:
-        print(f"\n{words(points)}")
+        say(f"\n{words(points)}")

@@ -5,6 +5,7 @@ Line colours are those of Okabe & Ito (2008), distinguishable with any colour vi
 in lightness contrast against the water, so that they can also be read in greyscale.
 """
 import textwrap
+import threading
 from contextlib import contextmanager
 
 from bergtow import table as text_table
@@ -78,11 +79,14 @@ LOOK = {"font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
         "legend.frameon": False, "legend.fontsize": 9.5, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
         "figure.dpi": DPI, "savefig.dpi": DPI, "figure.facecolor": PAPER, "svg.fonttype": "none", "pdf.fonttype": 42}
 
+_TURN = threading.RLock()
+
 
 @contextmanager
 def look():
-    """Apply our matplotlib settings while a figure is made and saved, then restore those of the calling program."""
-    with matplotlib.rc_context():
+    """Apply our matplotlib settings while a figure is made and saved, then restore those of the calling program.
+    Threads take turns, since matplotlib has one set of settings for all of them."""
+    with _TURN, matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(LOOK)
         yield

@@ -12,12 +12,13 @@ from pathlib import Path
 
 from bergtow import arguments, progress, writing
 from bergtow.errors import USAGE, BergtowError, RunError
-from bergtow.plot import vector
+from bergtow.plot import style, vector
 from bergtow.reporting import pdf
 from bergtow.reporting import run as report_run
 from bergtow.reporting.replay import LIMIT
 from bergtow.result.origins import TITLE_BLOCK
 from bergtow.result.run import Run
+from bergtow.said import say
 from bergtow.study import analysis
 
 import jinja2
@@ -119,6 +120,7 @@ def perform(a):
           a.force)
 
 
+@style.look()
 def pages(folder, paths, given, also, size, compressed):
     """({path: text}, members) for the report of a folder, as HTML or, for a PDF, in print layout. Raises RunError."""
     # study.resolved.yml alone: the ensemble has only just begun
@@ -154,4 +156,4 @@ def write(folder, paths, given=None, also=(), size=LIMIT / 1e6, compressed=True,
                 writing.write_csv([{k: m[k] for k in MEMBER} for m in members], path.with_name("members.csv"), force)
         else:
             writing.write_text(text, path, force)
-        print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
+        say(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")

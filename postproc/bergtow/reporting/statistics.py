@@ -11,6 +11,7 @@ from bergtow import arguments, progress, writing
 from bergtow.arguments import above_zero, at_least_one, finite, not_below_zero
 from bergtow.errors import RunError
 from bergtow.result.members import FINISHED, Members
+from bergtow.said import say
 from bergtow.stats import conditions, loads
 from bergtow.text import ensemble as ensemble_text
 
@@ -99,8 +100,8 @@ def perform(a):
     with progress.doing(f"{e.n} members"):
         s = conditions.statistics(e, a)
     write(s, folder, a.force)
-    print(ensemble_text.report(s, a.markdown))
-    print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
+    say(ensemble_text.report(s, a.markdown))
+    say(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
     if s["holes"] and not a.partial:
         again = "" if np.all(e.status == FINISHED) else "run `bergtow ensemble` again, with --retry-failed for those " \
             "that failed, or "

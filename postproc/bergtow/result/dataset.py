@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bergtow.case import here
 from bergtow.errors import IO, BergtowError
 from bergtow.functions import report
 from bergtow.result import integrity
@@ -25,7 +26,7 @@ class Result:
     """The output folder of a run."""
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.folder = Path(folder)
+        self.folder = Path(here(), folder)  # the working folder may change
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -99,6 +100,7 @@ def _stored_class() -> Any:
     class Stored(BackendArray):
         def __init__(self, dataset: h5py.Dataset, column: int | None, part: slice | None) -> None:
             self.dataset, self.column, self.part = dataset, column, part
+            self.path = os.path.abspath(dataset.file.filename)  # the working folder may change before it is pickled
             shape = dataset.shape if column is None else dataset.shape[:-1]
             self.shape = shape if part is None else (shape[0], part.stop - part.start, *shape[2:])
             self.dtype = dataset.dtype
@@ -107,7 +109,7 @@ def _stored_class() -> Any:
             return self  # a copy is not needed: it only reads
 
         def __reduce__(self) -> Any:
-            return _stored_again, (self.dataset.file.filename, self.dataset.name, self.column, self.part)
+            return _stored_again, (self.path, self.dataset.name, self.column, self.part)
 
         def __getitem__(self, key: Any) -> Any:
             if any(getattr(k, "size", 1) == 0 for k in key.tuple):  # HDF5 does not support empty indices
@@ -143,6 +145,28 @@ def _wrapper(xarray: Any) -> Callable[..., Any]:
     return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(_stored_class()(dataset, column, part))
 
 
+class _Closer:
+    """Closes the file of a Dataset. Pickled it closes nothing, because an unpickled array opens the file itself."""
+
+    def __init__(self, file: h5py.File | None = None) -> None:
+        self.file = file
+
+    def __call__(self) -> None:
+        if self.file is not None:
+            self.file.close()
+
+    def __reduce__(self) -> Any:
+        return _Closer, ()
+
+
+def _dataset(variables: dict[str, Any], coordinates: list[str], attributes: dict[str, Any],
+             file: h5py.File) -> xarray.Dataset:
+    """A Dataset that closes the file with itself."""
+    dataset = _imported("xarray").Dataset(variables, attrs=attributes).set_coords(coordinates)
+    dataset.set_close(_Closer(file))
+    return dataset
+
+
 #: groups of result.h5, and the prefixes of their variables
 _GROUPS = {"series": "", "floes": "floe_", "bodies": "other_body_", "impacts": "collision_", "panels": "panel_",
            "events": "event_", "splits": "split_", "pieces": "piece_"}
@@ -167,9 +191,9 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     Dimensions: time (samples of the series), frame, floe, other_body (the towed body, walls), collision, event, and
     panel of the hull if the case has panels. Series keep their names; frames are floe_x, floe_y, floe_yaw, floe_speed,
     floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices come from the
-    groups of result.h5. Every variable has units, long_name and, where available, a label. Values are read from the
-    file on first use; close it like any Dataset. The attribute `summary` holds the text of summary.json. Raises
-    BergtowError.
+    groups of result.h5. Every variable has a long_name and, where available, a label. Numbers have units, except
+    event_value (its unit depends on the kind) and frame_piece_pose (m, m, rad). Values are read from the file on first
+    use; close it like any Dataset. The attribute `summary` holds the text of summary.json. Raises BergtowError.
     """
     xarray, _ = _imported("xarray"), _imported("h5py")
     from bergtow.result.hdf5 import opened, plain
@@ -219,12 +243,10 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
             put("line_points", ("frame", "line_point", "xy"), frames["line_points"])
             put("branch_tension", ("frame", "branch"), frames["line_tension"])
     if any("xy" in v.dims for v in variables.values()):
-        variables["xy"] = xarray.Variable(("xy",), ["x", "y"])
+        variables["xy"] = xarray.Variable(("xy",), ["x", "y"], {"long_name": "component of a vector"})
     attributes = {name: plain(value) for name, value in file.attrs.items()}
     summary = path.with_name("summary.json")
     if summary.exists():
         attributes["summary"] = summary.read_text(encoding="utf-8")
     coordinates = "time", "frame_time", "collision_time", "event_time", "other_body_name"
-    dataset = xarray.Dataset(variables, attrs=attributes).set_coords([n for n in coordinates if n in variables])
-    dataset.set_close(file.close)
-    return dataset
+    return _dataset(variables, [n for n in coordinates if n in variables], attributes, file)

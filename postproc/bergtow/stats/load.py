@@ -111,11 +111,18 @@ def over_fields(statistic, samples, low=-np.inf, scale=None):
     return {"value": value, "interval_95": jackknife(value, without, low, np.inf, scale)}
 
 
-def ratio_over_fields(counts, sizes, high=np.inf, scale=LOG):
-    """Sum of counts / sum of sizes, one of each per field, with its interval."""
+def ratio_over_fields(counts, sizes, high=np.inf, scale=LOG, events=None):
+    """Sum of counts / sum of sizes, one of each per field, with its interval. Equal counts leave the jackknife no
+    scatter, so the interval then covers at least that of a Poisson number of events [Garwood 1936], of which the counts
+    consist (default: counts of events)."""
     counts, sizes = np.asarray(counts, dtype=float), np.asarray(sizes, dtype=float)
     without, value = (counts.sum() - counts) / np.maximum(sizes.sum() - sizes, 1e-300), counts.sum() / sizes.sum()
-    return {"value": value, "interval_95": jackknife(value, without, 0.0, high, scale)}
+    ends = jackknife(value, without, 0.0, high, scale)
+    if 0 < counts.min() == counts.max():
+        n, level = counts.sum() if events is None else events, stat_mean.LEVEL
+        low, top = scipy.stats.chi2.ppf([0.5 - level / 2, 0.5 + level / 2], [2 * n, 2 * n + 2]) / (2 * n) * value
+        ends = float(np.minimum(ends[0], low)), float(np.minimum(np.maximum(ends[1], top), high))  # NaN stays
+    return {"value": value, "interval_95": ends}
 
 
 def least_of(samples):
@@ -151,7 +158,8 @@ def exceedance(fields, gap):
         above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]
         clusters = [len(stat_extreme.clusters(f["time"], f["peak"], level, gap)) for f in fields]
         out.append({
-            "level": level, "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields], 1.0, LOGIT),
+            "level": level,
+            "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields], 1.0, LOGIT, sum(clusters)),
             "per_hour": ratio_over_fields(clusters, [f["hours"] for f in fields])
         })
     return out

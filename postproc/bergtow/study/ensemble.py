@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from bergtow._calls import called
 from bergtow._program import program_path
-from bergtow.case import setting
+from bergtow.case import here, setting
 from bergtow.errors import IO, OK, BergtowError
 from bergtow.functions import Picture, plot_ensemble, report, statistics
-from bergtow.result.dataset import Result, _imported, _wrapper
+from bergtow.result.dataset import Result, _dataset, _imported, _wrapper
 from bergtow.study.workers import on_workers
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Ensemble:
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.folder = Path(folder)
+        self.folder = Path(here(), folder)  # the working folder may change
         if not (self.folder / "ensemble.h5").is_file():
             raise BergtowError(f"{self.folder}: holds no ensemble.h5; give the folder that `bergtow ensemble` has left",
                                IO)
@@ -97,7 +97,7 @@ class Ensemble:
 
         Dimensions: member, and sample (samples of the series). Coordinates: name, condition, repeat, seed of each
         member, and the keys that the study varies. Variables: the numbers of summary.json, the series, state_hash,
-        status and reason. All have units and a long_name.
+        status and reason. All have a long_name, numbers also units.
         """
         xarray, file = _imported("xarray"), self._open()
         from bergtow.result.hdf5 import plain
@@ -117,9 +117,7 @@ class Ensemble:
                     coordinates.append(name)
         attributes = {name: plain(value) for name, value in file.attrs.items()}
         attributes["study"] = plain(file["study"][()])
-        dataset = xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
-        dataset.set_close(file.close)
-        return dataset
+        return _dataset(variables, coordinates, attributes, file)
 
     @property
     def dataframe(self) -> pandas.DataFrame:
