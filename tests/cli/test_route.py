@@ -326,8 +326,10 @@ def test_positions_do_not_jump_at_the_180th_meridian():
 
 def test_a_programme_of_legs_goes_their_way():
     t, v = np.array(tows.programme([(100, 0.5), (80, 0.2), (60, 0.4)], 30)).T
-    assert np.trapz(v, t) == pytest.approx(240) and np.all(np.diff(t) > 0)
+    assert np.sum(np.diff(t) * (v[1:] + v[:-1]) / 2) == pytest.approx(240) and np.all(np.diff(t) > 0)
     assert list(np.unique(v)) == [0, 0.2, 0.4, 0.5]
+    t, v = np.transpose(tows.programme([(100, np.nextafter(0.6, 1))], 300, (1208.0, 0.6)))
+    assert np.all(np.diff(t) > 0) and set(v) == {0.6}
 
 
 def test_a_polyline_keeps_within_its_distance():
@@ -545,6 +547,17 @@ def towed_on_a_line(folder):
     shoal = {"type": "Polygon", "coordinates": [[[-60, 250], [-5, 250], [-5, 270], [-60, 270], [-60, 250]]]}
     (folder / "shoal.geojson").write_text(json.dumps(local(shoal)))
     return folder
+
+
+def test_a_look_at_drifting_ice(tmp_path):
+    """Red: at the look, rounding is a change of speed that takes no time."""
+    write_case(tmp_path, changed(LINE, water={"current_x": 0.1}, tow={"mode": "speed", "speed": 0.5}))
+    done = called("route", "case.yml", "--to", "430,0", "--routes", "1", "--replan", "300 s", "--members", "1", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert found["drift"][0] > 0.05 and len(found["rounds"]) == 2
+    assert all(t["arrived"] for t in found["horizon"]["tows"].values())
 
 
 def test_looks_from_a_line(tmp_path):

@@ -97,9 +97,10 @@ def legs_of(route, track, time, situation):
 
 def programme(legs, ramp, start=(0.0, 0.0)):
     """[(time s, speed m/s)] of a tow at the speeds of its legs [(length m, speed m/s)], from a time and a speed on. A
-    change of speed takes the share of the ramp, s, that it is of the largest speed."""
+    change of speed takes the share of the ramp, s, that it is of the largest speed; one by rounding is none."""
     top, out, (time, at) = max(v for _, v in legs), [start], start
     for length, v in legs:
+        v = at if abs(v - at) < 1e-9 * top else v
         change = ramp * abs(v - at) / top * (1 + 1e-9)  # rounded, it is no steeper than the ramp
         way = change * (v + at) / 2
         if change > 0:
