@@ -481,7 +481,7 @@ static bt_lattice *lattice_of(bt_planner *planner)
     return bt_lattice_make(planner, ax, ay, h, h / ceil(h / cell - 1e-9));
 }
 
-void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
+static void make(const bt_route_task *task, bt_route_plan *plan)
 {
     bt_planner planner;
     begin(&planner, task);
@@ -562,6 +562,14 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     plan->states = planner.states;
     bt_lattice_free(lattice);
     end(&planner);
+}
+
+void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
+{
+    bt_route_task fast = *task; // the cheapest speed may be too slow for a goal that drifts away
+    qsort(fast.speed, (size_t)fast.n_speeds, sizeof *fast.speed, bt_descending);
+    do make(&fast, plan);
+    while (plan->status == BT_ROUTE_GOAL_DRIFTS && --fast.n_speeds > 0);
 }
 
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan)
