@@ -394,6 +394,12 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
     way_goal(planner, 0, from[0], from[1], end);
     for (int k = 0; k < STEPS && !there; k++) {
         way_price(planner, &way);
+        if (way.cost.faults & BT_ROUTE_TURNS) { // they may fit where the goal is on arrival
+            double length = bt_hypot(way.point[0][0] - task->start[0], way.point[0][1] - task->start[1]);
+            for (int m = 0; m < n; m++)
+                length += bt_hypot(way.point[m + 1][0] - way.point[m][0], way.point[m + 1][1] - way.point[m][1]);
+            way.cost.time = length / task->speed[0];
+        }
         const double was[2] = {end[0], end[1]};
         way_goal(planner, way.cost.time, from[0], from[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);

@@ -26,6 +26,7 @@ from bergtow import Case, _library
 from bergtow.errors import RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, route, situation, tows, verdict
+from bergtow.text import route as text_route
 
 BASIN = changed(TOW, run__duration=20, domain__length=12, domain__width=6, domain__ends="open", body__x=2.5,
                 body__length=0.8, ice__size=0.5, ice__concentration=0.4, output=None)
@@ -301,6 +302,34 @@ def test_each_speed_has_its_own_prediction(tmp_path):
     assert limit < fast["predicted"]["mean_force"]
     limited = told([0.1, 0.2], force_limit=limit)
     assert [limited[v]["faults"] for v in (0.1, 0.2)] == [[], ["force_limit"]]
+
+
+def test_every_route_has_every_speed_that_reaches_the_goal(tmp_path):
+    """And those that do not are named. Red: a speed below that of the ice refuses all; a route whose turns do not fit
+    where the goal is without drift is left out without a word."""
+    write_case(tmp_path, changed(LINE, domain__length=900, water={"current_x": -0.35}))
+    done = called("route", "case.yml", "--to", "330,0", "--speeds", "0.3,0.6,1.2", "--routes", "1", "--plan-only", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert [(r["kind"], r["speed"]) for r in found["routes"]] == [
+        (kind, v) for kind in ("straight", "planned") for v in (0.6, 1.2)]
+    assert re.findall("Left out: .*", done.stdout) == [
+        "Left out: 0.300 m/s, at which the goal drifts away from the ice faster than the body is towed."]
+    unreached = [*found["unreached"], {"label": "route 1", "kind": "planned", "speed": 1.2}]
+    assert text_route.unreached({"unreached": unreached})[1].startswith("Left out: route 1 at 1.20 m/s, since its turns")
+
+
+def test_a_faster_tow_does_not_overshoot_a_goal_that_drifts(tmp_path):
+    """At twice the speed the goal is met where, in the ice, a corner was before. Red: the tow turns back there."""
+    s = read_situation(tmp_path, changed(BASIN, ice__concentration=0, domain__length=200, domain__width=30))
+    s = dataclasses.replace(s, drift=(-0.15, 0.0), water=(-0.15, 0.0))
+    options = {"drift": s.drift, "water": s.water, "extent": s.extent, "radius": 1.0}
+    slow = planner.route_through(s.ice, s.hull, s.start, (30, 0), [(90, 6)], speed=0.2, **options)
+    fast = route.at_speed(slow, 0.4, s, None, options)
+    ground, wanted = (np.array(r.waypoints[0]) + r.time[np.argmin(np.hypot(r.x - r.waypoints[0][0],
+                      r.y - r.waypoints[0][1]))] * np.array(s.drift) for r in (fast, slow))
+    assert ground == pytest.approx(wanted, abs=0.1) and np.all(np.abs(fast.heading) < 1)
 
 
 def test_the_limit_holds_in_every_step(tmp_path):

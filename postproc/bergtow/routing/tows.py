@@ -179,9 +179,9 @@ def candidate(name, label, route, situation):
 
 
 def candidates(routes, speeds, situation, at_speed):
-    """Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ.
-    at_speed(route, m/s): the route at that speed, or None."""
-    out, k = [], 0
+    """(Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ;
+    [{"label", "kind", "speed"}] of those that do not). at_speed(route, m/s): the route at that speed, or None."""
+    out, unreached, k = [], [], 0
     for route in routes:
         k += route.kind != "straight"
         name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
@@ -189,9 +189,11 @@ def candidates(routes, speeds, situation, at_speed):
             more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
             if same := at_speed(route, speed):
                 out.append(candidate(name + more[0], label + more[1], same, situation))
+            else:
+                unreached.append({"label": label, "kind": route.kind, "speed": speed})
         if len(set(route.legs["speed"].tolist())) > 1:
             out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, situation))
-    return out
+    return out, unreached
 
 
 # ---- runs

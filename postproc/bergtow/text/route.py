@@ -28,7 +28,16 @@ def plan(found, markdown=False):
         rows.append([r["label"], amount(p["length"], "m"), amount(p["time"], "s"), f"{number(p['ice_area'])} m2",
                      amount(p["mean_force"], "N"), amount(p["work"], "J"),
                      "; ".join(PLANNED[f] for f in r["faults"]) or "–"])
-    return table(head, rows, markdown)
+    return "\n\n".join([table(head, rows, markdown), *unreached(found)])
+
+
+def unreached(found):
+    """[sentence] of the routes that some speeds do not bring to the goal."""
+    slow = {r["speed"] for r in found["unreached"] if r["kind"] == "straight"}
+    return [f"Left out: {number(v)} m/s, at which the goal drifts away from the ice faster than the body is towed."
+            for v in sorted(slow)] + [
+        f"Left out: {r['label']} at {number(r['speed'])} m/s, since its turns do not fit where the goal then is."
+        for r in found["unreached"] if r["speed"] not in slow]
 
 
 def percent(x):
