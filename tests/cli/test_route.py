@@ -467,6 +467,15 @@ def test_what_a_call_leaves(routed):
     assert "No route shown better" in routed.said or "Take route" in routed.said
 
 
+def test_a_force_limit_is_compared_with_the_force_that_is_shown(routed):
+    """Red: the table shows a percentile below the limit, and that the limit is exceeded."""
+    told = text_route.verified(routed.found | {"force_limit": 1.0})
+    for r in routed.found["routes"]:
+        decides = text_route.amount(max(t["largest"] for t in r["members"]), "N")
+        assert decides in next(row for row in told.splitlines() if row.startswith(r["label"]))
+    assert "largest force" in told and "largest force" not in routed.said and "99th percentile" in routed.said
+
+
 def test_every_route_is_towed_through_the_same_ice(routed):
     fields = {}
     for path in (routed.out / "route").glob("*/members/*/case.resolved.yml"):

@@ -46,9 +46,9 @@ def percent(x):
 
 def verified(found, markdown=False):
     """The tows compared with the straight line."""
-    verdict, unit = found["verdict"], UNITS[found["objective"]]
-    head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak", "time",
-            "remarks"]
+    verdict, unit, limited = found["verdict"], UNITS[found["objective"]], found["force_limit"] is not None
+    head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak",
+            *["largest force"] * limited, "time", "remarks"]
     rows = []
     by_name = {r["name"]: r for r in found["routes"]}
     for name in verdict["order"]:
@@ -62,8 +62,14 @@ def verified(found, markdown=False):
             against = percent(c["relative"]) + ("" if low is None else f" ({percent(low)} to {percent(high)})")
         said = [f"{FAULTS[f]} in {n} of {verdict['members']}" for f, n in r["counts"].items() if n]
         rows.append([r["label"], amount(s[found["objective"]], unit), against, amount(s["mean_force"], "N"),
-                     amount(s["peak"], "N"), amount(s["time"], "s"), "; ".join(said) or "–"])
+                     amount(s["peak"], "N"), *[amount(largest(r), "N")] * limited, amount(s["time"], "s"),
+                     "; ".join(said) or "–"])
     return table(head, rows, markdown)
+
+
+def largest(r):
+    """Largest force of any step in any member, N, which the limit is for; None without one."""
+    return max((t["largest"] for t in r["members"] if t["largest"] is not None), default=None)
 
 
 def answer(found):
@@ -117,7 +123,11 @@ def meaning(found):
         f"The best route by prediction lost to the straight line in {best['lost']} of {best['members']}. "
     c = found.get("calibration")
     fit = "" if not c else calibration(c) + " "
-    return members + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
+    peak = "The peak is the 99th percentile of the force after the ramp, the mean of the members. "
+    if found["force_limit"] is not None:
+        peak += ("The force limit holds in every step, the ramp included; the largest force is that of any step in any "
+                 "member. ")
+    return members + peak + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
 
 
 def span(numbers):
