@@ -90,6 +90,27 @@ def test_the_place_is_that_of_the_outlines(tmp_path, crs):
     found = s.place.degrees(floe)
     assert np.abs(found[:, None] - ring[:-1]).max(axis=2).min(axis=1).max() < 1e-7
     assert np.allclose(s.place.metres(found), floe, atol=1e-3)
+    again = map_of(write_case(tmp_path, case | {"ice": {"field": str(s.field)}}))
+    assert again["crs"] == s.place.crs and again["origin"] == pytest.approx(
+        s.place.origin if crs else np.degrees(s.place.origin))
+
+
+def test_a_field_keeps_its_place_unless_the_case_gives_one(tmp_path):
+    """In the program, whose runs are exported, and for routes. Red: one has the place of the file, the other that of the
+    case, or none."""
+    first, own = ({"origin_lon": lon, "origin_lat": lat} for lon, lat in ((20, 76.5), (30, 70)))
+    call("field", write_case(tmp_path, changed(BASIN, ice=BASIN["ice"] | first)), "-o", tmp_path / "f.h5")
+    for ice, wanted in ({}, (20, 76.5)), (own, (30, 70)):
+        case = write_case(tmp_path, changed(BASIN, ice={"field": "f.h5"} | ice))
+        assert map_of(case)["origin"] == pytest.approx(wanted)
+        assert np.degrees(situation.place_of(Case(case), tmp_path / "f.h5").origin) == pytest.approx(wanted)
+
+
+def map_of(case):
+    """{"origin", "crs"} of the floes of a case as GeoJSON."""
+    call("field", case, "-o", case.parent / "floes.geojson", "--force")
+    found = json.loads((case.parent / "floes.geojson").read_text())
+    return {"origin": found["bergtow"]["origin"], "crs": found.get("crs", {}).get("properties", {}).get("name", "")}
 
 
 def test_a_position_is_metres_or_degrees(tmp_path):
