@@ -150,8 +150,8 @@ static double read_number(const reader *in, const char *name)
     return number;
 }
 
-/// A word among the attributes of /floes, or "": files of other programs may have none. Only strings of fixed length are
-/// read: HDF5 1.10 may search for one of variable length forever if bits of the file are flipped.
+/// A word among the attributes of /floes, or "": files of other programs may have none. Only strings of fixed length
+/// are read: HDF5 1.10 may search for one of variable length forever if bits of the file are flipped.
 static void read_word(const reader *in, const char *name, size_t size, char word[size])
 {
     *word = 0;

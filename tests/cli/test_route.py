@@ -96,8 +96,8 @@ def test_the_place_is_that_of_the_outlines(tmp_path, crs):
 
 
 def test_a_field_keeps_its_place_unless_the_case_gives_one(tmp_path):
-    """In the program, whose runs are exported, and for routes. Red: one has the place of the file, the other that of the
-    case, or none."""
+    """In the program, whose runs are exported, and for routes. Red: one has the place of the file, the other that of
+    the case, or none."""
     first, own = ({"origin_lon": lon, "origin_lat": lat} for lon, lat in ((20, 76.5), (30, 70)))
     call("field", write_case(tmp_path, changed(BASIN, ice=BASIN["ice"] | first)), "-o", tmp_path / "f.h5")
     for ice, wanted in ({}, (20, 76.5)), (own, (30, 70)):
@@ -337,8 +337,8 @@ def test_every_route_has_every_speed_that_reaches_the_goal(tmp_path):
         (kind, v) for kind in ("straight", "planned") for v in (0.6, 1.2)]
     assert re.findall("Left out: .*", done.stdout) == [
         "Left out: 0.300 m/s, at which the goal drifts away from the ice faster than the body is towed."]
-    unreached = [*found["unreached"], {"label": "route 1", "kind": "planned", "speed": 1.2}]
-    assert text_route.unreached({"unreached": unreached})[1].startswith("Left out: route 1 at 1.20 m/s, since its turns")
+    unreached = text_route.unreached({"unreached": [{"label": "route 1", "kind": "planned", "speed": 1.2}]})
+    assert unreached[0].startswith("Left out: route 1 at 1.20 m/s, since its turns do not fit")
 
 
 def test_a_faster_tow_does_not_overshoot_a_goal_that_drifts(tmp_path):
