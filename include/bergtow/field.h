@@ -26,7 +26,7 @@ typedef struct bt_outline_counts {
     int64_t parts;    ///< their parts
     double lon, lat;  ///< place of x = y = 0 for longitude and latitude, rad; NaN otherwise
     double east, north; ///< coordinates of x = y = 0 in the plane of the file, m; NaN otherwise
-    char crs[32];     ///< of the file: "OGC:CRS84" (degrees), "EPSG:32633", "local" (metres); "" for other fields
+    char crs[32];     ///< of the file: "OGC:CRS84" (degrees), "EPSG:32633", "local" (metres); "" without a map
     int64_t unnamed;  ///< features without `thickness` that have a similarly named property
     char nearly[96];  ///< the first few such names
     int64_t bare;     ///< features without a thickness, whose floes get that of the case

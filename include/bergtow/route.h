@@ -50,7 +50,7 @@ typedef enum {
     BT_ROUTE_GOAL_NO_GO,
     BT_ROUTE_START_TOO_THICK, ///< the force at the start exceeds the limit at every speed
     BT_ROUTE_GOAL_TOO_THICK,
-    BT_ROUTE_GOAL_DRIFTS,    ///< in the frame of the ice the goal moves away faster than the berg follows
+    BT_ROUTE_GOAL_DRIFTS,    ///< in the frame of the ice the goal moves away faster than the berg follows at any speed
     BT_ROUTE_AT_GOAL,        ///< the start is the goal
 } bt_route_status;
 
@@ -118,7 +118,8 @@ typedef struct bt_route_plan {
 } bt_route_plan;
 
 /// Make a plan. Deterministic: costs of the search are whole numbers, and of equal costs the lower index goes first. No
-/// errors other than the status in the plan: the caller must have checked the numbers. Release with bt_route_free.
+/// errors other than the status in the plan: the caller must have checked the numbers. Where the goal drifts away from
+/// the straight line, the slowest speed is left out, until it is reached. Release with bt_route_free.
 void bt_route_make(const bt_route_task *task, bt_route_plan *plan);
 /// Release the routes of a plan.
 void bt_route_free(bt_route_plan *plan);

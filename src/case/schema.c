@@ -215,8 +215,8 @@ bt_key bt_case_keys[] = {
            "coordinates of the outlines: as the file's crs says, degrees if it has none [RFC 7946]; for a file without "
            "a crs also lonlat (degrees, WGS84), plane (metres east, north) or frame (metres x, y of this case)"),
     REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]",
-         "longitude of x = y = 0, for outlines in degrees (none: their middle) and for GeoJSON from bergtow field; "
-         "outlines are projected about it (azimuthal equidistant, within 100 km)"),
+         "longitude of x = y = 0, for outlines in degrees (none: their middle), and of any other field (none: that of "
+         "its file); outlines are projected about it (azimuthal equidistant, within 100 km)"),
     REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-90, 90]", "latitude of x = y = 0, as ice.origin_lon"),
     REAL("ice.origin_east", ice.origin_east, LENGTH, "none", "[-1e8, 1e8]",
          "easting of x = y = 0 in the plane of outlines in metres; none: the middle of the outlines if their crs is a "

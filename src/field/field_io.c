@@ -7,7 +7,8 @@
 //     /floes/thickness  [n]     m
 //     /floes/area       [n]     m², optional when read
 //     /floes            attributes ice_area m² (to which concentration refers), concentration, n_floes, frame (the
-//                       domain.frame of x and y), x_min, y_min, x_max, y_max m (the ice region)
+//                       domain.frame of x and y), x_min, y_min, x_max, y_max m (the ice region); the place of x = y =
+//                       0, if known: origin_lon, origin_lat deg, or crs, origin_east, origin_north m
 //     /case             the resolved case the field was made from
 // The reader trusts nothing: the file may be cut off, damaged, or made by hand. Files of this program carry a checksum
 // (checksum.h), so damage is refused before HDF5, which some damage crashes, reads a byte. In a file without one, made
@@ -67,7 +68,7 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
             bt_h5_attr_double(&h5, "/floes", "origin_lon", place.first * 180 / BT_PI);
             bt_h5_attr_double(&h5, "/floes", "origin_lat", place.second * 180 / BT_PI);
         } else if (place.kind == BT_MAP_PLANE) {
-            bt_h5_attr_text(&h5, "/floes", "crs", place.crs);
+            bt_h5_attr_word(&h5, "/floes", "crs", place.crs);
             bt_h5_attr_double(&h5, "/floes", "origin_east", place.first);
             bt_h5_attr_double(&h5, "/floes", "origin_north", place.second);
         }
@@ -149,18 +150,18 @@ static double read_number(const reader *in, const char *name)
     return number;
 }
 
-/// The frame that the file names, or "": files of other programs may name none. Only strings of fixed length are read:
-/// HDF5 1.10 may search for one of variable length forever if bits of the file are flipped.
-static void read_frame(const reader *in, char frame[16])
+/// A word among the attributes of /floes, or "": files of other programs may have none. Only strings of fixed length
+/// are read: HDF5 1.10 may search for one of variable length forever if bits of the file are flipped.
+static void read_word(const reader *in, const char *name, size_t size, char word[size])
 {
-    *frame = 0;
-    if (in->r.status != BT_OK || H5Aexists_by_name(in->file, "/floes", "frame", H5P_DEFAULT) <= 0) return;
-    hid_t a = H5Aopen_by_name(in->file, "/floes", "frame", H5P_DEFAULT, H5P_DEFAULT), type = H5Aget_type(a),
+    *word = 0;
+    if (in->r.status != BT_OK || H5Aexists_by_name(in->file, "/floes", name, H5P_DEFAULT) <= 0) return;
+    hid_t a = H5Aopen_by_name(in->file, "/floes", name, H5P_DEFAULT, H5P_DEFAULT), type = H5Aget_type(a),
           space = H5Aget_space(a);
-    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 && H5Tget_size(type) < 16 &&
-        H5Sget_simple_extent_npoints(space) == 1 && H5Aread(a, type, frame) < 0)
-        *frame = 0;
-    frame[15] = 0;
+    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 && H5Tget_size(type) < size &&
+        H5Sget_simple_extent_npoints(space) == 1 && H5Aread(a, type, word) < 0)
+        *word = 0;
+    word[size - 1] = 0;
     H5Sclose(space);
     H5Tclose(type);
     H5Aclose(a);
@@ -175,6 +176,25 @@ static void read_region(const reader *in, double region[4])
         x[k] = read_number(in, region_names[k]);
     }
     if (x[0] < x[2] && x[1] < x[3]) memcpy(region, x, sizeof x);
+}
+
+/// The place of x = y = 0, if the file gives one that makes sense.
+static void read_place(reader *in)
+{
+    bt_outline_counts *counts = &in->counts;
+    const double lon = read_number(in, "origin_lon"), lat = read_number(in, "origin_lat"),
+                 east = read_number(in, "origin_east"), north = read_number(in, "origin_north");
+    char crs[sizeof counts->crs];
+    read_word(in, "crs", sizeof crs, crs);
+    if (lon >= -180 && lon <= 360 && fabs(lat) <= 90) {
+        snprintf(counts->crs, sizeof counts->crs, "OGC:CRS84");
+        counts->lon = lon * BT_PI / 180, counts->lat = lat * BT_PI / 180;
+        counts->east = counts->north = NAN;
+    } else if (bt_map_crs_of(crs).kind == BT_MAP_PLANE && isfinite(east) && isfinite(north)) {
+        memcpy(counts->crs, crs, sizeof crs);
+        counts->east = east, counts->north = north;
+        counts->lon = counts->lat = NAN;
+    }
 }
 
 static double read_ice_area(reader *in)
@@ -255,7 +275,8 @@ static void read_floes(reader *in, bt_field *field)
         same_length(in, "/floes/area", n_area, n);
     }
     field->ice_area = read_ice_area(in);
-    read_frame(in, field->frame);
+    read_word(in, "frame", sizeof field->frame, field->frame);
+    read_place(in);
     read_region(in, in->counts.region);
     if (in->r.status == BT_OK) {
         field->n = field->cap = (bt_idx)n;

@@ -85,7 +85,7 @@ static void warn_of_latitude(const bt_outline_counts *counts, const bt_case *inp
 static void warn_of_plane(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
 {
     const bt_map_crs crs = bt_map_crs_of(counts->crs);
-    if (crs.kind != BT_MAP_PLANE) return;
+    if (!counts->read || crs.kind != BT_MAP_PLANE) return;
     double along, across;
     bt_map_crs_scale(&crs, counts->east, counts->north, &along, &across);
     const bool turned = crs.any_north && input->domain.frame == BT_FRAME_GEOGRAPHIC;

@@ -117,12 +117,12 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
 
 bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *input)
 {
-    const bool read = counts && counts->read;
-    const bool plane = read && isfinite(counts->east);
-    if (read && isfinite(counts->lon)) return (bt_map_place){BT_MAP_DEGREES, counts->lon, counts->lat, NULL};
-    if (read && bt_map_crs_of(counts->crs).kind == BT_MAP_PLANE)
-        return (bt_map_place){BT_MAP_PLANE, plane ? counts->east : 0, plane ? counts->north : 0, counts->crs};
+    const bool map = counts && *counts->crs;
+    const bool plane = map && isfinite(counts->east);
     if (!isnan(input->ice.origin_lon))
         return (bt_map_place){BT_MAP_DEGREES, input->ice.origin_lon, input->ice.origin_lat, NULL};
+    if (map && isfinite(counts->lon)) return (bt_map_place){BT_MAP_DEGREES, counts->lon, counts->lat, NULL};
+    if (map && bt_map_crs_of(counts->crs).kind == BT_MAP_PLANE)
+        return (bt_map_place){BT_MAP_PLANE, plane ? counts->east : 0, plane ? counts->north : 0, counts->crs};
     return (bt_map_place){BT_MAP_LOCAL, plane ? counts->east : 0, plane ? counts->north : 0, NULL};
 }

@@ -52,7 +52,7 @@ typedef struct bt_map_place {
     const char *crs;      ///< of the projection, valid as long as the outlines; otherwise NULL
 } bt_map_place;
 
-/// The map of the outlines (NULL or all 0: there is none) takes precedence over ice.origin_lon and ice.origin_lat.
+/// By ice.origin_lon and ice.origin_lat; without them, that of the outlines or of the field file (NULL or all 0: none).
 bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *input);
 
 #endif

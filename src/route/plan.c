@@ -394,6 +394,12 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
     way_goal(planner, 0, from[0], from[1], end);
     for (int k = 0; k < STEPS && !there; k++) {
         way_price(planner, &way);
+        if (way.cost.faults & BT_ROUTE_TURNS) { // they may fit where the goal is on arrival
+            double length = bt_hypot(way.point[0][0] - task->start[0], way.point[0][1] - task->start[1]);
+            for (int m = 0; m < n; m++)
+                length += bt_hypot(way.point[m + 1][0] - way.point[m][0], way.point[m + 1][1] - way.point[m][1]);
+            way.cost.time = length / task->speed[0];
+        }
         const double was[2] = {end[0], end[1]};
         way_goal(planner, way.cost.time, from[0], from[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
@@ -481,7 +487,7 @@ static bt_lattice *lattice_of(bt_planner *planner)
     return bt_lattice_make(planner, ax, ay, h, h / ceil(h / cell - 1e-9));
 }
 
-void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
+static void make(const bt_route_task *task, bt_route_plan *plan)
 {
     bt_planner planner;
     begin(&planner, task);
@@ -562,6 +568,14 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
     plan->states = planner.states;
     bt_lattice_free(lattice);
     end(&planner);
+}
+
+void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
+{
+    bt_route_task fast = *task; // the cheapest speed may be too slow for a goal that drifts away
+    qsort(fast.speed, (size_t)fast.n_speeds, sizeof *fast.speed, bt_descending);
+    do make(&fast, plan);
+    while (plan->status == BT_ROUTE_GOAL_DRIFTS && --fast.n_speeds > 0);
 }
 
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan)

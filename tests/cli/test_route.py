@@ -26,6 +26,7 @@ from bergtow import Case, _library
 from bergtow.errors import RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, route, situation, tows, verdict
+from bergtow.text import route as text_route
 
 BASIN = changed(TOW, run__duration=20, domain__length=12, domain__width=6, domain__ends="open", body__x=2.5,
                 body__length=0.8, ice__size=0.5, ice__concentration=0.4, output=None)
@@ -89,6 +90,27 @@ def test_the_place_is_that_of_the_outlines(tmp_path, crs):
     found = s.place.degrees(floe)
     assert np.abs(found[:, None] - ring[:-1]).max(axis=2).min(axis=1).max() < 1e-7
     assert np.allclose(s.place.metres(found), floe, atol=1e-3)
+    again = map_of(write_case(tmp_path, case | {"ice": {"field": str(s.field)}}))
+    assert again["crs"] == s.place.crs and again["origin"] == pytest.approx(
+        s.place.origin if crs else np.degrees(s.place.origin))
+
+
+def test_a_field_keeps_its_place_unless_the_case_gives_one(tmp_path):
+    """In the program, whose runs are exported, and for routes. Red: one has the place of the file, the other that of
+    the case, or none."""
+    first, own = ({"origin_lon": lon, "origin_lat": lat} for lon, lat in ((20, 76.5), (30, 70)))
+    call("field", write_case(tmp_path, changed(BASIN, ice=BASIN["ice"] | first)), "-o", tmp_path / "f.h5")
+    for ice, wanted in ({}, (20, 76.5)), (own, (30, 70)):
+        case = write_case(tmp_path, changed(BASIN, ice={"field": "f.h5"} | ice))
+        assert map_of(case)["origin"] == pytest.approx(wanted)
+        assert np.degrees(situation.place_of(Case(case), tmp_path / "f.h5").origin) == pytest.approx(wanted)
+
+
+def map_of(case):
+    """{"origin", "crs"} of the floes of a case as GeoJSON."""
+    call("field", case, "-o", case.parent / "floes.geojson", "--force")
+    found = json.loads((case.parent / "floes.geojson").read_text())
+    return {"origin": found["bergtow"]["origin"], "crs": found.get("crs", {}).get("properties", {}).get("name", "")}
 
 
 def test_a_position_is_metres_or_degrees(tmp_path):
@@ -303,6 +325,34 @@ def test_each_speed_has_its_own_prediction(tmp_path):
     assert [limited[v]["faults"] for v in (0.1, 0.2)] == [[], ["force_limit"]]
 
 
+def test_every_route_has_every_speed_that_reaches_the_goal(tmp_path):
+    """And those that do not are named. Red: a speed below that of the ice refuses all; a route whose turns do not fit
+    where the goal is without drift is left out without a word."""
+    write_case(tmp_path, changed(LINE, domain__length=900, water={"current_x": -0.35}))
+    done = called("route", "case.yml", "--to", "330,0", "--speeds", "0.3,0.6,1.2", "--routes", "1", "--plan-only", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert [(r["kind"], r["speed"]) for r in found["routes"]] == [
+        (kind, v) for kind in ("straight", "planned") for v in (0.6, 1.2)]
+    assert re.findall("Left out: .*", done.stdout) == [
+        "Left out: 0.300 m/s, at which the goal drifts away from the ice faster than the body is towed."]
+    unreached = text_route.unreached({"unreached": [{"label": "route 1", "kind": "planned", "speed": 1.2}]})
+    assert unreached[0].startswith("Left out: route 1 at 1.20 m/s, since its turns do not fit")
+
+
+def test_a_faster_tow_does_not_overshoot_a_goal_that_drifts(tmp_path):
+    """At twice the speed the goal is met where, in the ice, a corner was before. Red: the tow turns back there."""
+    s = read_situation(tmp_path, changed(BASIN, ice__concentration=0, domain__length=200, domain__width=30))
+    s = dataclasses.replace(s, drift=(-0.15, 0.0), water=(-0.15, 0.0))
+    options = {"drift": s.drift, "water": s.water, "extent": s.extent, "radius": 1.0}
+    slow = planner.route_through(s.ice, s.hull, s.start, (30, 0), [(90, 6)], speed=0.2, **options)
+    fast = route.at_speed(slow, 0.4, s, None, options)
+    ground, wanted = (np.array(r.waypoints[0]) + r.time[np.argmin(np.hypot(r.x - r.waypoints[0][0],
+                      r.y - r.waypoints[0][1]))] * np.array(s.drift) for r in (fast, slow))
+    assert ground == pytest.approx(wanted, abs=0.1) and np.all(np.abs(fast.heading) < 1)
+
+
 def test_the_limit_holds_in_every_step(tmp_path):
     """A tow whose force is largest while the body is accelerated. Red: its mean is larger than its peak; the force
     of the ramp passes for one within the limit."""
@@ -326,8 +376,10 @@ def test_positions_do_not_jump_at_the_180th_meridian():
 
 def test_a_programme_of_legs_goes_their_way():
     t, v = np.array(tows.programme([(100, 0.5), (80, 0.2), (60, 0.4)], 30)).T
-    assert np.trapz(v, t) == pytest.approx(240) and np.all(np.diff(t) > 0)
+    assert np.sum(np.diff(t) * (v[1:] + v[:-1]) / 2) == pytest.approx(240) and np.all(np.diff(t) > 0)
     assert list(np.unique(v)) == [0, 0.2, 0.4, 0.5]
+    t, v = np.transpose(tows.programme([(100, np.nextafter(0.6, 1))], 300, (1208.0, 0.6)))
+    assert np.all(np.diff(t) > 0) and set(v) == {0.6}
 
 
 def test_a_polyline_keeps_within_its_distance():
@@ -434,6 +486,15 @@ def test_what_a_call_leaves(routed):
     assert line[0] == pytest.approx([2.5, 0]) and line[-1] == pytest.approx([8.5, 0.3])
     assert not (out / "routes.gpx").exists() and "<iframe" in (out / "route.html").read_text()
     assert "No route shown better" in routed.said or "Take route" in routed.said
+
+
+def test_a_force_limit_is_compared_with_the_force_that_is_shown(routed):
+    """Red: the table shows a percentile below the limit, and that the limit is exceeded."""
+    told = text_route.verified(routed.found | {"force_limit": 1.0})
+    for r in routed.found["routes"]:
+        decides = text_route.amount(max(t["largest"] for t in r["members"]), "N")
+        assert decides in next(row for row in told.splitlines() if row.startswith(r["label"]))
+    assert "largest force" in told and "largest force" not in routed.said and "99th percentile" in routed.said
 
 
 def test_every_route_is_towed_through_the_same_ice(routed):
@@ -545,6 +606,17 @@ def towed_on_a_line(folder):
     shoal = {"type": "Polygon", "coordinates": [[[-60, 250], [-5, 250], [-5, 270], [-60, 270], [-60, 250]]]}
     (folder / "shoal.geojson").write_text(json.dumps(local(shoal)))
     return folder
+
+
+def test_a_look_at_drifting_ice(tmp_path):
+    """Red: at the look, rounding is a change of speed that takes no time."""
+    write_case(tmp_path, changed(LINE, water={"current_x": 0.1}, tow={"mode": "speed", "speed": 0.5}))
+    done = called("route", "case.yml", "--to", "430,0", "--routes", "1", "--replan", "300 s", "--members", "1", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert found["drift"][0] > 0.05 and len(found["rounds"]) == 2
+    assert all(t["arrived"] for t in found["horizon"]["tows"].values())
 
 
 def test_looks_from_a_line(tmp_path):

@@ -390,6 +390,9 @@ def test_land_goes_by_where_the_ice_drifts():
 def test_a_goal_that_drifts_away():
     found = plan(NONE, BERG, (50, 300), (950, 300), extent=(0, 0, 1000, 600), drift=(-1.2, 0), water=(-1.2, 0))
     assert found.status == "goal_drifts_away" and found.routes == []
+    found = plan(NONE, BERG, (50, 300), (950, 300), extent=(0, 0, 1000, 600), drift=(-0.2, 0), water=(-0.2, 0),
+                 speeds=(0.1, 0.5), routes=1)  # the cheaper one is too slow
+    assert found.routes[0].duration == pytest.approx(900 / 0.3)
 
 
 def test_current_across_and_against():

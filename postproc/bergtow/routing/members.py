@@ -63,7 +63,8 @@ class Floes:
         with h5py.File(file) as f:
             g = f["floes"]
             return cls(*(g[name][...] for name in ("vertices", "offsets", "pose", "thickness", "area")),
-                       {k: g.attrs[k] for k in ("ice_area", "frame", "x_min", "x_max", "y_min", "y_max")
+                       {k: g.attrs[k] for k in ("ice_area", "frame", "x_min", "x_max", "y_min", "y_max", "crs",
+                                                "origin_lon", "origin_lat", "origin_east", "origin_north")
                         if k in g.attrs})
 
     def write(self, file):

@@ -162,15 +162,38 @@ def priced(a, w, s, weights, factor):
 
 
 def at_speed(route, speed, s, cell, options):
-    """A planned route at one speed, m/s; None if it does not reach the goal at it. cell: m; options: priced()."""
+    """A planned route at one speed, m/s; None if it does not reach the goal at it. Its corners keep their places in the
+    ice or, as the goal does, over the ground, whichever is cheaper. cell: m; options: priced()."""
     if set(route.legs["speed"].tolist()) == {speed}:
         return route
-    goal = route.waypoints[-1] + np.multiply(s.drift, route.duration)  # over the ground
-    try:  # a hair less of a radius: arcs that touch fit in spite of rounding
-        return planner.route_through(s.ice, s.hull, s.start, goal, route.waypoints[:-1], speed=speed, cell=cell,
-                                     **options | {"radius": 0.999 * options["radius"]})
-    except BergtowError:
-        return None
+    corners = route.waypoints[:-1]
+    times = [route.time[np.argmin(np.hypot(*(np.column_stack([route.x, route.y]) - at).T))] for at in corners]
+    *over_ground, goal = route.waypoints + np.outer([*times, route.duration], s.drift)
+    moved = passed(over_ground, s.start, s.drift, speed) if any(s.drift) and over_ground else None
+    found = []
+    for some in (corners, moved):
+        if some is None:
+            continue
+        try:  # a hair less of a radius: arcs that touch fit in spite of rounding
+            found.append(planner.route_through(s.ice, s.hull, s.start, goal, some, speed=speed, cell=cell,
+                                               **options | {"radius": 0.999 * options["radius"]}))
+        except BergtowError:
+            continue
+    return min(found, key=lambda r: (len(r.faults), r.cost), default=None)
+
+
+def passed(points, start, drift, speed):
+    """[n, 2] places in the ice, m, of points over the ground as a body passes them one after the other at a speed
+    through the ice, m/s; None if one drifts away."""
+    out, time = [], 0.0
+    for at, way in zip(points, np.diff([start, *points], axis=0)):
+        along = way @ drift  # |way - drift t| = speed t
+        root = along ** 2 + (speed ** 2 - np.dot(drift, drift)) * (way @ way)
+        if root < 0 or along + np.sqrt(root) <= 0:
+            return None
+        time += way @ way / (along + np.sqrt(root))
+        out.append(at - np.multiply(drift, time))
+    return out
 
 
 def refuse(plan, found, path, force):
@@ -399,9 +422,10 @@ def perform(a):
         found |= {"plan_s": time.monotonic() - clock, "states": plan.states, "cell": plan.cell, "spacing": plan.spacing}
         refuse(plan, found, folder / "route.json", a.force)
         options = priced(a, w, s, weights, factor)
-        some = tows.candidates(plan.routes, w["speeds"], s,
-                               lambda route, speed: at_speed(route, speed, s, plan.cell, options))
-        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c) for c in some]}
+        some, unreached = tows.candidates(plan.routes, w["speeds"], s,
+                                          lambda route, speed: at_speed(route, speed, s, plan.cell, options))
+        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c) for c in some],
+                  "unreached": unreached}
         files = Files(folder, plan, some, s, goal, a.force)
         files.write_plan()
         files.write(found, picture=True)

@@ -294,15 +294,16 @@ def floes_of(program, case, values, folder):
 
 
 def place_of(values, file):
-    """The Place of a case, from the file of its floes, or from its own keys if the file gives none."""
+    """The Place of a case, from its own keys, or from the file of its floes if they give none."""
     with h5py.File(file) as f:
         found = dict(f["floes"].attrs)
     north_first, keys = values["domain.frame"] == "geographic", (values["ice.origin_lon"], values["ice.origin_lat"])
+    if None not in keys:
+        return Place(north_first, keys)
     if "crs" in found:
         return Place(north_first, (float(found["origin_east"]), float(found["origin_north"])), plain(found["crs"]))
-    if "origin_lon" in found:
-        keys = tuple(map(float, np.radians([found["origin_lon"], found["origin_lat"]])))
-    return Place(north_first, None if None in keys else keys)
+    return Place(north_first, tuple(map(float, np.radians([found["origin_lon"], found["origin_lat"]])))
+                 if "origin_lon" in found else None)
 
 
 def of(program, case, folder, ramp=None, no_go=(), width=None):

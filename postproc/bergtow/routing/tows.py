@@ -97,9 +97,10 @@ def legs_of(route, track, time, situation):
 
 def programme(legs, ramp, start=(0.0, 0.0)):
     """[(time s, speed m/s)] of a tow at the speeds of its legs [(length m, speed m/s)], from a time and a speed on. A
-    change of speed takes the share of the ramp, s, that it is of the largest speed."""
+    change of speed takes the share of the ramp, s, that it is of the largest speed; one by rounding is none."""
     top, out, (time, at) = max(v for _, v in legs), [start], start
     for length, v in legs:
+        v = at if abs(v - at) < 1e-9 * top else v
         change = ramp * abs(v - at) / top * (1 + 1e-9)  # rounded, it is no steeper than the ramp
         way = change * (v + at) / 2
         if change > 0:
@@ -178,9 +179,9 @@ def candidate(name, label, route, situation):
 
 
 def candidates(routes, speeds, situation, at_speed):
-    """Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ.
-    at_speed(route, m/s): the route at that speed, or None."""
-    out, k = [], 0
+    """(Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ;
+    [{"label", "kind", "speed"}] of those that do not). at_speed(route, m/s): the route at that speed, or None."""
+    out, unreached, k = [], [], 0
     for route in routes:
         k += route.kind != "straight"
         name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
@@ -188,9 +189,11 @@ def candidates(routes, speeds, situation, at_speed):
             more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
             if same := at_speed(route, speed):
                 out.append(candidate(name + more[0], label + more[1], same, situation))
+            else:
+                unreached.append({"label": label, "kind": route.kind, "speed": speed})
         if len(set(route.legs["speed"].tolist())) > 1:
             out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, situation))
-    return out
+    return out, unreached
 
 
 # ---- runs

@@ -26,7 +26,16 @@ def plan(found, markdown=False):
         rows.append([r["label"], amount(p["length"], "m"), amount(p["time"], "s"), f"{number(p['ice_area'])} m2",
                      amount(p["mean_force"], "N"), amount(p["work"], "J"),
                      "; ".join(PLANNED[f] for f in r["faults"]) or "–"])
-    return table(head, rows, markdown)
+    return "\n\n".join([table(head, rows, markdown), *unreached(found)])
+
+
+def unreached(found):
+    """[sentence] of the routes that some speeds do not bring to the goal."""
+    slow = {r["speed"] for r in found["unreached"] if r["kind"] == "straight"}
+    return [f"Left out: {number(v)} m/s, at which the goal drifts away from the ice faster than the body is towed."
+            for v in sorted(slow)] + [
+        f"Left out: {r['label']} at {number(r['speed'])} m/s, since its turns do not fit where the goal then is."
+        for r in found["unreached"] if r["speed"] not in slow]
 
 
 def percent(x):
@@ -35,9 +44,9 @@ def percent(x):
 
 def verified(found, markdown=False):
     """The tows compared with the straight line."""
-    verdict, unit = found["verdict"], UNITS[found["objective"]]
-    head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak", "time",
-            "remarks"]
+    verdict, unit, limited = found["verdict"], UNITS[found["objective"]], found["force_limit"] is not None
+    head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak",
+            *["largest force"] * limited, "time", "remarks"]
     rows = []
     by_name = {r["name"]: r for r in found["routes"]}
     for name in verdict["order"]:
@@ -51,8 +60,14 @@ def verified(found, markdown=False):
             against = percent(c["relative"]) + ("" if low is None else f" ({percent(low)} to {percent(high)})")
         said = [f"{FAULTS[f]} in {n} of {verdict['members']}" for f, n in r["counts"].items() if n]
         rows.append([r["label"], amount(s[found["objective"]], unit), against, amount(s["mean_force"], "N"),
-                     amount(s["peak"], "N"), amount(s["time"], "s"), "; ".join(said) or "–"])
+                     amount(s["peak"], "N"), *[amount(largest(r), "N")] * limited, amount(s["time"], "s"),
+                     "; ".join(said) or "–"])
     return table(head, rows, markdown)
+
+
+def largest(r):
+    """Largest force of any step in any member, N, which the limit is for; None without one."""
+    return max((t["largest"] for t in r["members"] if t["largest"] is not None), default=None)
 
 
 def answer(found):
@@ -106,7 +121,11 @@ def meaning(found):
         f"The best route by prediction lost to the straight line in {best['lost']} of {best['members']}. "
     c = found.get("calibration")
     fit = "" if not c else calibration(c) + " "
-    return members + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
+    peak = "The peak is the 99th percentile of the force after the ramp, the mean of the members. "
+    if found["force_limit"] is not None:
+        peak += ("The force limit holds in every step, the ramp included; the largest force is that of any step in any "
+                 "member. ")
+    return members + peak + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
 
 
 def span(numbers):
