@@ -655,7 +655,7 @@ def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):
     assert p["needs_hours"] == pytest.approx(20 * 4 * gap / 3600) and p["window_hours"] == pytest.approx(30 / 3600)
     assert p["needs_fields"] == math.ceil(3600 * p["needs_hours"] / 30)
     assert answer.plan(BERGTOW, path, [], 1, 2, np.inf, 9)["budget_fields"] == 9
-    assert json.dumps(p) and "A design value takes some" in words.plan(p)
+    assert json.dumps(p) and "A design value needs about" in words.plan(p)
 
 
 @pytest.mark.slow
