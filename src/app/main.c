@@ -121,6 +121,8 @@ static void before_libraries(void)
     signal(SIGUSR1, SIG_IGN);
     // a file at its size limit makes the write fail, with a message, and does not end the program
     signal(SIGXFSZ, SIG_IGN);
+    // a reader of the output that ends, such as head, only loses text, and the command reports that at its end
+    signal(SIGPIPE, SIG_IGN);
 }
 __attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = before_libraries;
 
@@ -162,14 +164,6 @@ static int list_of(const char *word)
     return -1;
 }
 
-// A reader of the output that ends, such as head or a terminal, must not end a run or a field: the text is lost, and
-// the command reports that at its end. A command that only prints may end with its reader.
-static int start(int command, int argc, char **argv)
-{
-    if (commands[command].steps) signal(SIGPIPE, SIG_IGN);
-    return commands[command].run(argc, argv);
-}
-
 // Exit code of this rank.
 static int bergtow(int argc, char **argv)
 {
@@ -184,7 +178,8 @@ static int bergtow(int argc, char **argv)
         else if (argv[2][0] != '-') return bergtow(3, (char *[]){argv[0], argv[2], "--help", NULL});
     }
     const int command = command_of(word);
-    if (command >= 0) return first || commands[command].parallel ? start(command, argc - 1, argv + 1) : BT_OK;
+    if (command >= 0)
+        return first || commands[command].parallel ? commands[command].run(argc - 1, argv + 1) : BT_OK;
     if (!first) return BT_OK; // the rest only prints
 
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"),

@@ -258,9 +258,10 @@ void bt_case_put_default(bt_case *c, int key)
 
 // --- limits ----------------------------------------------------------------------------------------------------------
 
-typedef enum { REFUSED, NEEDED, BELOW, AT_MOST, AT_LEAST } relation;
+typedef enum { REFUSED, NEEDED, BELOW, AT_MOST, AT_LEAST, UP_TO, FROM } relation;
 
-/// A value that must be above 0 (NEEDED) or keep within a bound; or a combination that is refused.
+/// A value that must be above 0 (NEEDED) or keep within a bound; or a combination that is refused. UP_TO, FROM: AT_MOST
+/// and AT_LEAST of positions, which rounding may put just beyond.
 typedef struct limit {
     bool so;           ///< the row applies; of REFUSED: the fault is present
     relation relation;
@@ -294,9 +295,8 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
                power = input->ice.size_law == BT_SIZE_POWER, ordered = size_min < size_max || size_max == 0,
                splits = input->ice.splitting.toughness > 0,
                lognormal = made && input->ice.size_law == BT_SIZE_LOGNORMAL && ordered;
-    const double slack = 1e-9 * (input->domain.length + input->domain.width), x0 = input->domain.x0 - slack,
-                 x1 = input->domain.x0 + input->domain.length + slack, y0 = input->domain.y0 - slack,
-                 y1 = input->domain.y0 + input->domain.width + slack;
+    const double x0 = input->domain.x0, x1 = x0 + input->domain.length, y0 = input->domain.y0,
+                 y1 = y0 + input->domain.width;
     // a region without room, or sizes in the wrong order, are refused for that alone
     const double room = bt_min(input->ice.x_max - input->ice.x_min, input->ice.y_max - input->ice.y_min);
     const bool roomy = made && room > 0 && ordered;
@@ -330,14 +330,14 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
 
         {true, BELOW, "ice.x_min", "ice.x_max", input->ice.x_max, EXTENT, empty},
         {true, BELOW, "ice.y_min", "ice.y_max", input->ice.y_max, EXTENT, empty},
-        {true, AT_LEAST, "ice.x_min", "the low end of the domain", x0, EXTENT, inside},
-        {true, AT_MOST, "ice.x_max", "the high end of the domain", x1, EXTENT, inside},
-        {true, AT_LEAST, "ice.y_min", "the low end of the domain", y0, EXTENT, inside},
-        {true, AT_MOST, "ice.y_max", "the high end of the domain", y1, EXTENT, inside},
-        {!read, AT_MOST, "ice.extent.x_min", "ice.x_min", input->ice.x_min + slack, "", cut},
-        {!read, AT_LEAST, "ice.extent.x_max", "ice.x_max", input->ice.x_max - slack, "", cut},
-        {!read, AT_MOST, "ice.extent.y_min", "ice.y_min", input->ice.y_min + slack, "", cut},
-        {!read, AT_LEAST, "ice.extent.y_max", "ice.y_max", input->ice.y_max - slack, "", cut},
+        {true, FROM, "ice.x_min", "the low end of the domain", x0, EXTENT, inside},
+        {true, UP_TO, "ice.x_max", "the high end of the domain", x1, EXTENT, inside},
+        {true, FROM, "ice.y_min", "the low end of the domain", y0, EXTENT, inside},
+        {true, UP_TO, "ice.y_max", "the high end of the domain", y1, EXTENT, inside},
+        {!read, UP_TO, "ice.extent.x_min", "ice.x_min", input->ice.x_min, "", cut},
+        {!read, FROM, "ice.extent.x_max", "ice.x_max", input->ice.x_max, "", cut},
+        {!read, UP_TO, "ice.extent.y_min", "ice.y_min", input->ice.y_min, "", cut},
+        {!read, FROM, "ice.extent.y_max", "ice.y_max", input->ice.y_max, "", cut},
 
         {true, AT_LEAST, "ice.thickness", NULL, BT_LEAST_THICKNESS, "", ", too thin for ice; check the unit"},
         {true, AT_MOST, "ice.density", "water.density", input->water.density, "",
@@ -446,15 +446,19 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
 
 static void refuse_limit(const bt_check *check, const limit *l)
 {
-    static const char *const broken[] = {[BELOW] = "not below", [AT_MOST] = "more than", [AT_LEAST] = "less than"};
+    static const char *const broken[] = {[BELOW] = "not below", [AT_MOST] = "more than", [AT_LEAST] = "less than",
+                                         [UP_TO] = "more than", [FROM] = "less than"};
     const bt_key *row = row_of(l->key);
     const bool is_key = l->of && !strchr(l->of, ' ');
     const double value = row->type == BT_KEY_REAL ? bt_value_number(row, check->c) : 1;
+    const double slack = 1e-9 * (check->c->domain.length + check->c->domain.width);
     const bool bad[] = {[REFUSED] = true,
                         [NEEDED] = !(value > 0),
                         [BELOW] = value >= l->bound,
                         [AT_MOST] = value > l->bound,
-                        [AT_LEAST] = value < l->bound};
+                        [AT_LEAST] = value < l->bound,
+                        [UP_TO] = value > l->bound + slack,
+                        [FROM] = value < l->bound - slack};
     if (!l->so || !bad[l->relation] || !bt_check_sound(check, l->key) || !bt_check_sound(check, l->beside) ||
         (is_key && !bt_check_sound(check, l->of)))
         return;

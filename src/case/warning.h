@@ -36,7 +36,7 @@
     ROW(ADRIFT, "adrift", "time_s", "the last line parted, and nothing has towed the body since")                      \
     ROW(ICE_OVERTOOK, "ice_overtook", "distance_m", "ice overtook the body in a moving window")                        \
     ROW(WINDOW_LAPS, "window_laps", "laps", "the moving window passes through its ice more than once")                 \
-    ROW(PLACES_MISSED, "places_missed", "share_percent", "places ahead of the moving window stayed empty")             \
+    ROW(PLACES_MISSED, "places_missed", "share_percent", "floes due to enter the moving window found no free place")   \
     ROW(FLOES_KEPT, "floes_kept", "share_percent", "disturbed floes came back ahead of the moving window")             \
     /* reasons of a verdict alone */                                                                                   \
     ROW(SETTLING, "settling", "- from_s start_s", "a reported force is still settling where the window begins")        \

@@ -338,8 +338,8 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
     const double places = (double)(totals->window->renewed + totals->window->missed);
     if (places > 0 && (double)totals->window->missed > BT_STEADY_MISSED * places)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_PLACES_MISSED,
-                "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or "
-                "carries it along: use a longer domain",
+                "%.0f %% of the floes due to enter at the front of the moving window found no free place: the body "
+                "pushes ever more ice, or carries it along: use a longer domain",
                 100 * (double)totals->window->missed / places);
 }
 

@@ -35,8 +35,8 @@
 void bt_summary_window_print(const bt_window *window)
 {
     if (!window) return;
-    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept, %lld places missed, %lld floes "
-           "wait\n",
+    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept; %lld floes found no place, "
+           "%lld wait to enter\n",
            bt_window_laps(window), (long long)window->renewed, (long long)window->kept, (long long)window->missed,
            (long long)window->waiting);
 }

@@ -114,8 +114,9 @@ static void print_forces(const bt_summary *summary, const bt_case *input)
     else if (steady->met_no_ice) printf("    ice resistance    none: the body met no ice\n");
     else print_mean("  ice resistance", &summary->ice, steady->at_least);
     if (bt_case_reads_field(input) || bt_case_ice_is_random(input))
-        printf("    one field         the interval covers only this field: use several %s for a usable number\n",
-               bt_case_reads_field(input) ? "maps, or make fields like this one," : "values of ice.seed");
+        printf("    one field         the interval excludes the scatter between ice fields; repeat with other %s "
+               "before using this mean\n",
+               bt_case_reads_field(input) ? "maps, or fields made like this one," : "values of ice.seed");
     const double *quarter = steady->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s%s,", steady->at_least ? "at least: " : "", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
@@ -187,9 +188,8 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
         const bt_estimate_input *in = &summary->estimate;
         printf("  estimates           at %.4g m/s through the ice", in->along);
         if (fabs(in->along - in->ordered) > 0.01 * fabs(in->ordered)) printf(" (%.4g ordered)", in->ordered);
-        printf(": force, ice resistance of this run / estimate where the estimate depends on the concentration%s and "
-               "holds, regime\n",
-               in->channel ? " (none accounts for the channel)" : "");
+        printf(": estimate; simulated / estimate (where valid and dependent on concentration%s); validity\n",
+               in->channel ? "; none accounts for the channel" : "");
         bt_estimates_print(in, bt_summary_held_against(summary), "    ", false);
     }
     if (history->n)

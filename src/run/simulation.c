@@ -170,8 +170,7 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
     bt_status status = check_numbers(options, &err);
     if (status == BT_OK) status = read_case(&sim->c, options, &err);
     if (status == BT_OK && sim->dir && comm->rank == 0)
-        status = bt_folder_may_take(sim->dir, options->replace, "give another folder, or replace=True to replace it",
-                                    &err);
+        status = bt_folder_may_take(sim->dir, options->replace, "give another folder, or set `replace`", &err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = begin(sim, &err);
     return hand_out(out, sim, status, &err);

@@ -318,6 +318,15 @@ def test_examples_are_valid_cases(path, tmp_path):
         assert "warning" not in done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/tutorials/1-first-tow.md"])
+def test_a_page_states_the_mean_that_its_case_gives(page, tmp_path):
+    text = (ROOT / page).read_text()
+    (tmp_path / "case.yml").write_text(re.search(r"^```yaml\n(.*?)^```", text, re.S | re.M)[1])
+    done = call("run", tmp_path / "case.yml", "-o", tmp_path / "out", "--set", "output.frame_interval=-1 s")
+    [stated] = re.findall(r"[\d.]+ kN, 95 % interval [\d.]+ kN to [\d.]+ kN", text)
+    assert f"ice resistance    {stated}" in done.stdout and "), steady; " in done.stdout
+
+
 def test_the_force_law_of_the_page_is_the_one_that_is_tested():
     page = (ROOT / "docs/how-to-add-a-force-law.md").read_text()
     first = next(lines for language, lines in blocks(page) if language == "c")

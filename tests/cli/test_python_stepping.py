@@ -570,6 +570,6 @@ def test_a_simulation_is_never_duplicated(duplicate):
 
 def test_a_result_is_not_replaced_unless_asked(tmp_path):
     bergtow.run(SHORT, tmp_path / "out")
-    with pytest.raises(bergtow.BergtowError, match="holds a result; .* or replace=True to replace it"):
+    with pytest.raises(bergtow.BergtowError, match="holds a result; .* or set `replace`"):
         bergtow.run(SHORT, tmp_path / "out")
     bergtow.run(SHORT, tmp_path / "out", replace=True)

@@ -310,3 +310,14 @@ def test_a_field_for_a_reader_that_has_gone(tmp_path):
     os.close(writer)
     assert result.returncode == IO and "standard output: cannot be written" in result.stderr
     assert (tmp_path / "field.h5").exists()
+
+
+def test_words_for_a_reader_that_has_gone(tmp_path):
+    """Commands that only print, too. Red: ended by SIGPIPE, without a message."""
+    write_case(tmp_path, TOW)
+    for words in (["check", "case.yml"], ["estimate", "case.yml", "--json"], ["--list-keys"]):
+        reader, writer = os.pipe()
+        os.close(reader)
+        done = subprocess.run([BERGTOW, *words], cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True)
+        os.close(writer)
+        assert done.returncode == IO and "standard output: cannot be written" in done.stderr, (words, done)

@@ -358,10 +358,10 @@ def test_clustered_peaks_count_once():
 def test_what_no_tail_is_fitted_to():
     rng = np.random.default_rng(6)
     few = poisson_fields(rng, 2, rate=10)
-    assert "collisions do not make 30 clusters" in stat_extreme.over_threshold(few, [1.0], 0.0)["refused"]
+    assert "fewer than 30 independent peaks" in stat_extreme.over_threshold(few, [1.0], 0.0)["refused"]
     assert "needs 30" in stat_extreme.over_threshold(few, [1.0], 0.0, threshold=1e9)["refused"]
     fewer = [f | {"time": f["time"][:3], "peak": f["peak"][:3]} for f in few]  # one largest of six is no limit
-    assert "collisions do not make 30 clusters" in stat_extreme.over_threshold(fewer, [1.0], 0.0)["refused"]
+    assert "fewer than 30 independent peaks" in stat_extreme.over_threshold(fewer, [1.0], 0.0)["refused"]
     assert "without a collision" in stat_extreme.by_blocks(few, [1.0], blocks=30)["refused"]
     assert "raise --blocks" in stat_extreme.by_blocks(few, [1.0], blocks=2)["refused"]
     seldom = stat_extreme.over_threshold(poisson_fields(rng, 6, rate=100), [0.001], 0.0, threshold=100.0, resamples=1)

@@ -27,7 +27,7 @@ def map_to_design_force(reader):
     assert (reader.folder / "out/design/report.html").exists()
     verdicts = [json.loads(p.read_text())["window"]["verdict"]
                 for p in (reader.folder / "out/design/members").glob("*/summary.json")]
-    assert verdicts == 8 * ["steady"]  # as the page says
+    assert sorted(verdicts) == ["not steady"] + 7 * ["steady"]  # as the page says
 
 
 def ensemble_on_a_cluster(reader):

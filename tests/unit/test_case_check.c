@@ -23,7 +23,7 @@ TEST(cross_checks_refuse)
         {"ice.x_min=-1", "less than the low end of the domain"},
         {"ice.y_max=6", "more than the high end of the domain"},
         {"ice.extent.y_max=4", "4 m is less than ice.y_max, 5 m, and the field is cut"},
-        {"ice.extent.x_min=1", "1 m is more than ice.x_min"},
+        {"ice.extent.x_min=1", "1 m is more than ice.x_min, 0 m, and the field is cut"},
         {"ice.extent.x_max=7e6;ice.extent.y_max=3e5", "floes, more than the limit of 20000000"},
         {"ice.field=f.h5;ice.extent.y_min=-20", "ice.extent.y_min=-20: has no effect on ice that is read"},
         {"ice.size=11", "11 m is more than the short side of the ice region, 10 m"},

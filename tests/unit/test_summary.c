@@ -248,7 +248,7 @@ TEST(what_no_mean_goes_across_is_a_verdict)
                                        "the speed programme goes from 1 to 0.5 m/s within the window",
                                        "a line parted at 45 s",
                                        "stood still for 6 s of 60 s",
-                                       "of the places ahead of the moving window stayed empty"};
+                                       "at the front of the moving window found no free place"};
     for (size_t k = 0; k < sizeof reported / sizeof *reported; k++) {
         bt_case d = c;
         bt_run_totals t = totals(600);

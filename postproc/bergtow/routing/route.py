@@ -431,8 +431,7 @@ def perform(a):
         files.write(found, picture=True)
         print(words.plan(writing.plain(found)))
         if plan.status == "fewer_routes":
-            print(f"\n{sum(r.kind != 'straight' for r in plan.routes)} of {a.routes} routes were found: no other one "
-                  "lies a width apart from these.")
+            print("\nNo further alternative found: every other path runs within one width of these.")
         n = 1 if w["errors"].none else a.members
         told = estimate(runs, s, some, n)
         how = f"{len(some)} candidates, {n} member{'s' * (n > 1)} each: {len(some) * n} tows, {a.jobs} at a time"

@@ -184,8 +184,8 @@ def _of_the_sample(e, rows, c, load):
                     f"{hours_text(hours)} against {hours_text(simulated)}"))
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
-        out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
-                    f"{short(d['times_the_hours_simulated'], 2)} times; with {counted(more, 'field')} {FAR:g} times"))
+        out.append(("extrapolated far beyond the simulated hours", f"{short(d['times_the_hours_simulated'], 2)} times; "
+                    f"{counted(more, 'field')} would reduce this to {FAR:g}"))
     if d["irregular"]:
         out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, "
                     "and the value can be too small", f"shape {d['shape']:.2g}"))

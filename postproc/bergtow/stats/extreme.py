@@ -157,8 +157,8 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
         if threshold is None:
             return {
                 "refused": saturated(pooled, what) or
-                           f"{len(pooled)} {what} do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
-                           f"any threshold that half of them exceed at most; run longer, or more fields"
+                           f"too little data: fewer than {LEAST_EXCESSES} independent peaks ({gap:.3g} s apart) above "
+                           "any usable threshold; simulate longer or add fields"
                            + ("" if clusters_wanted else ", or `bergtow statistics` with a shorter --gap")
             }
     each = _excesses(fields, threshold, gap)

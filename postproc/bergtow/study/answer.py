@@ -108,7 +108,7 @@ def value_of(e, c, found, fields):
     if "value" in d:
         low, high = d["interval_95"]
         # rounded here, so that every sentence and table of it states the same load
-        return {"kind": "return_level", "n": table.designed(d["value"], d["largest"]),
+        return {"kind": "return_level", "n": table.designed(d["value"], found["largest"]),
                 "interval_95": [low, table.bound(d["value"], high)], "model": d["model"],
                 "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
     largest = stat_largest.largest_of([f["peak"].max() for f in fields], [f["hours"] for f in fields])

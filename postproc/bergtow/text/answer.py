@@ -286,12 +286,13 @@ def speeds(a):
 
 def plan(p):
     """Before the first run: the cost of a value, and what the budget allows."""
-    each = f"{p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min"
-    fields = each if p["window_hours"] > 0 else "a window"
+    each = f" ({p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min)"
+    fields = each if p["window_hours"] > 0 else ""
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
              "nothing": "not one"}[p["gives"]]
-    return (f"A design value takes some {short(p['needs_hours'], 2)} h of tow in windows: {fields}, some "
-            f"{short(p['needs_min'], 2)} min here. The budget allows {p['budget_fields']} fields, {gives}. "
+    return (f"A design value needs about {short(p['needs_hours'], 2)} h of simulated tow after the start{fields}, "
+            f"about {short(p['needs_min'], 2)} min of computing here. The budget allows {p['budget_fields']} fields, "
+            f"{gives}. "
             "(Both are estimates: of the program's speed, and of how soon new ice is in contact.)")
 
 
