@@ -59,15 +59,15 @@ static inline bt_memory bt_law_names(const bt_world *world, const bt_pair *pair,
 
 /// Work of the impulses of the contact in this step, Σ λ·½(w1 + w2), J, from the relative velocity at its start. With
 /// the work of loads and line taken alike, Σ J·½(U1 + U2), it adds up to the change of kinetic energy. Taken from the
-/// velocity after the loads (bt_contacts_gain), it would count ½ λᵀWλ of a contact at rest whose impulse only bears them.
+/// velocity after the loads (bt_contacts_gain), it would count ½ λᵀWλ of a contact at rest that only bears them.
 double bt_contacts_work(const bt_world *world, const bt_contact *contact);
 
 /// The part of that work done by the normal impulse of point i, J.
 double bt_contacts_normal_work(const bt_world *world, const bt_contact *contact, int i);
 
 /// Energy that the impulses of the contact add to the step without contacts, Σ λ·½(w* + w2), J; never positive in an
-/// exact solution. w* is the velocity without contacts, with the tow line's impulse: of simultaneous impulses the line's
-/// counts first, or its pull into the ice would count as a gain by the ice.
+/// exact solution. w* is the velocity without contacts, with the tow line's impulse: of simultaneous impulses that of
+/// the line counts first, or its pull into the ice would count as a gain by the ice.
 double bt_contacts_gain(const bt_world *world, const bt_contact *contact);
 
 /// The most that the contact can have gained in a step with this residual, m/s, J: an exact solution has λ·w <= 0, and
