@@ -45,6 +45,7 @@ def may_be_null(path, case, summary):
         (r"domain", not body),
         (r"domain\.body_widths_needed", summary["concentration"] < 0.445 or value_of(case, "domain.sides") == "open"
          or summary["n_floes"] == 0),
+        (r"(worst_)?(repartition_)?imbalance", True),  # nothing was checked
         (r"sweep_bytes_per_contact|lead\.mean_piece_m", True),  # no contact in the last step, no piece
         (r"memory_per_floe_b|ns_per_floe_step|max_overlap_relative", summary["n_floes"] == 0),
         (r"impacts.*", True),

@@ -27,19 +27,6 @@ def _view(pointer: Any, *shape: int, writeable: bool = False) -> np.ndarray:
     return view
 
 
-class _Columns(property):
-    """Columns of the loads: a view, which an assignment or += fills in."""
-
-    def __init__(self, columns: int | slice, doc: str) -> None:
-        def fill(bodies: Bodies, value: npt.ArrayLike) -> None:
-            bodies._load[:, columns] = value
-        super().__init__(lambda bodies: bodies._load[:, columns], fill)
-        self.__doc__ = doc
-
-    if TYPE_CHECKING:
-        def __get__(self, bodies: Any, kind: Any = None) -> np.ndarray: ...
-
-
 class Bodies:
     """The bodies at the start of a step, as a force sees them. The arrays are valid only during the call.
 
@@ -67,9 +54,32 @@ class Bodies:
         bodies."""
         return _library.id_of_towed(self._towed)
 
-    load = _Columns(slice(None), "[n, 10], the rows of bergtow/applied.h")
-    force = _Columns(slice(_FX, _FY + 1), "[n, 2] N")
-    moment = _Columns(_MOMENT, "[n] N m")
+    @property
+    def load(self) -> np.ndarray:
+        """[n, 10], the rows of bergtow/applied.h"""
+        return self._load
+
+    @load.setter
+    def load(self, value: npt.ArrayLike) -> None:
+        self._load[:] = value
+
+    @property
+    def force(self) -> np.ndarray:
+        """[n, 2] N"""
+        return self._load[:, _FX:_FY + 1]
+
+    @force.setter
+    def force(self, value: npt.ArrayLike) -> None:
+        self.force[:] = value
+
+    @property
+    def moment(self) -> np.ndarray:
+        """[n] N m"""
+        return self._load[:, _MOMENT]
+
+    @moment.setter
+    def moment(self, value: npt.ArrayLike) -> None:
+        self.moment[:] = value
 
     def _add(self, answer: npt.ArrayLike) -> None:
         """Add the value that a force function returned."""

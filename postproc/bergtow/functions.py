@@ -57,11 +57,11 @@ def _words(options: Mapping[str, Any]) -> list[str]:
 
 def _perform(command: str, *words: str | os.PathLike[str]) -> None:
     from . import cli  # imported here because cli needs the functions of this module
-    from .cli import lacking
+    from .cli import missing_packages
     try:
         cli.perform(command, *words)
     except ModuleNotFoundError as error:
-        raise BergtowError(lacking.message(error), IO) from None
+        raise BergtowError(missing_packages.message(error), IO) from None
     except OSError as error:
         raise BergtowError(str(error), IO) from None
 

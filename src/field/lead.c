@@ -274,7 +274,7 @@ typedef struct {
 } planned;
 
 /// Extend the path to (x, y), or as far towards it as the remaining length allows.
-static void go_on(planned *p, double x, double y)
+static void add_leg(planned *p, double x, double y)
 {
     const double *last = p->at + 2 * (p->n - 1), dx = x - last[0], dy = y - last[1], far = bt_hypot(dx, dy);
     if (far == 0 || p->left <= 0) return;
@@ -296,16 +296,16 @@ static double *planned_path(const bt_case *input, int *n, char why[200])
     p.at[0] = input->body.x;
     p.at[1] = input->body.y;
     if (input->tow.n_waypoints == 0)
-        go_on(&p, input->body.x + input->lead.length * bt_cos(input->tow.direction),
-              input->body.y + input->lead.length * bt_sin(input->tow.direction));
+        add_leg(&p, input->body.x + input->lead.length * bt_cos(input->tow.direction),
+                input->body.y + input->lead.length * bt_sin(input->tow.direction));
     for (int k = 0; input->tow.n_waypoints > 0 && k < path.n; k++) {
         const bt_leg *leg = &path.leg[k];
         const int pieces = leg->turn != 0 ? PIECES : 1;
-        go_on(&p, leg->x, leg->y);
+        add_leg(&p, leg->x, leg->y);
         for (int i = 1; i <= pieces && p.left > 0; i++) {
             double at[2], tangent[2];
             bt_path_at(&path, leg->way + (isinf(leg->length) ? p.left : leg->length * i / pieces), at, tangent);
-            go_on(&p, at[0], at[1]);
+            add_leg(&p, at[0], at[1]);
         }
     }
     bt_path_free(&path);

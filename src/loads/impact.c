@@ -220,12 +220,12 @@ static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t 
         rest = bt_max(rest, contact[i].rest);
         if (contact[i].collision > contact[most].collision) most = i;
     }
-    const bool goes_on = *begun && sum > 0 && approach <= TURNED * o->rest + impacts->tolerance;
-    if (!goes_on && !(sum > 0 && approach >= impacts->rule.least_speed)) {
+    const bool continues = *begun && sum > 0 && approach <= TURNED * o->rest + impacts->tolerance;
+    if (!continues && !(sum > 0 && approach >= impacts->rule.least_speed)) {
         for (int64_t i = 0; i < n; i++) contact[i].collision = 0; // quasi-static
         return false;
     }
-    if (!goes_on) *o = (bt_impact_open){.so_far = {.time = time, .gid = contact[0].gid, .approach = approach}};
+    if (!continues) *o = (bt_impact_open){.so_far = {.time = time, .gid = contact[0].gid, .approach = approach}};
     *begun = true;
     bt_impact *impact = &o->so_far;
     impact->impulse += sum;

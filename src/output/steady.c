@@ -233,7 +233,7 @@ static void judge_solver(bt_steady *steady, const bt_case *input, const bt_run_t
 }
 
 /// Distance of the towing end after this time, m. A vessel may fall behind its programme: it goes as far as its body.
-static double led_after(const bt_history *history, const bt_case *input, double time)
+static double distance_towed(const bt_history *history, const bt_case *input, double time)
 {
     const double *t = history->column[BT_COL_TIME], *vx = history->column[BT_COL_VX], *vy = history->column[BT_COL_VY];
     double way = 0;
@@ -249,7 +249,7 @@ static double half_tan(double angle) { return bt_sin(0.5 * angle) / bt_cos(0.5 *
 
 /// Distance of the end from a turn until the body on its line has followed, m. The angle θ between body and end decays
 /// as tan θ/2 ~ exp(−s/L) (a tractrix); at least the length of the line.
-static double followed_in(const bt_case *input, double turn)
+static double distance_to_follow(const bt_case *input, double turn)
 {
     if (input->tow.mode == BT_TOW_SPEED) return 0;
     return input->tow.line_length * bt_max(1, bt_log(half_tan(bt_min(turn, 3)) / half_tan(COURSE_LEFT)));
@@ -284,17 +284,17 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
 {
     bt_path path;
     char why[200];
-    for (int k = 0; k < 2; k++) steady->led[k] = led_after(history, input, k ? steady->end : steady->start);
+    for (int k = 0; k < 2; k++) steady->led[k] = distance_towed(history, input, k ? steady->end : steady->start);
     if (input->tow.n_waypoints == 0 || input->tow.mode == BT_TOW_NONE || !bt_case_tow_path(input, &path, why)) return;
     bool turned = false;
     for (int k = 0; k < path.n_marks; k++) {
         const double turn = bt_case_tow_turn(input, k), passed = passed_at(totals, k),
                      arc = 0.5 * input->tow.turn_radius * turn;
         const bool vessel = input->tow.mode == BT_TOW_THRUST && isfinite(passed);
-        const double mark = vessel ? led_after(history, input, passed) : path.mark[k], slack = 1e-9 * mark;
+        const double mark = vessel ? distance_towed(history, input, passed) : path.mark[k], slack = 1e-9 * mark;
         turned = turned || (turn > BT_TURN && mark < steady->led[1]);
         if (!(turn > BT_TURN) || mark - arc >= steady->led[1] - slack ||
-            mark + arc + followed_in(input, turn) <= steady->led[0] + slack)
+            mark + arc + distance_to_follow(input, turn) <= steady->led[0] + slack)
             continue;
         char when[60] = "to which it begins to turn";
         if (isfinite(passed)) snprintf(when, sizeof when, "passed at %g s", passed);
@@ -344,7 +344,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
 }
 
 /// Distance made good over ground by the body within the window, along its present leg of the tow, m; NaN = not known.
-static double come_on(const bt_steady *steady, const bt_history *history, const bt_case *input,
+static double distance_made_good(const bt_steady *steady, const bt_history *history, const bt_case *input,
                       const bt_run_totals *totals)
 {
     const double *t = history->column[BT_COL_TIME], *vx = history->column[BT_COL_VX], *vy = history->column[BT_COL_VY];
@@ -373,7 +373,7 @@ static void judge_track(bt_steady *steady, const bt_history *history, const bt_c
     const double asked =
         input->tow.mode == BT_TOW_NONE
         ? 0 : bt_case_tow_distance(input, steady->end) - bt_case_tow_distance(input, steady->start);
-    const double way = come_on(steady, history, input, totals);
+    const double way = distance_made_good(steady, history, input, totals);
     if (totals->stall.inside > 0)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_END_INSIDE,
                 "the towing end was inside the hull for %.3g s, from %.4g s on: the body has overtaken it, and its "

@@ -295,7 +295,7 @@ static void warn_of_bodies(bt_summary *summary, const bt_history *history, const
 }
 
 /// Without a tow: tow.direction is 0 by default and has no meaning, so a free body has no resistance along it.
-static void without_tow(bt_summary *summary, const bt_case *input)
+static void clear_resistance_if_untowed(bt_summary *summary, const bt_case *input)
 {
     if (input->tow.mode != BT_TOW_NONE) return;
     summary->ice.mean = summary->ice.se = summary->ice.low = summary->ice.high = NAN;
@@ -388,7 +388,7 @@ void bt_summary_make(bt_summary *summary, const bt_history *history, const bt_ca
     reduce_added(summary, history);
     if (body) {
         reduce_window(summary, history);
-        without_tow(summary, input);
+        clear_resistance_if_untowed(summary, input);
         warn_of_window(summary, input, totals);
         summary->reference_ratio = summary->ice.mean / input->reference.mean_force;
         double tow[2];

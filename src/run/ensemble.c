@@ -136,7 +136,7 @@ static int64_t claim(bt_ensemble *ensemble)
 }
 
 /// Collective over the group. Run a member, from its checkpoint if it was stopped; if that is refused, from the start.
-static bt_status run_or_go_on(const bt_comm *group, const bt_case *input, const bt_run_options *options, bt_errors *why)
+static bt_status run_or_resume(const bt_comm *group, const bt_case *input, const bt_run_options *options, bt_errors *why)
 {
     int kept = group->rank == 0 && bt_checkpoint_there(options->dir);
     bt_comm_bcast(group, &kept, sizeof kept);
@@ -200,7 +200,7 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
                                         .command_line = ensemble->o->command_line,
                                         .held = true,
                                         .fields = entry->shares ? ensemble->fields : NULL};
-        if (status == BT_OK) status = run_or_go_on(ensemble->group, &input, &options, &why);
+        if (status == BT_OK) status = run_or_resume(ensemble->group, &input, &options, &why);
         bt_case_free(&input);
     }
     bt_comm_errors(ensemble->group, &why);

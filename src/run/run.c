@@ -82,7 +82,7 @@ static bt_status start_again(bt_resume *resume, const bt_comm *comm, const bt_ru
 }
 
 /// Collective. Read the case of the checkpoint, and find whether any of its steps are left.
-static bt_status go_on(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
+static bt_status continue_run(bt_resume *resume, const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
     bt_snapshot_share(comm, &resume->s);
     resume->s.err = err;
@@ -105,7 +105,7 @@ bt_status bt_resume_begin(bt_resume *resume, const bt_comm *comm, const bt_run_o
     status = bt_comm_agree(comm, status);
     bt_comm_bcast(comm, &resume->fresh, sizeof resume->fresh);
     if (status != BT_OK) return status;
-    return resume->fresh ? start_again(resume, comm, options, err) : go_on(resume, comm, options, err);
+    return resume->fresh ? start_again(resume, comm, options, err) : continue_run(resume, comm, options, err);
 }
 
 void bt_resume_end(bt_resume *resume)
@@ -119,13 +119,13 @@ void bt_resume_end(bt_resume *resume)
 
 /// Collective. Do a run. *failed: the step that was not sound, −1 = none.
 static bt_status run_case(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
-                          bt_run_manner *manner, int64_t *failed, bt_errors *err)
+                          bt_run_start *begin, int64_t *failed, bt_errors *err)
 {
     bt_memory_forget_peak(); // of the run before, in an ensemble
     bt_running running;
-    bt_status status = bt_running_begin(&running, comm, input, options, manner, err);
-    while (status == BT_OK && bt_running_goes_on(&running)) status = bt_running_step(&running, err);
-    status = bt_running_end(&running, status, err);
+    bt_status status = bt_running_begin(&running, comm, input, options, begin, err);
+    while (status == BT_OK && bt_running_has_next(&running)) status = bt_running_step(&running, err);
+    status = bt_running_close(&running, status, err);
     *failed = running.failed;
     return status;
 }
@@ -160,9 +160,9 @@ void bt_run_keep_failure(const bt_comm *comm, const bt_case *input, const bt_run
     if (again > 0 && options->aloud)
         bt_errors_add(err, "the %" PRId64 " steps up to the state before that one are computed again", again);
     tell(comm, options, err);
-    bt_run_manner manner = {.kept = from ? &snap : NULL, .start = start, .until = step - 1, .held = true};
+    bt_run_start begin = {.kept = from ? &snap : NULL, .start = start, .until = step - 1, .held = true};
     int64_t failed;
-    const bt_status status = run_case(comm, input, &quiet, &manner, &failed, &unheard);
+    const bt_status status = run_case(comm, input, &quiet, &begin, &failed, &unheard);
     if (status == BT_OK)
         bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` reaches it again",
                       options->dir, BT_FAILURE_FILE, options->dir, BT_FAILURE_FILE);
@@ -184,15 +184,15 @@ void bt_run_keep_failure(const bt_comm *comm, const bt_case *input, const bt_run
 static bt_status run_guarded(const bt_comm *comm, const bt_case *input, const bt_run_options *options,
                              bt_snapshot *kept, bool held, double start, bt_errors *err)
 {
-    bt_run_manner manner = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
+    bt_run_start begin = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     int64_t failed;
-    const bt_status status = run_case(comm, input, options, &manner, &failed, err);
+    const bt_status status = run_case(comm, input, options, &begin, &failed, err);
     if (failed >= 0) bt_run_keep_failure(comm, input, options, failed, start, err);
-    const bool taken = manner.lock >= 0 || (options->held && comm->rank == 0);
+    const bool taken = begin.lock >= 0 || (options->held && comm->rank == 0);
     if (status != BT_OK && taken && bt_folder_keeps(options->dir))
         bt_errors_add(err, "the previous contents of %s are in %s/%s until a new result is complete", options->dir,
                       options->dir, BT_FOLDER_REPLACED);
-    bt_lock_drop(options->dir, manner.lock);
+    bt_lock_drop(options->dir, begin.lock);
     return status;
 }
 

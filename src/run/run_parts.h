@@ -46,27 +46,27 @@ typedef struct bt_running {
 } bt_running;
 
 /// How to begin a run.
-typedef struct bt_run_manner {
+typedef struct bt_run_start {
     bt_snapshot *kept;   ///< checkpoint to resume from, or NULL
     double start;        ///< bt_clock when the call began
     int64_t until;       ///< only up to this step, for failure.h5; −1 = as in the options
     bool held;           ///< the folder is already locked
     int lock;            ///< out: its lock, on rank 0
-} bt_run_manner;
+} bt_run_start;
 
 /// Collective. Make field, world, folder and record of a run at its first step. comm, `input` and `options` must stay
-/// valid until bt_running_end, which must follow whatever the status.
+/// valid until bt_running_close, which must follow whatever the status.
 bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_case *input,
-                           const bt_run_options *options, bt_run_manner *manner, bt_errors *err);
+                           const bt_run_options *options, bt_run_start *begin, bt_errors *err);
 
 /// Are steps left, and no stop requested?
-bool bt_running_goes_on(const bt_running *running);
+bool bt_running_has_next(const bt_running *running);
 
 /// Collective. Do one step, observed, guarded and recorded, with frame and checkpoint if due.
 bt_status bt_running_step(bt_running *running, bt_errors *err);
 
-/// Collective. End the run here, before bt_running_end, as after --steps.
-bt_status bt_running_stop(bt_running *running, bt_errors *err);
+/// Collective. End the run here, before bt_running_close, as after --steps.
+bt_status bt_running_finish_early(bt_running *running, bt_errors *err);
 
 /// Collective, between steps. Take a frame of the present state, besides those by the interval; does nothing if one was
 /// taken after this step.
@@ -74,7 +74,7 @@ bt_status bt_running_frame(bt_running *running, bt_errors *err);
 
 /// Collective. Write summary and last checkpoint if all steps were sound; close and free everything except the lock.
 /// status: of the last step. Returns the status of the run.
-bt_status bt_running_end(bt_running *running, bt_status status, bt_errors *err);
+bt_status bt_running_close(bt_running *running, bt_status status, bt_errors *err);
 
 /// Collective, between steps. Save the whole state of the run, on rank 0 to a checkpoint of this name, which is begun
 /// here. Errors: BT_ERR_IO, BT_ERR_NUMERIC.
@@ -101,7 +101,7 @@ bt_status bt_running_load_field(bt_field *field, bt_lead_stats *lead, bt_snapsho
 /// over the ranks.
 bt_status bt_running_load(bt_running *running, bt_snapshot *snap, bt_errors *err);
 
-/// Collective, after bt_running_end, with the folder still held. After a step that was not sound: compute the state
+/// Collective, after bt_running_close, with the folder still held. After a step that was not sound: compute the state
 /// before it again, from the last checkpoint (or options->from, or the start), and write it to failure.h5. The outcome
 /// is added to err; options->aloud: print the messages already in err first. start: bt_clock when the call began, from
 /// which options->max_wall counts.

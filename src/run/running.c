@@ -234,7 +234,7 @@ static bt_status begin_steps(run *running, bool fresh, bt_errors *err)
 }
 
 bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_case *input,
-                           const bt_run_options *options, bt_run_manner *manner, bt_errors *err)
+                           const bt_run_options *options, bt_run_start *begin, bt_errors *err)
 {
     *running = (run){.comm = comm, .c = input, .o = options, .reference_speed = bt_case_reference_speed(input),
                      .framed = -1, .failed = -1};
@@ -245,21 +245,21 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
                               .stop_signal = options->stop_signal,
                               .deaf = options->leave_signals,
                               .first = comm->rank == 0,
-                              .started = manner->start};
-    running->until = manner->until;
-    running->clocked = options->began > 0 ? options->began : manner->start;
+                              .started = begin->start};
+    running->until = begin->until;
+    running->clocked = options->began > 0 ? options->began : begin->start;
     clock_part(running, &running->totals.call.program);
     // before the field is made, which may take long: digests of the files as read
-    if (running->halt.first && options->dir && !manner->kept) running->digests = bt_case_digests(input);
-    bt_status status = set_up(running, manner->kept, err);
+    if (running->halt.first && options->dir && !begin->kept) running->digests = bt_case_digests(input);
+    bt_status status = set_up(running, begin->kept, err);
     // Only now: a rejected case leaves nothing behind.
-    if (status == BT_OK && options->dir && !manner->held)
-        status = take_folder(comm, options->dir, options->held, &manner->lock, err);
+    if (status == BT_OK && options->dir && !begin->held)
+        status = take_folder(comm, options->dir, options->held, &begin->lock, err);
     if (status != BT_OK) return status;
     bt_halt_begin(&running->halt); // before the record, which shows that the run has begun
-    if (options->dir) status = open_record(running, manner->kept, err);
+    if (options->dir) status = open_record(running, begin->kept, err);
     running->begun = status == BT_OK;
-    if (running->begun) return begin_steps(running, !manner->kept, err);
+    if (running->begun) return begin_steps(running, !begin->kept, err);
     bt_halt_end(&running->halt);
     return status;
 }
@@ -303,7 +303,7 @@ static bt_status tell_failed(const bt_forces *forces, bt_errors *err)
     return bt_fail(err, BT_ERR_NUMERIC, "force %s: %s; the run ends here", forces->failed->name, forces->why);
 }
 
-bool bt_running_goes_on(const bt_running *running)
+bool bt_running_has_next(const bt_running *running)
 {
     return running->w->step < running->end_step && !bt_halt_stops(running->asked);
 }
@@ -364,7 +364,7 @@ bt_status bt_running_step(bt_running *running, bt_errors *err)
     if (status == BT_ERR_NUMERIC) bt_guard_name(&running->guard, world, err);
     if (status == BT_OK) status = frame_if_due(running, sample->time, err);
     const bool saves = running->record && bt_halt_saves(running->asked); // at the end a checkpoint is written anyway
-    if (status == BT_OK && saves && bt_running_goes_on(running))
+    if (status == BT_OK && saves && bt_running_has_next(running))
         status = bt_running_checkpoint(running, BT_CHECKPOINT_FILE, err);
     bt_progress_step(&running->progress, world->step, sample->time, sample->ice_resistance);
     running->totals.phases.output += bt_clock() - t0;
@@ -512,7 +512,7 @@ static bt_status close_steps(run *running, bt_status status, bt_errors *err)
     return status;
 }
 
-bt_status bt_running_stop(bt_running *running, bt_errors *err)
+bt_status bt_running_finish_early(bt_running *running, bt_errors *err)
 {
     running->end_step = running->w->step;
     return frame_if_due(running, (double)running->w->step * running->w->par.dt, err);
@@ -525,7 +525,7 @@ bt_status bt_running_frame(bt_running *running, bt_errors *err)
     return record_frame(running, err);
 }
 
-bt_status bt_running_end(bt_running *running, bt_status status, bt_errors *err)
+bt_status bt_running_close(bt_running *running, bt_status status, bt_errors *err)
 {
     if (running->begun) status = close_steps(running, status, err);
     bt_field_free(&running->field);

@@ -35,7 +35,7 @@ struct bt_simulation {
     bt_run_options o;
     char *dir, *from, *command_line; ///< texts to which o points
     bt_running r;
-    bt_run_manner m;
+    bt_run_start m;
     bt_status status;         ///< of the last step
     char *why;                ///< reason of a failure, or NULL
     bool *moved;              ///< [bodies] moved by hand since the last step; NULL = none
@@ -132,14 +132,14 @@ static bt_simulation *simulation_of(const bt_simulation_options *options)
                               .command_line = sim->command_line,
                               .leave_signals = !options->signals};
     sim->alone = true;
-    sim->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
+    sim->m = (bt_run_start){.start = bt_clock(), .until = -1, .lock = -1};
     return sim;
 }
 
 static bt_status begin(bt_simulation *sim, bt_errors *err)
 {
     const bt_status status = bt_running_begin(&sim->r, bt_comm_world(), &sim->c, &sim->o, &sim->m, err);
-    if (status != BT_OK) bt_running_end(&sim->r, status, err);
+    if (status != BT_OK) bt_running_close(&sim->r, status, err);
     return status;
 }
 
@@ -155,7 +155,7 @@ static bt_status check_numbers(const bt_simulation_options *options, bt_errors *
 }
 
 /// Common end of create and resume.
-static bt_status hand_out(bt_simulation **out, bt_simulation *sim, bt_status status, bt_errors *err)
+static bt_status finish_create(bt_simulation **out, bt_simulation *sim, bt_status status, bt_errors *err)
 {
     *out = status == BT_OK ? sim : NULL;
     if (status != BT_OK) release(sim);
@@ -173,7 +173,7 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
         status = bt_folder_may_take(sim->dir, options->replace, "give another folder, or set `replace`", &err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = begin(sim, &err);
-    return hand_out(out, sim, status, &err);
+    return finish_create(out, sim, status, &err);
 }
 
 bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options *options)
@@ -201,7 +201,7 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
         sim->m.kept = NULL;
     }
     bt_resume_end(&resume);
-    return hand_out(out, sim, status, &err);
+    return finish_create(out, sim, status, &err);
 }
 
 /// Can the state before the failed step be computed again from the folder alone?
@@ -225,7 +225,7 @@ bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
     sim->alone = sim->alone && !bt_force_is_applied();
     if (n > 0) forget_moved(sim);
     stepping = sim;
-    for (; n > 0 && sim->status == BT_OK && bt_running_goes_on(&sim->r); n--)
+    for (; n > 0 && sim->status == BT_OK && bt_running_has_next(&sim->r); n--)
         sim->status = bt_running_step(&sim->r, &err);
     stepping = NULL;
     if (sim->status == BT_OK && bt_halt_stops(sim->r.asked))
@@ -243,7 +243,7 @@ bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
 static bt_status close_parts(bt_simulation *sim, bt_status status, bt_errors *err)
 {
     const bool keep = keeps_failure(sim);
-    status = bt_running_end(&sim->r, status, err);
+    status = bt_running_close(&sim->r, status, err);
     if (keep) bt_run_keep_failure(bt_comm_world(), &sim->c, &sim->o, sim->r.failed, sim->m.start, err);
     return status;
 }
@@ -262,7 +262,7 @@ bt_status bt_simulation_end(bt_simulation *sim)
     if (sim == stepping) return refuse_within();
     bt_errors err = {0};
     bt_status status = sim->status == BT_ERR_SIGNAL ? BT_OK : sim->status;
-    if (sim->status == BT_OK) status = bt_running_stop(&sim->r, &err);
+    if (sim->status == BT_OK) status = bt_running_finish_early(&sim->r, &err);
     status = close_parts(sim, status, &err);
     if (status != BT_OK && err.n == 0 && sim->why) add_lines(&err, sim->why);
     release(sim);
@@ -303,7 +303,7 @@ bt_status bt_simulation_frame(bt_simulation *sim)
 int64_t bt_simulation_steps(const bt_simulation *sim) { return sim->r.w->step; }
 int64_t bt_simulation_steps_left(const bt_simulation *sim)
 {
-    return sim->status == BT_OK && bt_running_goes_on(&sim->r) ? sim->r.end_step - sim->r.w->step : 0;
+    return sim->status == BT_OK && bt_running_has_next(&sim->r) ? sim->r.end_step - sim->r.w->step : 0;
 }
 double bt_simulation_dt(const bt_simulation *sim) { return sim->r.w->par.dt; }
 double bt_simulation_time(const bt_simulation *sim) { return (double)sim->r.w->step * sim->r.w->par.dt; }

@@ -65,15 +65,15 @@ bool bt_study_check_value(const bt_study_reader *reader, int line, const char *n
 typedef struct {
     double number;
     char *text; ///< NULL for a number
-} said;
+} list_value;
 
-static said read_said(const bt_key *key, const bt_node *value)
+static list_value parse_list_value(const bt_key *key, const bt_node *value)
 {
     bt_case scratch;
     bt_case_defaults(&scratch);
     char why[BT_WHY];
     bt_value_read(key, &scratch, value->text, value->plain, why); // it has been checked
-    said x = {.number = bt_value_number(key, &scratch)};
+    list_value x = {.number = bt_value_number(key, &scratch)};
     if (key->type != BT_KEY_REAL && key->type != BT_KEY_INT) {
         bt_text text;
         bt_text_begin(&text);
@@ -85,7 +85,7 @@ static said read_said(const bt_key *key, const bt_node *value)
 }
 
 /// Are two values equal? 7 % and 0.07 are, whatever the last digit of the conversion.
-static bool same(const said *a, const said *b)
+static bool same(const list_value *a, const list_value *b)
 {
     if (a->text && b->text) return !strcmp(a->text, b->text);
     if (isnan(a->number) || isnan(b->number)) return isnan(a->number) && isnan(b->number); // NaN: no value
@@ -103,11 +103,11 @@ void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int 
         return;
     }
     parameter->value = bt_alloc((size_t)list->n, sizeof *parameter->value);
-    said *value = bt_alloc((size_t)list->n, sizeof *value);
+    list_value *value = bt_alloc((size_t)list->n, sizeof *value);
     for (int i = 0; i < list->n; i++) {
         const bt_node *item = list->item[i];
         if (!bt_study_check_value(reader, item->line, parameter->name, parameter->key, item)) continue;
-        value[parameter->n] = read_said(&bt_case_keys[parameter->key], item);
+        value[parameter->n] = parse_list_value(&bt_case_keys[parameter->key], item);
         int twin = 0;
         while (twin < parameter->n && !same(&value[twin], &value[parameter->n])) twin++;
         if (twin < parameter->n && !strcmp(parameter->value[twin], item->text))

@@ -16,7 +16,7 @@ from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
 from bergtow import cli
 from bergtow.errors import RunError
 from bergtow.reporting import method
-from bergtow.result import compared, findings
+from bergtow.result import answers, compared
 from bergtow.result.members import Members
 from bergtow.result.run import Run
 from bergtow.stats import load as stat_load
@@ -414,7 +414,7 @@ def test_a_study_end_to_end(small):
     seconds = json.loads((member / "summary.json").read_text())["window"]
     minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
-    block = analysis.chapter("budget", findings.read("budget", folder / "out"))
+    block = analysis.chapter("budget", answers.read("budget", folder / "out"))
     assert written(block["parts"], True).startswith("| part |") and len(block["figure"]().axes) == 2
     case = Run(member).case
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}

@@ -11,7 +11,7 @@ from scipy import stats
 
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
-from bergtow.result import findings
+from bergtow.result import answers
 from bergtow.result.run import Run
 from bergtow.study import analysis, bracket, capability
 from bergtow.study import runs as case_runs
@@ -411,7 +411,7 @@ class made_up_run(Told):
 
 
 def test_its_block_for_a_report(tmp_path):
-    assert findings.read("capability", tmp_path) is None
+    assert answers.read("capability", tmp_path) is None
     point = {"value": 0.5, "fields": 2, "made": 2, "parted": 0, "failed": 1, "speed": [0.4, 0.5], "mean_speed": 0.45,
              "mean_speed_95": [0.2, 0.7], "tow_force": [1e5, 2e5], "mean_tow_force": 1.5e5,
              "mean_tow_force_95": [None, None], "tension": [2e5, None], "mean_tension": None,
@@ -424,7 +424,7 @@ def test_its_block_for_a_report(tmp_path):
              "share": 0.5, "most_fields": 12, "breaking_load": 1e6, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = analysis.chapter("capability", findings.read("capability", tmp_path))
+    block = analysis.chapter("capability", answers.read("capability", tmp_path))
     said = written(block["parts"], True)
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in said
     assert "| stood still | failed |" in said and "| 2 of 2 | – | 1 |" in said
@@ -432,14 +432,14 @@ def test_its_block_for_a_report(tmp_path):
     assert "WARNING" not in said  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    said = written(analysis.chapter("capability", findings.read("capability", tmp_path))["parts"])
+    said = written(analysis.chapter("capability", answers.read("capability", tmp_path))["parts"])
     assert "WARNING: at 90.0 % the domain is narrow for its ice (31.2 body widths; up to 77 are asked for)" in said
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
     for row in rows:
         row["estimate"] = None
     (tmp_path / "capability.json").write_text(json.dumps(found))
-    block = analysis.chapter("capability", findings.read("capability", tmp_path))
+    block = analysis.chapter("capability", answers.read("capability", tmp_path))
     assert len(block["figure"]().axes) == 2  # no limit, no panel of it
     assert "breaking load" not in [line.get_label() for line in axes[1].lines]  # far above
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3

@@ -697,7 +697,8 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
         with Run(r.dir) as opened_run:
             values = report_case.values(opened_run)
             groups = report_run.key_values(opened_run, values)
-            members = SimpleNamespace(folder=lambda m: r.dir, n=1, summary={}, texts=lambda m: [])
+            members = SimpleNamespace(each=lambda rows, measure: iter([measure(opened_run)]), n=1, summary={},
+                                      texts=lambda m: [])
             said.append({k: statement.case_of(members, [0]).texts[k] for k in ("ice.size", "ice.thickness")})
         return r, {v.key: (v.value, v.kind) for v in groups["Ice"]}, {v.key: v for v in values}
 

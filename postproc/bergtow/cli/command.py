@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bergtow import progress
 from bergtow._interrupts import STOPS
-from bergtow.cli import lacking
+from bergtow.cli import missing_packages
 from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
 
 
@@ -71,7 +71,7 @@ def guarded(name, main):
     except BergtowError as error:
         code = _say(name, error, error.status)
     except ModuleNotFoundError as error:
-        code = _say(name, lacking.message(error), IO)
+        code = _say(name, missing_packages.message(error), IO)
     except OSError as error:
         code = _say(name, _of_system(error), IO)
     except KeyboardInterrupt:

@@ -3,7 +3,7 @@
 line tension if there is a line."""
 from bergtow.plot import style
 from bergtow.result.at_least import AtLeast
-from bergtow.stats import design_value as statement
+from bergtow.stats import design_value
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def draw(conditions, numeric, axis_label, times):
     if least:
         axes.plot(x[least], [tows[k]["largest"] / factor for k in least], "^", color=style.JAM, markersize=7, zorder=5,
                   label="largest, at least")
-    starts = [(k, tows[k]["start_up"]["largest"]) for k in there if statement.start_exceeds(tows[k])]
+    starts = [(k, tows[k]["start_up"]["largest"]) for k in there if design_value.start_exceeds(tows[k])]
     if starts:
         axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,
                   markerfacecolor="none", zorder=3, label="in the start, in no other number")

@@ -3,7 +3,7 @@
 hand calculation, the validation evidence, sources, symbols, standards. Blocks are those of reporting/ensemble.py."""
 import numpy as np
 
-from bergtow.result import findings
+from bergtow.result import answers
 from bergtow.result.origins import short as in_short
 from bergtow.table import number, quantity
 from bergtow.text import loads as loads_text
@@ -173,5 +173,5 @@ def sources(values, estimates):
 
 def answer_beside(folder):
     """answer.json of bergtow design; None if there is none."""
-    found = findings.read("answer", folder)
+    found = answers.read("answer", folder)
     return found if isinstance(found, dict) and "sentence" in found else None

@@ -17,12 +17,12 @@ from bergtow.reporting import document
 from bergtow.reporting import method as report_method
 from bergtow.reporting import run as report_run
 from bergtow.reporting.document import lines, table
-from bergtow.result import compared, findings
+from bergtow.result import answers, compared
 from bergtow.result import origins as report_case
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, Members, reading, short_key
 from bergtow.result.origins import scrubbed
 from bergtow.stats import conditions as ensemble
-from bergtow.stats import design_value as statement
+from bergtow.stats import design_value
 from bergtow.stats.conditions import DEFAULTS as OPTIONS
 from bergtow.stats.loads import CONSTANT
 from bergtow.study import analysis
@@ -98,7 +98,7 @@ def design_row(c):
 
 def answer(e, s, cases, results, told=None):
     """Blocks of the first chapter: the statement, the table, the figure if there is more than one condition, line and
-    vessel, the scope. cases: from statement.cases(); results: of other commands, from results_beside(); told:
+    vessel, the scope. cases: from design_value.cases(); results: of other commands, from results_beside(); told:
     answer.json of bergtow design, which has vessel, line and ranges."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
@@ -106,7 +106,7 @@ def answer(e, s, cases, results, told=None):
     notes = ["Largest simulated: of the same moving mean."]
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
-    if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
+    if any(c["design"]["tow"] and design_value.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
         notes.append("In the start: of the same moving mean, the largest that begins before the window, which enters "
                      "no other number.")
     else:
@@ -147,7 +147,7 @@ def governing(s):
     if np.isinf(high):
         said += ": these fields do not determine the length of the tail, so do not use the value for a design"
     return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
-                   if statement.start_exceeds(d) else ".")
+                   if design_value.start_exceeds(d) else ".")
 
 
 def without_value(s, value):
@@ -298,7 +298,7 @@ def results_beside(e, also):
     texts, out = compared.cases(e), {}
     for name in analysis.KINDS:
         for folder in (e.path, *also):
-            found = findings.read(name, folder)
+            found = answers.read(name, folder)
             if found is not None:
                 out[name] = found | {"doubt": doubt(name, found, folder, texts)}
                 break
@@ -397,7 +397,7 @@ def context(folder, place=None, given=None, also=()):
     rows, rows_of = provenance(e), members(e, s)
     runs = first_runs(e, s)
     values = [replace(v, value=scrubbed(v.value)) for v in varied(e, runs)]
-    cases, results = statement.cases(e, s), results_beside(e, also)
+    cases, results = design_value.cases(e, s), results_beside(e, also)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})

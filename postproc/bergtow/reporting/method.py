@@ -45,7 +45,7 @@ def _amount(s, cases):
 
 
 def method(s, cases):
-    """Paragraphs. cases: those of statement.cases()."""
+    """Paragraphs. cases: those of design_value.cases()."""
     out = [
         "Every floe is a rigid polygon that moves in the plane of the sea surface. Floes, the towed body and walls "
         "push each other by non-negative impulses with Coulomb friction, solved together in every time step (planar "
@@ -127,7 +127,7 @@ def _vessel(case):
 
 def limits(cases, vessel=False):
     """Sentences on the limits of the model, most serious first; a limit that does not apply to all cases names its
-    conditions. cases: from statement.cases(); vessel: is a vessel assessed?"""
+    conditions. cases: from design_value.cases(); vessel: is a vessel assessed?"""
     out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if not cases:
@@ -164,7 +164,7 @@ def _pull(case):
 
 
 def holds(cases):
-    """Rows (what, value) on the line and the vessel, for the answer; cases: from statement.cases()."""
+    """Rows (what, value) on the line and the vessel, for the answer; cases: from design_value.cases()."""
     if not cases:
         return []
     def row(what, say):

@@ -4,10 +4,10 @@ estimates, distributions, peaks of collisions, sensitivity."""
 
 from bergtow import progress
 from bergtow.errors import RunError
-from bergtow.result import at_least, findings
+from bergtow.result import answers, at_least
 from bergtow.result.members import DOUBTS, FAILED, FINISHED, WAITING
 from bergtow.stats import loads
-from bergtow.stats import design_value as statement
+from bergtow.stats import design_value
 from bergtow.stats import drift as stat_drift
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import fit as stat_fit
@@ -145,7 +145,7 @@ def condition(e, c, members, options):
         out = at_least.condition(out, str(without), without.share, loads.bounded(out["loads"], without))
     out["without_bound"] = {"share": without.share, "some": without.some, "ended": without.ended, "tows": without.tows,
                             "words": without.words(named=True)}  # "" if there are none
-    return out | {"design": statement.statement(e, rows, out)}
+    return out | {"design": design_value.statement(e, rows, out)}
 
 
 def sample(e, means):
@@ -214,4 +214,4 @@ def statistics(e, options):
             "unsound": e.unsound, "without_mean": e.without_mean, "waiting": e.waiting, "holes": e.holes(),
             "copies": e.copies, "builds": e.builds, "doubts": DOUBTS,
             "conditions": conditions, "sensitivity": sensitivity(e, members), "members": list(members.values()),
-            "convergence": findings.read("converge", e.path)}
+            "convergence": answers.read("converge", e.path)}

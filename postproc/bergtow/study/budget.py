@@ -15,7 +15,7 @@ from pathlib import Path
 
 from bergtow._program import program_path
 from bergtow.errors import CASE, SIGNAL, USAGE, RunError
-from bergtow.result import compared, findings
+from bergtow.result import answers, compared
 from bergtow.result.members import FAILED, FINISHED, WAITING, Members, listed
 from bergtow.stats import conditions, loads
 from bergtow.stats import load as stat_load
@@ -174,8 +174,8 @@ def of_all(e, some, converge):
 
 def read_converge(path, folder):
     if path is None:
-        return findings.read("converge", folder)
-    found = findings.read("converge", path)
+        return answers.read("converge", folder)
+    found = answers.read("converge", path)
     if not isinstance(found, dict) or "rows" not in found:
         raise RunError(path, "is not a converge.json", "name the folder or the file of bergtow converge")
     return found
