@@ -136,7 +136,8 @@ static int64_t claim(bt_ensemble *ensemble)
 }
 
 /// Collective over the group. Run a member, from its checkpoint if it was stopped; if that is refused, from the start.
-static bt_status run_or_resume(const bt_comm *group, const bt_case *input, const bt_run_options *options, bt_errors *why)
+static bt_status run_or_resume(const bt_comm *group, const bt_case *input, const bt_run_options *options,
+                               bt_errors *why)
 {
     int kept = group->rank == 0 && bt_checkpoint_there(options->dir);
     bt_comm_bcast(group, &kept, sizeof kept);
