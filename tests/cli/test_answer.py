@@ -150,10 +150,20 @@ def test_ramp_and_stop():
     t = tow()
     ramp = load_cases.start_ramp(t)
     assert t.mean + t.mass * t.speed / ramp == pytest.approx(t.value)
-    assert t.mass * t.speed / load_cases.taut_stop(t) == pytest.approx(t.mean)  # the deceleration that leaves no pull
+    assert t.mass * t.speed / load_cases.taut_stop(t) == pytest.approx(t.ice)  # which alone slows the body in the end
     assert load_cases.start_ramp(tow(value=6e5)) == np.inf
     line = gear.Line("", 4e6, 2.6e8, 600.0)
     assert load_cases.start_ramp(tow(line=line)) > ramp  # the line swings
+
+
+def test_a_head_current_takes_the_place_of_that_of_the_case():
+    """Along the tow; across it, and where none is given, that of the case stays. Red: their difference, still a current
+    from astern."""
+    t = tow(direction=0.0, case={"tow.mode": "speed", "water.current_x": "0.2 m/s", "water.current_y": "0.1 m/s",
+                                 "air.wind_x": "-5 m/s"})
+    row = load_cases.head_sea(t, SimpleNamespace(make=lambda some: "budget"), 0.15)
+    assert row["set"] == {"water.current_x": "-0.15 m/s", "water.current_y": "0.1 m/s"}
+    assert (row["values"]["current_m_s"], row["values"]["wind_m_s"]) == (0.15, 5.0)
 
 
 def test_the_ramp_of_a_berg_that_drag_holds_on_a_line():
@@ -529,14 +539,28 @@ def test_thicknesses_and_winds_beside_those_of_the_case():
 def test_the_vessel_has_to_hold_the_largest_load_case():
     """Red: "can tow" by the steady tow, beside a bollard pull that the design value does not leave."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
-    some = [{"speed_m_s": 0.5, "needs_n": 2e5, "has_n": 4.9e5, "feasible": "yes"}]
+    some = [{"speed_m_s": 0.5, "needs_n": 2e5, "interval_95": (1e5, 3e5), "has_n": 4.9e5, "feasible": "yes"}]
     def case(name, n, interval=None, kind="changed"):
         return {"id": name, "n": n, "interval_95": interval, "kind": kind}
     t = tow(water=1e5, wind=0.0)
-    assert answer.feasible(some, 0.5, v, 1.0, t, case("case.steady", 2e5))["not_above_m_s"] > 0.5
+    assert answer.feasible(some, 0.5, v, 1.0, t, [case("case.steady", 2e5, (1e5, 3e5))])["not_above_m_s"] > 0.5
     for n, interval, verdict in ((6e5, None, "no"), (3e5, (2e5, 4e5), "yes"), (4e5, (3e5, 6e5), "open")):
-        found = answer.feasible(some, 0.5, v, 1.0, t, case("case.head_sea", n, interval))
+        found = answer.feasible(some, 0.5, v, 1.0, t, [case("case.steady", 2e5, (1e5, 3e5)),
+                                                       case("case.head_sea", n, interval)])
         assert (found["verdict"], found["not_above_m_s"]) == (verdict, None)
+    # not the largest of them, but the least certain
+    found = answer.feasible(some, 0.5, v, 1.0, t, [case("case.steady", 2e5, (1e5, 3e5)),
+                                                   case("case.head_sea", 1.9e5, (1e5, 6e5))])
+    assert (found["verdict"], found["row"]) == ("open", "case.head_sea")
+
+
+def test_the_highest_speed_is_by_the_upper_end_of_the_load():
+    """Red: by the load itself, up to a speed at which the verdict is "open"."""
+    v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
+    some = [{"speed_m_s": u, "needs_n": n, "interval_95": (0.9 * n, 1.2 * n), "has_n": 4.9e5, "feasible": "yes"}
+            for u, n in ((0.5, 3e5), (1.0, 6e5))]
+    limit = answer.feasible(some, 0.5, v, 1.0, None)["not_above_m_s"]
+    assert limit == pytest.approx(0.5 + 0.5 * (4.9 - 3.6) / (7.2 - 3.6))
 
 
 def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
@@ -547,7 +571,8 @@ def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
         return {"id": "case.course_change", "speed_m_s": 0.5, "concentration": 0.7, "mean": {"n": n}, "value": {
             "n": n, "kind": kind, "interval_95": interval}, "n": n, "kind": kind, "interval_95": interval}
     def verdict(steady, top):
-        return answer.feasible(answer.speeds([steady], v, 1.0), 0.5, v, 1.0, tow(), top)["verdict"]
+        cases = [steady | {"id": "case.steady"}, top]
+        return answer.feasible(answer.speeds([steady], v, 1.0), 0.5, v, 1.0, tow(), cases)["verdict"]
     sure, bound = row(3e5, "return_level", (2e5, 4e5)), row(3.5e5, "largest_of_n")
     assert verdict(sure, bound) == "open" and verdict(sure, row(6e5, "largest_of_n")) == "no"
     assert verdict(row(3e5, "return_level", (2e5, 6e5)), row(3.5e5, "changed", (3e5, 4e5))) == "open"

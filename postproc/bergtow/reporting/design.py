@@ -335,6 +335,7 @@ def answer_of(work, a, plan, began):
     vessel, line = named(a, case)
     t = answer.tow_of(e, row, line, vessel) if row else None
     cases, ramp, ranges, count = ([], None, [], 0)
+    before = time.monotonic()
     if t is not None and plan is not None:
         cases, ramp, ranges, count = beside(work, a, row, t)
     now = time.monotonic()
@@ -344,7 +345,7 @@ def answer_of(work, a, plan, began):
              "line_factor": a.line_factor, "efficiency": a.efficiency, "budget_min": a.budget,
              "time_scale_s": answer.stat_loads.TIME_SCALE, "probability": answer.stat_loads.PROBABILITY,
              "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
-    cost = {"wall_s": now - began, "fields_s": spent - began, "cases_s": now - spent, "case_runs": count}
+    cost = {"wall_s": now - began, "fields_s": spent - began, "cases_s": now - before, "case_runs": count}
     found = writing.plain(answer.of(asked, plan, rows, cases, ramp, ranges, vessel, t, cost, title=e.title,
                                     case=str(a.file), report="report.html"))
     writing.write_json(found, a.output / "answer.json", a.force)

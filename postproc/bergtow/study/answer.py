@@ -245,28 +245,36 @@ def speeds(rows, v, efficiency):
     return out
 
 
-def feasible(some, asked, v, efficiency, t, top=None):
-    """Can the vessel hold the tow at the requested speed, and up to which speed? If another load case, top, requires
-    more than the steady tow, the vessel must hold both, and up to which speed it can has not been examined."""
+def feasible(some, asked, v, efficiency, t, cases=()):
+    """Can the vessel hold the tow at the requested speed, and up to which speed? It must also hold the largest of these
+    load cases, and every one that has an interval; where one of them requires more than the steady tow, or is less
+    certain, up to which speed it can has not been examined. A smaller one without an interval is the largest of few
+    runs, which the interval of the steady tow is taken to cover. The speeds are those at which the upper ends of the
+    loads, where they have one, reach the pull."""
     here = next((s for s in some if math.isclose(s["speed_m_s"], asked, rel_tol=1e-6)), None)
     out = {"id": "feasible", "speed_m_s": asked, "verdict": here["feasible"] if here else "not_asked",
-           "not_above_m_s": None, "by": None, "reason": None}
+           "not_above_m_s": None, "by": None, "reason": None, "row": None}
     if not np.isfinite(v.pull):
         return out | {"verdict": "not_asked", "reason": "no_vessel"}
     if out["verdict"] == "held_back":
         return out
-    if here and here["feasible"] != "no" and top and top["id"] != "case.steady":
-        return out | {"verdict": min(here["feasible"], gear.verdict(top["n"], bounds(top), here["has_n"]),
-                                     key=("no", "open", "yes").index), "reason": "other_load_case"}
+    if here and here["feasible"] != "no" and cases:
+        def rank(c):
+            return "no open yes".split().index(gear.verdict(c["n"], bounds(c), here["has_n"])), -c["n"]
+        top = max(cases, key=lambda c: c["n"])
+        worst = min((c for c in cases if c["interval_95"] or c is top), key=rank)
+        if worst["id"] != "case.steady":
+            return out | {"verdict": gear.verdict(worst["n"], bounds(worst), here["has_n"]), "row": worst["id"],
+                          "reason": "other_load_case"}
+    ends = [max([s["needs_n"], *(x for x in s["interval_95"] or () if x is not None and np.isfinite(x))]) for s in some]
     if len(some) > 1:
-        limit = gear.limit_speed([s["speed_m_s"] for s in some], [s["needs_n"] for s in some],
-                                 [s["has_n"] for s in some])
+        limit = gear.limit_speed([s["speed_m_s"] for s in some], ends, [s["has_n"] for s in some])
         if limit is not None:
             return out | {"not_above_m_s": limit, "by": "speeds"}
     if not some or some[0]["has_n"] < some[0]["needs_n"]:
         return out | {"reason": "no_speed_is_feasible"}
     last = some[-1]
-    limit = gear.limit_by_drag(v, efficiency, last["speed_m_s"], last["needs_n"],
+    limit = gear.limit_by_drag(v, efficiency, last["speed_m_s"], ends[-1],
                                (t.water + t.wind) * (last["speed_m_s"] / t.speed) ** 2) if t and t.speed > 0 else None
     return out | {"not_above_m_s": limit, "by": limit and "drag_alone"}
 
@@ -291,8 +299,8 @@ def sentence(a):
         out.append({"code": "covers", "values": steady["value"], "rows": [steady["id"]]})
     if case.get("of"):
         out.append({"code": "band", "values": a["band"], "rows": ["band"] + [r["id"] for r in a["assumed"]]})
-    out.append({"code": "vessel", "values": {k: v[k] for k in ("needed_bollard_pull_n", "speed_m_s", "efficiency",
-                                                               "given_n")}, "rows": ["vessel"]})
+    out.append({"code": "vessel", "values": {k: v[k] for k in (
+        "needed_bollard_pull_n", "needed_interval_95", "speed_m_s", "efficiency", "given_n")}, "rows": ["vessel"]})
     out.append({"code": "line", "values": line, "rows": ["line", line["row"]]})
     if a["feasible"]["verdict"] != "not_asked":
         out.append({"code": "feasible", "values": a["feasible"], "rows": ["feasible"] + [s["id"] for s in a["speeds"]]})
@@ -346,5 +354,6 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     out = {"format": FORMAT, "asked": {k: x for k, x in asked.items() if k != "line_found"}, "plan": plan,
            "conditions": rows, "load_cases": cases, "ramp": ramp, "design": design, "assumed": ranges, "band": band,
            "vessel": vessel, "line": line, "speeds": by_speed,
-           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t, top), "cost": cost, **more}
+           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t,
+                                [c for c in some if c["acts_on"] == "tow"]), "cost": cost, **more}
     return out | {"sentence": sentence(out)}

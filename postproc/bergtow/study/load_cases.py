@@ -11,13 +11,15 @@ resistance, F the design value of the steady tow, k = EA/L of the line:
                      show the effect of the ice
     course change    on a line its tension in runs through a bend of radius r; otherwise the force along the course in
                      such runs, across it M V^2/r: the root of the sum of squares
-    stop             the line stays taut if the ordered stop takes at least M V/(D + R)
-    loss of thrust   the body coasts for  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if only ice and
-                     water stop it; if the line is taken up again at a relative speed of V, an upper bound, the load
-                     is towing.snap_load
+    stop             the line stays taut if the ordered stop, linear in time, takes at least M V/R: the drag vanishes
+                     with the speed, and in the end the ice alone slows the body
+    loss of thrust   in still water the body coasts for  M V^2/(2 D) ln(1 + D/R), in  M V/sqrt(D R) atan(sqrt(D/R)), if
+                     the resistance of the ice stays R; it falls with the speed, so these are lower bounds. If the line
+                     is taken up again at a relative speed of V, an upper bound, the load is towing.snap_load
     a line parts     of a bridle with two equal branches, at constant pull: the other is loaded from F/2, and swings,
                      without damping, to 3/2 F. A single line: the tow is lost, and the body coasts as above
-    head sea         paired runs with current and wind against the tow, as for a changed value in study/assumed.py
+    head sea         paired runs with current and wind against the tow, as for a changed value in study/assumed.py; no
+                     less than the largest load of these runs
 
 Angle and radius of the bend are assumed unless the call gives them, and so are current and wind. These determine the
 load: a head current of half the speed doubles the drag. So if they are assumed, the row is shown beside the design
@@ -195,13 +197,15 @@ def start_ramp(t):
 
 
 def taut_stop(t):
-    return t.mass * t.speed / t.mean if t.mean > 0 else np.nan
+    return t.mass * t.speed / t.ice if t.ice > 0 and t.mean > 0 else np.nan
 
 
 def coasting(t):
-    """(m, s) that the body coasts without thrust; (nan, nan) if there is no ice to stop it."""
+    """(m, s) that the body at least coasts without thrust; (nan, nan) if no ice stops it, or there is a current."""
     drag, ice = t.water + t.wind, t.ice
-    if not (drag > 0 and ice > 0):
+    current = any(t.case.get(key, "none").split()[0] not in ("none", "0") for key in (
+        "water.current_x", "water.current_y", "water.current_table", "water.tide.major"))
+    if not (drag > 0 and ice > 0) or current:
         return np.nan, np.nan
     return (t.mass * t.speed ** 2 / (2 * drag) * math.log1p(drag / ice),
             t.mass * t.speed / math.sqrt(drag * ice) * math.atan(math.sqrt(drag / ice)))
@@ -361,19 +365,23 @@ def changed(t, base, other):
 
 
 def head_sea(t, runs, current=None, wind=None):
-    """Current and wind against the tow, m/s, on the fields of the base runs. If both are None they are assumed, at
-    model scale by Froude's law."""
+    """Current and wind against the tow, m/s, on the fields of the base runs. Each takes the place of the component that
+    the case has along the tow, unless it is None. If both are None they are assumed, at model scale by Froude's law."""
     given = current is not None or wind is not None
-    current, wind = (x if x is not None else 0.0 if given else y / t.slower
-                     for x, y in ((current, HEAD_CURRENT), (wind, HEAD_WIND)))
+    if not given:
+        current, wind = HEAD_CURRENT / t.slower, HEAD_WIND / t.slower
     if any(t.case.get(key, "none") != "none" for key in ("water.current_table", "air.wind_table")):
         return none("head_sea", "environment_from_table")
     d = np.array([math.cos(t.direction), math.sin(t.direction)])
     own = {key: float(t.case.get(key, "0").split()[0]) for key in ("water.current_x", "water.current_y", "air.wind_x",
                                                                    "air.wind_y")}
-    sets = {f"water.current_{k}": f"{own[f'water.current_{k}'] - current * d[i]:.9g} m/s" for i, k in enumerate("xy")}
-    sets |= {f"air.wind_{k}": f"{own[f'air.wind_{k}'] - wind * d[i]:.9g} m/s" for i, k in enumerate("xy")}
-    values = {"current_m_s": current, "wind_m_s": wind, "given": given}
+    sets, values = {}, {"given": given}
+    for name, key, against in (("water.current", "current_m_s", current), ("air.wind", "wind_m_s", wind)):
+        of_case = np.array([own[f"{name}_x"], own[f"{name}_y"]])
+        values[key] = float(0.0 - of_case @ d) if against is None else against
+        if against is not None:
+            there = of_case - (of_case @ d + against) * d
+            sets |= {f"{name}_{k}": f"{x:.9g} m/s" for k, x in zip("xy", there)}
     if reason := runs.make({"base": {}, "head-sea": sets}):
         return none("head_sea", reason, set=sets, values=values)
     base, other = (runs.measured(name, mean_parts) for name in ("base", "head-sea"))
@@ -381,9 +389,14 @@ def head_sea(t, runs, current=None, wind=None):
         return none("head_sea", "no_window", set=sets, values=values)
     n, ends, parts = changed(t, base, other)
     largest = max(runs.measured("head-sea", lambda run: largest_mean(run, t.scale, *run.window)))
-    return row("head_sea", n, "changed", "runs", in_design=given, runs=len(runs.fields), set=sets, formula="changed",
-               interval_95=combined_interval(t, n, ends, parts["ice_ratio"]),
-               values=values | parts | {"largest_n": largest})
+    interval, values = combined_interval(t, n, ends, parts["ice_ratio"]), values | parts | {"largest_n": largest}
+    if largest > n:
+        n, kind, interval = largest, "largest_of_n", None
+        values |= {"n_tows": len(runs.fields), "share_below": stat_largest.share_below(len(runs.fields))}
+    else:
+        kind = "changed"
+    return row("head_sea", n, kind, "runs", in_design=given, runs=len(runs.fields), set=sets, formula="changed",
+               interval_95=interval, values=values)
 
 
 # ---- ranges

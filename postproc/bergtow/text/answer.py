@@ -115,7 +115,7 @@ def _largest(v, a):
     few = next(c["values"] for c in a["load_cases"] if c["id"] == v["case"])
     of = (f", of {few['n_tows']} runs: a lower bound, below which at least {percent(few['share_below'])} of such runs "
           "stay with 95 % confidence") if "share_below" in few else ""
-    return f"The largest load simulated is {force(v['n'])} {_over(a)}{_in_case(v, a)}{of}"
+    return f"The largest load simulated outside the start is {force(v['n'])} {_over(a)}{_in_case(v, a)}{of}"
 
 
 def _covers(v, a):
@@ -149,8 +149,11 @@ def _vessel(v, a):
     eta = f" at an efficiency of {short(v['efficiency'])}" if v["efficiency"] != 1 else ""
     if not known(v["needed_bollard_pull_n"]):
         return "No bollard pull can be named"
-    return (f"It takes a vessel of at least {math.ceil(v['needed_bollard_pull_n'] / TONNE)} t bollard pull{eta} at "
-            f"{speed(v['speed_m_s'])}")
+    of = v["needed_interval_95"] or (None, None)
+    low, high = (math.ceil(x / TONNE) if known(x) else None for x in of)
+    interval = f" (95 % interval {low} to {'no bound' if high is None else f'{high} t'})" if low is not None else ""
+    tonnes = math.ceil(v["needed_bollard_pull_n"] / TONNE)
+    return f"It takes a vessel of at least {tonnes} t bollard pull{interval}{eta} at {speed(v['speed_m_s'])}"
 
 
 def _line(v, a):
@@ -165,7 +168,8 @@ def _line(v, a):
 
 def _feasible(v, a):
     at = speed(v["speed_m_s"])
-    why = "its pull lies within the interval" if a["design"]["interval_95"] else "a load larger than the largest " \
+    of = next((c for c in a["load_cases"] if c["id"] == v["row"]), a["design"])
+    why = "its pull lies within the interval" if of["interval_95"] else "a load larger than the largest " \
         "simulated is possible"
     out = {"yes": f"The vessel named can tow at {at}", "no": f"The vessel named cannot tow at {at}",
            "open": f"Whether the vessel named can tow at {at} is open, since {why}"}[v["verdict"]]
@@ -228,8 +232,8 @@ def _behind(row):
             said.append(words.format(v[key], plain(v[key]), minutes(v[key])))
     add("ramp_s", "ramp {2}")
     add("slack_below_s", "line slack if stopped in less than {2}")
-    add("coasts_m", "the body drifts on for {1} m")
-    add("coasts_s", "in {2}")
+    add("coasts_m", "the body drifts on for at least {1} m")
+    add("coasts_s", "in at least {2}")
     add("relative_speed_m_s", "taken up at {1} m/s")
     add("angle_deg", "{1} deg")
     add("radius_m", "radius {1} m")
@@ -260,11 +264,12 @@ def parts(a):
     rows = []
     for c in a["conditions"]:
         value = c["value"]["n"]
-        rows += [[c["label"] if k == 0 else "", PARTS[p["part"]], kn(p["n"]),
-                  percent(p["share"]) if known(p["share"]) else "–"]
-                 for k, p in enumerate(x for x in c["parts"] if known(x["n"]) and value and abs(x["n"]) >= 0.0005
-                                       * abs(value))]
-        rows.append(["", KINDS[c["value"]["kind"]], kn(value), "100 %" if known(value) else "–"])
+        if not known(value):
+            continue
+        own = [[PARTS[p["part"]], kn(p["n"]), percent(p["share"]) if known(p["share"]) else "–"]
+               for p in c["parts"] if known(p["n"]) and value and abs(p["n"]) >= 0.0005 * abs(value)]
+        own.append([KINDS[c["value"]["kind"]], kn(value), "100 %"])
+        rows += [[c["label"] if k == 0 else "", *cells] for k, cells in enumerate(own)]
     return [Table(["condition", "part", "kN", "share"], rows)]
 
 
