@@ -156,6 +156,16 @@ def test_ramp_and_stop():
     assert load_cases.start_ramp(tow(line=line)) > ramp  # the line swings
 
 
+def test_the_load_of_a_tow_that_is_too_slow_is_a_lower_bound():
+    """Red: a vessel of 22 t for 1.2 kn, from tows that a weak vessel brought to 0.5 kn."""
+    case = {"tow.mode": "thrust", "tow.speed": "0.6 m/s"}
+    assert answer.too_slow(case, {"value": 0.26}) and not answer.too_slow(case, {"value": 0.59})
+    assert not answer.too_slow(case, None) and not answer.too_slow(case | {"tow.mode": "speed"}, {"value": 0.26})
+    members = SimpleNamespace(tows=lambda rows: rows, without_bound=lambda rows: False, _series={}, summary={})
+    value = answer.value_of(members, SimpleNamespace(members=[], finished=[0]), {"largest": 2e5}, [], slow=True)
+    assert (value["kind"], value["reason"], value["n"]) == ("at_least", "speed_not_reached", 2e5)
+
+
 def test_a_head_current_takes_the_place_of_that_of_the_case():
     """Along the tow; across it, and where none is given, that of the case stays. Red: their difference, still a current
     from astern."""
@@ -539,7 +549,8 @@ def test_thicknesses_and_winds_beside_those_of_the_case():
 def test_the_vessel_has_to_hold_the_largest_load_case():
     """Red: "can tow" by the steady tow, beside a bollard pull that the design value does not leave."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
-    some = [{"speed_m_s": 0.5, "needs_n": 2e5, "interval_95": (1e5, 3e5), "has_n": 4.9e5, "feasible": "yes"}]
+    some = [{"speed_m_s": 0.5, "needs_n": 2e5, "interval_95": (1e5, 3e5), "has_n": 4.9e5, "feasible": "yes",
+             "kind": "return_level"}]
     def case(name, n, interval=None, kind="changed"):
         return {"id": name, "n": n, "interval_95": interval, "kind": kind}
     t = tow(water=1e5, wind=0.0)
@@ -557,8 +568,8 @@ def test_the_vessel_has_to_hold_the_largest_load_case():
 def test_the_highest_speed_is_by_the_upper_end_of_the_load():
     """Red: by the load itself, up to a speed at which the verdict is "open"."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
-    some = [{"speed_m_s": u, "needs_n": n, "interval_95": (0.9 * n, 1.2 * n), "has_n": 4.9e5, "feasible": "yes"}
-            for u, n in ((0.5, 3e5), (1.0, 6e5))]
+    some = [{"speed_m_s": u, "needs_n": n, "interval_95": (0.9 * n, 1.2 * n), "has_n": 4.9e5, "feasible": "yes",
+             "kind": "return_level"} for u, n in ((0.5, 3e5), (1.0, 6e5))]
     limit = answer.feasible(some, 0.5, v, 1.0, None)["not_above_m_s"]
     assert limit == pytest.approx(0.5 + 0.5 * (4.9 - 3.6) / (7.2 - 3.6))
 

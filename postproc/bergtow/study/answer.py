@@ -92,14 +92,24 @@ def options(**more):
     return SimpleNamespace(**stat_conditions.DEFAULTS | {"hours": [], "resamples": 1} | more)
 
 
-def value_of(e, c, found, fields):
+#: share of the ordered speed below which a vessel does not reach it, assumed: the load is then that of a slower tow
+REACHED = 0.95
+
+
+def too_slow(case, made):
+    """Does the vessel of a case, {key: text}, not reach the ordered speed? made: the speed made good, None if unknown."""
+    return case.get("tow.mode") == "thrust" and case.get("tow.programme", "none") == "none" and made is not None and \
+        made["value"] < REACHED * case_value(case, "tow.speed", 0.0)
+
+
+def value_of(e, c, found, fields, slow=False):
     """The value of a condition: see the top of this file. found: statistics of the tow force, None without one; fields:
-    from gather()."""
+    from gather(); slow: see too_slow()."""
     if found is None:
         return {"kind": "none", "n": np.nan, "reason": "no_window" if len(c.finished) else "no_member"}
     rows = e.tows(c.members)
     reason = "no_solution" if e.without_bound(c.members) else "line_parted" if stat_loads.tows_with(
-        e, rows, stat_loads.PARTED, stat_loads.ADRIFT) else None
+        e, rows, stat_loads.PARTED, stat_loads.ADRIFT) else "speed_not_reached" if slow else None
     if reason:
         return {"kind": "at_least", "n": found["largest"], "reason": reason, "n_tows": len(rows)}
     if found["constant"]:
@@ -141,9 +151,10 @@ def condition(e, c, k, o):
     found = s["loads"].get("tow_force")
     means = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))[c.finished]
     means = means[np.isfinite(means)]
-    value = value_of(e, c, found, tow[1] if tow else [])
     name = f"steady.{k + 1}"
-    parts = parts_of(e, c.finished, value["n"], windy(case_of(e, {"id": name})))
+    case = case_of(e, {"id": name})
+    value = value_of(e, c, found, tow[1] if tow else [], too_slow(case, s["design"]["speed"]))
+    parts = parts_of(e, c.finished, value["n"], windy(case))
     start = found and found["start_up"]
     hours = sum(f["hours"] for f in tow[1]) if tow else 0.0
     return {
@@ -266,6 +277,8 @@ def feasible(some, asked, v, efficiency, t, cases=()):
         if worst["id"] != "case.steady":
             return out | {"verdict": gear.verdict(worst["n"], bounds(worst), here["has_n"]), "row": worst["id"],
                           "reason": "other_load_case"}
+    if any(s["kind"] == "at_least" for s in some):
+        return out
     ends = [max([s["needs_n"], *(x for x in s["interval_95"] or () if x is not None and np.isfinite(x))]) for s in some]
     if len(some) > 1:
         limit = gear.limit_speed([s["speed_m_s"] for s in some], ends, [s["has_n"] for s in some])

@@ -268,7 +268,7 @@ def start(t, runs, say):
     for _ in range(RAMPS):
         seconds = math.ceil(seconds / t.scale) * t.scale
         if t.speed * seconds / 2 > t.distance:
-            reason = reason or "domain_too_short"
+            reason = reason or "tow_too_short"
             break
         name = f"start-{seconds:.6g}s"
         sets = {"tow.ramp": f"{seconds:.9g} s", "run.duration": f"{seconds + 4 * t.scale:.9g} s",
@@ -327,8 +327,9 @@ def course_change(t, runs, degrees, radius):
     corner = np.array([x, y]) + (ahead + first) * d[0]
     end = corner + last * d[1]
     way = first + last - 2 * tangent + r * abs(angle) + ahead
+    too_short = "tow_too_short" if way > t.distance else "domain_too_short"
     if way > t.distance or not inside(t.case, end, t.width / 2):
-        return none("course_change", "domain_too_short", values={"way_m": way, "radius_m": r, "angle_deg": degrees})
+        return none("course_change", too_short, values={"way_m": way, "radius_m": r, "angle_deg": degrees})
     duration = t.case_ramp / 2 + way / t.speed
     sets = {"tow.waypoints": f"[[{corner[0]:.9g}, {corner[1]:.9g}], [{end[0]:.9g}, {end[1]:.9g}]]",
             "tow.turn_radius": f"{r:.9g} m", "run.duration": f"{duration:.9g} s",

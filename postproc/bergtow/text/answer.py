@@ -22,9 +22,11 @@ KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at
 REASONS = {
     "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above",
     "no_window": "no window that is long enough", "no_member": "no run",
+    "speed_not_reached": "the vessel of the case did not reach the speed",
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",
     "budget": "the budget is not enough for it", "run_failed": "the run failed",
     "domain_too_short": "the domain is too short",
+    "tow_too_short": "the tow of the case is too short: lengthen run.duration",
     "case_has_path": "the case has its own path: it is in the steady tow",
     "case_has_programme": "the case has its own programme",
     "environment_from_table": "the case has current or wind from a table",
@@ -153,7 +155,8 @@ def _vessel(v, a):
     low, high = (math.ceil(x / TONNE) if known(x) else None for x in of)
     interval = f" (95 % interval {low} to {'no bound' if high is None else f'{high} t'})" if low is not None else ""
     tonnes = math.ceil(v["needed_bollard_pull_n"] / TONNE)
-    return f"It takes a vessel of at least {tonnes} t bollard pull{interval}{eta} at {speed(v['speed_m_s'])}"
+    least = "more than" if (a["design"] or {}).get("kind") == "at_least" else "at least"
+    return f"It takes a vessel of {least} {tonnes} t bollard pull{interval}{eta} at {speed(v['speed_m_s'])}"
 
 
 def _line(v, a):
