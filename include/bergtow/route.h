@@ -119,7 +119,8 @@ typedef struct bt_route_plan {
 
 /// Make a plan. Deterministic: costs of the search are whole numbers, and of equal costs the lower index goes first. No
 /// errors other than the status in the plan: the caller must have checked the numbers. Where the goal drifts away from
-/// the straight line, the slowest speed is left out, until it is reached. Release with bt_route_free.
+/// the straight line, or drifting ice has it outside the domain or in thick ice on arrival, the slowest speed is left
+/// out, until it is reached. Release with bt_route_free.
 void bt_route_make(const bt_route_task *task, bt_route_plan *plan);
 /// Release the routes of a plan.
 void bt_route_free(bt_route_plan *plan);

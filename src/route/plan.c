@@ -574,8 +574,15 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
 {
     bt_route_task fast = *task; // the cheapest speed may be too slow for a goal that drifts away
     qsort(fast.speed, (size_t)fast.n_speeds, sizeof *fast.speed, bt_descending);
-    do make(&fast, plan);
-    while (plan->status == BT_ROUTE_GOAL_DRIFTS && --fast.n_speeds > 0);
+    const bool still = task->drift[0] == 0 && task->drift[1] == 0;
+    for (;; fast.n_speeds--) {
+        make(&fast, plan);
+        // it may also arrive so late that the goal is then beyond the domain, or in thick ice; no-go areas do not drift
+        const bool late = plan->status == BT_ROUTE_GOAL_DRIFTS ||
+            (!still && (plan->status == BT_ROUTE_GOAL_OUTSIDE || plan->status == BT_ROUTE_GOAL_TOO_THICK));
+        if (!late || fast.n_speeds == 1) return;
+        bt_route_free(plan);
+    }
 }
 
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan)
