@@ -70,16 +70,38 @@ static void way_goal(const bt_planner *planner, double t, double x, double y, do
     goal[0] += f * ex, goal[1] += f * ey;
 }
 
+/// Times of arrival at a goal that is moved each time to where it is then: a fixed-point iteration.
+typedef struct {
+    int n;
+    double time, change; ///< the last ones, s
+    bool nearing;        ///< the changes decrease
+} bt_arrivals;
+
+/// The time for which to move the goal next, from that of arrival at the last one: the same; but after `plain` steps
+/// every third one is Aitken's extrapolation, since a plain step gains only a factor drift / speed.
+static double next_arrival(bt_arrivals *a, double time, int plain)
+{
+    const double change = time - a->time;
+    a->nearing = fabs(change) < fabs(a->change);
+    if (++a->n > plain && a->n % 3 == 0 && a->nearing && change * a->change > 0)
+        time += change * change / (a->change - change);
+    a->change = time - a->time;
+    a->time = time;
+    return time;
+}
+
 /// Put the end of a way where the goal is at the time of arrival.
 static void end_at_goal(const bt_planner *planner, bt_way *way)
 {
-    enum { STEPS = 40 };
+    enum { PLAIN = 40, STEPS = 100 };
+    bt_arrivals arrivals = {0};
     const double *u = planner->task.drift, fine = 1e-9 * planner->task.width;
     double *end = way->point[way->n - 1];
     for (int k = 0; k < STEPS; k++) {
         const double was[2] = {end[0], end[1]};
-        way_goal(planner, way->cost.time, was[0], was[1], end);
+        way_goal(planner, next_arrival(&arrivals, way->cost.time, PLAIN), was[0], was[1], end);
         way_price(planner, way);
+        if (k >= PLAIN && !arrivals.nearing) return;
         if ((u[0] == 0 && u[1] == 0) || bt_hypot(end[0] - was[0], end[1] - was[1]) < fine) return;
     }
 }
@@ -383,7 +405,8 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
 static bool through(const bt_planner *planner, int n, const double (*corner)[2], bt_route *route)
 {
     const bt_route_task *task = &planner->task;
-    enum { STEPS = 200 };
+    enum { PLAIN = 200, STEPS = 260 };
+    bt_arrivals arrivals = {0};
     bt_way way = {.point = bt_alloc((size_t)n + 1, sizeof *way.point), .n = n + 1, .cap = n + 1};
     if (n) memcpy(way.point, corner, (size_t)n * sizeof *corner);
     const double *from = n ? corner[n - 1] : task->start;
@@ -401,7 +424,7 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
             way.cost.time = length / task->speed[0];
         }
         const double was[2] = {end[0], end[1]};
-        way_goal(planner, way.cost.time, from[0], from[1], end);
+        way_goal(planner, next_arrival(&arrivals, way.cost.time, PLAIN), from[0], from[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
         there = still || moved < 1e-9 * task->width;
         if (bt_hypot(end[0] - task->start[0], end[1] - task->start[1]) > 10 * wide) break;
