@@ -126,7 +126,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan);
 void bt_route_free(bt_route_plan *plan);
 
 /// Evaluate the way from start to goal through n corners [n][2], m, without a search: terms, forces, areas. No route in
-/// the plan: the goal drifts away, or the turns do not fit.
+/// the plan: the goal drifts away (BT_ROUTE_GOAL_DRIFTS), or the turns do not fit (BT_ROUTE_NONE).
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan);
 
 /// Concentration of the floes of a task on nx × ny cells over its extent, from exact areas; cover [ny][nx].

@@ -400,9 +400,9 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
 
 // --- the task --------------------------------------------------------------------------------------------------------
 
-/// The way through n corners to the goal as a route, n = 0: the straight line; false when the goal drifts away from it,
-/// or its turns do not fit.
-static bool through(const bt_planner *planner, int n, const double (*corner)[2], bt_route *route)
+/// The way through n corners to the goal as a route, n = 0: the straight line. BT_ROUTE_GOAL_DRIFTS when the goal
+/// drifts away from it, BT_ROUTE_NONE when its turns do not fit.
+static int through(const bt_planner *planner, int n, const double (*corner)[2], bt_route *route)
 {
     const bt_route_task *task = &planner->task;
     enum { PLAIN = 200, STEPS = 260 };
@@ -429,8 +429,9 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
         there = still || moved < 1e-9 * task->width;
         if (bt_hypot(end[0] - task->start[0], end[1] - task->start[1]) > 10 * wide) break;
     }
-    there = there && !(way.cost.faults & BT_ROUTE_TURNS);
-    if (there) {
+    const int fits = way.cost.faults & BT_ROUTE_TURNS ? BT_ROUTE_NONE : BT_ROUTE_OK;
+    const int status = there ? fits : BT_ROUTE_GOAL_DRIFTS;
+    if (status == BT_ROUTE_OK) {
         keep_way(planner, route, &way);
         const double x = way.point[0][0] - task->start[0], y = way.point[0][1] - task->start[1];
         const double given[2] = {task->start_heading, task->goal_heading};
@@ -443,7 +444,7 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
         }
     }
     free(way.point);
-    return there;
+    return status;
 }
 
 /// Least force, over the speeds, on a berg in a square of side W around a place, N.
@@ -523,7 +524,7 @@ static void make(const bt_route_task *task, bt_route_plan *plan)
     double there[2];
     way_goal(&planner, 0, t->start[0], t->start[1], there);
     const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
-    if (at_goal || !through(&planner, 0, NULL, &plan->route[0])) {
+    if (at_goal || through(&planner, 0, NULL, &plan->route[0]) != BT_ROUTE_OK) {
         plan->n = 0;
         if (!plan->status) plan->status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
     }
@@ -615,7 +616,8 @@ void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2
     *plan = (bt_route_plan){.n = 1};
     bt_lattice *lattice = lattice_of(&planner);
     plan->cell = planner.ice.cell;
-    if (!through(&planner, n, corner, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
+    plan->status = through(&planner, n, corner, &plan->route[0]);
+    if (plan->status != BT_ROUTE_OK) plan->n = 0;
     bt_lattice_free(lattice);
     end(&planner);
 }

@@ -23,7 +23,7 @@ from harness import (BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, change
 
 import bergtow
 from bergtow import Case, _library
-from bergtow.errors import RunError
+from bergtow.errors import BergtowError, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, route, situation, tows, verdict
 from bergtow.text import route as text_route
@@ -336,9 +336,15 @@ def test_every_route_has_every_speed_that_reaches_the_goal(tmp_path):
     assert [(r["kind"], r["speed"]) for r in found["routes"]] == [
         (kind, v) for kind in ("straight", "planned") for v in (0.6, 1.2)]
     assert re.findall("Left out: .*", done.stdout) == [
-        "Left out: 0.300 m/s, at which the goal drifts away from the ice faster than the body is towed."]
-    unreached = text_route.unreached({"unreached": [{"label": "route 1", "kind": "planned", "speed": 1.2}]})
-    assert unreached[0].startswith("Left out: route 1 at 1.20 m/s, since its turns do not fit")
+        "Left out: 0.300 m/s: the goal drifts away from the ice faster than the body is towed; raise the speed."]
+    left = [{"label": "route 1", "kind": "planned", "speed": 1.2, "reason": "the turns do not fit"},
+            {"label": "straight line", "kind": "straight", "speed": 0.3, "reason": "another"}]
+    assert text_route.unreached({"routes": [{"speed": 1.2}], "unreached": left}) == [
+        "Left out: 0.300 m/s: another.", "Left out: route 1 at 1.20 m/s: the turns do not fit."]
+    s = read_situation(tmp_path, changed(LINE, ice__concentration=0))
+    with pytest.raises(BergtowError, match="^the turns do not fit"):
+        planner.route_through(s.ice, s.hull, s.start, (330, 0), [(200, 0), (210, 90)], speed=0.5, radius=200,
+                              extent=s.extent)
 
 
 def test_a_faster_tow_does_not_overshoot_a_goal_that_drifts(tmp_path):

@@ -397,7 +397,7 @@ def test_a_goal_that_drifts_away():
 
 @pytest.mark.parametrize("speed", [0.36, 0.38])
 def test_a_goal_that_drifts_hardly_slower_than_the_tow(speed):
-    """It is met where it is on arrival, which is known. Red: the goal drifts away, or the planned way ends elsewhere."""
+    """It is met where it is on arrival, which is known. Red: it drifts away, or the planned way ends elsewhere."""
     drift = 0.345
     options = dict(extent=(0, -200, 6400, 200), drift=(-drift, 0), water=(-drift, 0), radius=20)
     straight = route_through(NONE, BERG, (50, 0), (290, 0), speed=speed, **options)

@@ -162,24 +162,26 @@ def priced(a, w, s, weights, factor):
 
 
 def at_speed(route, speed, s, cell, options):
-    """A planned route at one speed, m/s; None if it does not reach the goal at it. Its corners keep their places in the
-    ice or, as the goal does, over the ground, whichever is cheaper. cell: m; options: priced()."""
+    """A planned route at one speed, m/s. Its corners keep their places in the ice or, as the goal does, over the
+    ground, whichever is cheaper. cell: m; options: priced(). Raises BergtowError if it does not reach the goal."""
     if set(route.legs["speed"].tolist()) == {speed}:
         return route
     corners = route.waypoints[:-1]
     times = [route.time[np.argmin(np.hypot(*(np.column_stack([route.x, route.y]) - at).T))] for at in corners]
     *over_ground, goal = route.waypoints + np.outer([*times, route.duration], s.drift)
     moved = passed(over_ground, s.start, s.drift, speed) if any(s.drift) and over_ground else None
-    found = []
+    found, why = [], None
     for some in (corners, moved):
         if some is None:
             continue
         try:  # a hair less of a radius: arcs that touch fit in spite of rounding
             found.append(planner.route_through(s.ice, s.hull, s.start, goal, some, speed=speed, cell=cell,
                                                **options | {"radius": 0.999 * options["radius"]}))
-        except BergtowError:
-            continue
-    return min(found, key=lambda r: (len(r.faults), r.cost), default=None)
+        except BergtowError as e:
+            why = why or e
+    if not found:
+        raise why
+    return min(found, key=lambda r: (len(r.faults), r.cost))
 
 
 def passed(points, start, drift, speed):

@@ -30,12 +30,15 @@ def plan(found, markdown=False):
 
 
 def unreached(found):
-    """[sentence] of the routes that some speeds do not bring to the goal."""
-    slow = {r["speed"] for r in found["unreached"] if r["kind"] == "straight"}
-    return [f"Left out: {number(v)} m/s, at which the goal drifts away from the ice faster than the body is towed."
-            for v in sorted(slow)] + [
-        f"Left out: {r['label']} at {number(r['speed'])} m/s, since its turns do not fit where the goal then is."
-        for r in found["unreached"] if r["speed"] not in slow]
+    """[sentence] of the routes that some speeds do not bring to the goal; once if that is so of all routes at a speed
+    for the same reason."""
+    left, same = found["unreached"], {}
+    for r in left:
+        same.setdefault(r["speed"], set()).add(r["reason"])
+    whole = {r["speed"] for r in left if r["kind"] == "straight" and len(same[r["speed"]]) == 1
+             and not any(x["speed"] == r["speed"] for x in found["routes"])}
+    return [f"Left out: {number(v)} m/s: {min(same[v])}." for v in sorted(whole)] + [
+        f"Left out: {r['label']} at {number(r['speed'])} m/s: {r['reason']}." for r in left if r["speed"] not in whole]
 
 
 def percent(x):
