@@ -462,6 +462,13 @@ def test_the_best_of_many_that_are_alike_is_seldom_recommended():
     assert found / n < 0.025 + 3 * np.sqrt(0.025 / n) and naive / n > 0.08
 
 
+@pytest.mark.parametrize("low", [None, float("nan")])
+def test_one_pair_gives_no_interval(low):
+    """Two members, of which one judges. Red: "– to – at 95 %"."""
+    assert text_route.interval({"relative": -0.1, "relative_95": [low, low]}) == "is -10.0 %; one pair has no interval"
+    assert text_route.interval({"relative": -0.1, "relative_95": [-0.2, 0.1]}).endswith("-20.0 % to +10.0 % at 95 %")
+
+
 def test_failures_come_before_the_objective():
     straight = made_up("straight", [10.0, 11, 12, 13] * 4, True)
     lost = made_up("lost", [1.0, 1, 1, 2] * 4, arrived=False)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The results of bergtow route, as tables and sentences. found: as in route.json."""
+import math
+
 from bergtow.table import number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
@@ -106,6 +108,8 @@ def interval(c):
     if c is None or c["relative"] is None:
         return "cannot be compared, since one of the two fails"
     low, high = c["relative_95"]
+    if low is None or math.isnan(low):
+        return f"is {percent(c['relative'])}; one pair has no interval"
     return f"is {percent(c['relative'])}, {percent(low)} to {percent(high)} at 95 %"
 
 
