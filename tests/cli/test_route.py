@@ -477,8 +477,27 @@ def test_failures_come_before_the_objective():
     limited = made_up("straight", [10.0, 11, 12, 13] * 4, True, limit_exceeded=True)
     v = judged(limited, made_up("a", [20.0, 21, 22, 23] * 4))
     assert v["recommended"] == "a" and v["compared"]["a"]["fails_less"] == 8
-    few = judged(made_up("straight", [10.0, 11] * 2, True, limit_exceeded=True), made_up("a", [9.0, 9] * 2))
-    assert few["recommended"] is None  # two of two may be chance
+    half = [dict(t, limit_exceeded=k % 2 == 0) for k, t in enumerate(made_up("s", [10.0] * 4)[1])]
+    few = judged((made_up("straight", [], True)[0], half), made_up("a", [10.0] * 4))
+    assert few["recommended"] is None  # one of two may be chance
+
+
+def test_a_line_that_always_fails_is_none_to_compare_with():
+    """Red: "no route shown better" than a line that fails in every member, since few of them show nothing."""
+    failing = made_up("straight", [10.0, 11] * 2, True, limit_exceeded=True)
+    v = judged(failing, made_up("a", [20.0, 20] * 2))
+    assert v["code"] == "better" and v["recommended"] == "a"
+    said = text_route.answer({"verdict": v, "objective": "work", "routes": [{"name": "a", "label": "route 1"}]})
+    assert said == ("Take route 1: the straight line fails in all 2 members that judged, and route 1 in none; so few "
+                    "may be chance.")
+    assert judged(failing, made_up("a", [20.0, 20] * 2, missed=True, arrived=False))["recommended"] is None
+
+
+def test_the_default_members_can_show_fewer_failures():
+    """Red: ten, of which five judge: five of five are 0.031."""
+    c = verdict.compared(*(made_up("a", [1.0] * route.MEMBERS, limit_exceeded=over)[1] for over in (False, True)),
+                         verdict.halves(route.MEMBERS)[1], "work")
+    assert verdict.shown(c)
 
 
 # ---- the command

@@ -2,6 +2,7 @@
 """The results of bergtow route, as tables and sentences. found: as in route.json."""
 import math
 
+from bergtow.stats.mean import LEVEL
 from bergtow.table import number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
@@ -9,6 +10,7 @@ WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak fo
 FAULTS = {"missed": "misses the goal", "no_go_contact": "touches a no-go area",
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
+CHANCE = (1 - LEVEL) / 2
 PLANNED = {"no_go": "crosses a no-go area", "outside": "leaves the domain",
            "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
 
@@ -85,6 +87,10 @@ def answer(found):
     c = v["compared"].get(v["chosen"])
     if code == "better":
         low, high = c["relative_95"]
+        if c["fails_less"] == len(v["judged"]):
+            few = "" if c["chance_of_fails"] <= CHANCE else "; so few may be chance"
+            return (f"Take {chosen}: the straight line fails in all {len(v['judged'])} members that judged, and "
+                    f"{chosen} in none{few}.")
         if c["fails_less"]:
             return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in "
                     f"which {chosen} does not.")
