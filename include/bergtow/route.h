@@ -119,13 +119,14 @@ typedef struct bt_route_plan {
 
 /// Make a plan. Deterministic: costs of the search are whole numbers, and of equal costs the lower index goes first. No
 /// errors other than the status in the plan: the caller must have checked the numbers. Where the goal drifts away from
-/// the straight line, the slowest speed is left out, until it is reached. Release with bt_route_free.
+/// the straight line, or drifting ice has it outside the domain or in thick ice on arrival, the slowest speed is left
+/// out, until it is reached. Release with bt_route_free.
 void bt_route_make(const bt_route_task *task, bt_route_plan *plan);
 /// Release the routes of a plan.
 void bt_route_free(bt_route_plan *plan);
 
 /// Evaluate the way from start to goal through n corners [n][2], m, without a search: terms, forces, areas. No route in
-/// the plan: the goal drifts away, or the turns do not fit.
+/// the plan: the goal drifts away (BT_ROUTE_GOAL_DRIFTS), or the turns do not fit (BT_ROUTE_NONE).
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan);
 
 /// Concentration of the floes of a task on nx × ny cells over its extent, from exact areas; cover [ny][nx].

@@ -70,16 +70,38 @@ static void way_goal(const bt_planner *planner, double t, double x, double y, do
     goal[0] += f * ex, goal[1] += f * ey;
 }
 
+/// Times of arrival at a goal that is moved each time to where it is then: a fixed-point iteration.
+typedef struct {
+    int n;
+    double time, change; ///< the last ones, s
+    bool nearing;        ///< the changes decrease
+} bt_arrivals;
+
+/// The time for which to move the goal next, from that of arrival at the last one: the same; but after `plain` steps
+/// every third one is Aitken's extrapolation, since a plain step gains only a factor drift / speed.
+static double next_arrival(bt_arrivals *a, double time, int plain)
+{
+    const double change = time - a->time;
+    a->nearing = fabs(change) < fabs(a->change);
+    if (++a->n > plain && a->n % 3 == 0 && a->nearing && change * a->change > 0)
+        time += change * change / (a->change - change);
+    a->change = time - a->time;
+    a->time = time;
+    return time;
+}
+
 /// Put the end of a way where the goal is at the time of arrival.
 static void end_at_goal(const bt_planner *planner, bt_way *way)
 {
-    enum { STEPS = 40 };
+    enum { PLAIN = 40, STEPS = 100 };
+    bt_arrivals arrivals = {0};
     const double *u = planner->task.drift, fine = 1e-9 * planner->task.width;
     double *end = way->point[way->n - 1];
     for (int k = 0; k < STEPS; k++) {
         const double was[2] = {end[0], end[1]};
-        way_goal(planner, way->cost.time, was[0], was[1], end);
+        way_goal(planner, next_arrival(&arrivals, way->cost.time, PLAIN), was[0], was[1], end);
         way_price(planner, way);
+        if (k >= PLAIN && !arrivals.nearing) return;
         if ((u[0] == 0 && u[1] == 0) || bt_hypot(end[0] - was[0], end[1] - was[1]) < fine) return;
     }
 }
@@ -378,12 +400,13 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
 
 // --- the task --------------------------------------------------------------------------------------------------------
 
-/// The way through n corners to the goal as a route, n = 0: the straight line; false when the goal drifts away from it,
-/// or its turns do not fit.
-static bool through(const bt_planner *planner, int n, const double (*corner)[2], bt_route *route)
+/// The way through n corners to the goal as a route, n = 0: the straight line. BT_ROUTE_GOAL_DRIFTS when the goal
+/// drifts away from it, BT_ROUTE_NONE when its turns do not fit.
+static int through(const bt_planner *planner, int n, const double (*corner)[2], bt_route *route)
 {
     const bt_route_task *task = &planner->task;
-    enum { STEPS = 200 };
+    enum { PLAIN = 200, STEPS = 260 };
+    bt_arrivals arrivals = {0};
     bt_way way = {.point = bt_alloc((size_t)n + 1, sizeof *way.point), .n = n + 1, .cap = n + 1};
     if (n) memcpy(way.point, corner, (size_t)n * sizeof *corner);
     const double *from = n ? corner[n - 1] : task->start;
@@ -401,13 +424,14 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
             way.cost.time = length / task->speed[0];
         }
         const double was[2] = {end[0], end[1]};
-        way_goal(planner, way.cost.time, from[0], from[1], end);
+        way_goal(planner, next_arrival(&arrivals, way.cost.time, PLAIN), from[0], from[1], end);
         const double moved = bt_hypot(end[0] - was[0], end[1] - was[1]);
         there = still || moved < 1e-9 * task->width;
         if (bt_hypot(end[0] - task->start[0], end[1] - task->start[1]) > 10 * wide) break;
     }
-    there = there && !(way.cost.faults & BT_ROUTE_TURNS);
-    if (there) {
+    const int fits = way.cost.faults & BT_ROUTE_TURNS ? BT_ROUTE_NONE : BT_ROUTE_OK;
+    const int status = there ? fits : BT_ROUTE_GOAL_DRIFTS;
+    if (status == BT_ROUTE_OK) {
         keep_way(planner, route, &way);
         const double x = way.point[0][0] - task->start[0], y = way.point[0][1] - task->start[1];
         const double given[2] = {task->start_heading, task->goal_heading};
@@ -420,7 +444,7 @@ static bool through(const bt_planner *planner, int n, const double (*corner)[2],
         }
     }
     free(way.point);
-    return there;
+    return status;
 }
 
 /// Least force, over the speeds, on a berg in a square of side W around a place, N.
@@ -500,7 +524,7 @@ static void make(const bt_route_task *task, bt_route_plan *plan)
     double there[2];
     way_goal(&planner, 0, t->start[0], t->start[1], there);
     const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
-    if (at_goal || !through(&planner, 0, NULL, &plan->route[0])) {
+    if (at_goal || through(&planner, 0, NULL, &plan->route[0]) != BT_ROUTE_OK) {
         plan->n = 0;
         if (!plan->status) plan->status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
     }
@@ -574,8 +598,15 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
 {
     bt_route_task fast = *task; // the cheapest speed may be too slow for a goal that drifts away
     qsort(fast.speed, (size_t)fast.n_speeds, sizeof *fast.speed, bt_descending);
-    do make(&fast, plan);
-    while (plan->status == BT_ROUTE_GOAL_DRIFTS && --fast.n_speeds > 0);
+    const bool still = task->drift[0] == 0 && task->drift[1] == 0;
+    for (;; fast.n_speeds--) {
+        make(&fast, plan);
+        // it may also arrive so late that the goal is then beyond the domain, or in thick ice; no-go areas do not drift
+        const bool late = plan->status == BT_ROUTE_GOAL_DRIFTS ||
+            (!still && (plan->status == BT_ROUTE_GOAL_OUTSIDE || plan->status == BT_ROUTE_GOAL_TOO_THICK));
+        if (!late || fast.n_speeds == 1) return;
+        bt_route_free(plan);
+    }
 }
 
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan)
@@ -585,7 +616,8 @@ void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2
     *plan = (bt_route_plan){.n = 1};
     bt_lattice *lattice = lattice_of(&planner);
     plan->cell = planner.ice.cell;
-    if (!through(&planner, n, corner, &plan->route[0])) plan->n = 0, plan->status = BT_ROUTE_GOAL_DRIFTS;
+    plan->status = through(&planner, n, corner, &plan->route[0]);
+    if (plan->status != BT_ROUTE_OK) plan->n = 0;
     bt_lattice_free(lattice);
     end(&planner);
 }

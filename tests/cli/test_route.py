@@ -23,7 +23,7 @@ from harness import (BERGTOW, CASE, DONE, ROOT, SIGNAL, TOW, USAGE, call, change
 
 import bergtow
 from bergtow import Case, _library
-from bergtow.errors import RunError
+from bergtow.errors import BergtowError, RunError
 from bergtow.result.run import Run
 from bergtow.routing import apart, horizon, members, output, planner, route, situation, tows, verdict
 from bergtow.text import route as text_route
@@ -336,9 +336,15 @@ def test_every_route_has_every_speed_that_reaches_the_goal(tmp_path):
     assert [(r["kind"], r["speed"]) for r in found["routes"]] == [
         (kind, v) for kind in ("straight", "planned") for v in (0.6, 1.2)]
     assert re.findall("Left out: .*", done.stdout) == [
-        "Left out: 0.300 m/s, at which the goal drifts away from the ice faster than the body is towed."]
-    unreached = text_route.unreached({"unreached": [{"label": "route 1", "kind": "planned", "speed": 1.2}]})
-    assert unreached[0].startswith("Left out: route 1 at 1.20 m/s, since its turns do not fit")
+        "Left out: 0.300 m/s: the goal drifts away from the ice faster than the body is towed; raise the speed."]
+    left = [{"label": "route 1", "kind": "planned", "speed": 1.2, "reason": "the turns do not fit"},
+            {"label": "straight line", "kind": "straight", "speed": 0.3, "reason": "another"}]
+    assert text_route.unreached({"routes": [{"speed": 1.2}], "unreached": left}) == [
+        "Left out: 0.300 m/s: another.", "Left out: route 1 at 1.20 m/s: the turns do not fit."]
+    s = read_situation(tmp_path, changed(LINE, ice__concentration=0))
+    with pytest.raises(BergtowError, match="^the turns do not fit"):
+        planner.route_through(s.ice, s.hull, s.start, (330, 0), [(200, 0), (210, 90)], speed=0.5, radius=200,
+                              extent=s.extent)
 
 
 def test_a_faster_tow_does_not_overshoot_a_goal_that_drifts(tmp_path):
@@ -456,6 +462,13 @@ def test_the_best_of_many_that_are_alike_is_seldom_recommended():
     assert found / n < 0.025 + 3 * np.sqrt(0.025 / n) and naive / n > 0.08
 
 
+@pytest.mark.parametrize("low", [None, float("nan")])
+def test_one_pair_gives_no_interval(low):
+    """Two members, of which one judges. Red: "– to – at 95 %"."""
+    assert text_route.interval({"relative": -0.1, "relative_95": [low, low]}) == "is -10.0 %; one pair has no interval"
+    assert text_route.interval({"relative": -0.1, "relative_95": [-0.2, 0.1]}).endswith("-20.0 % to +10.0 % at 95 %")
+
+
 def test_failures_come_before_the_objective():
     straight = made_up("straight", [10.0, 11, 12, 13] * 4, True)
     lost = made_up("lost", [1.0, 1, 1, 2] * 4, arrived=False)
@@ -464,8 +477,27 @@ def test_failures_come_before_the_objective():
     limited = made_up("straight", [10.0, 11, 12, 13] * 4, True, limit_exceeded=True)
     v = judged(limited, made_up("a", [20.0, 21, 22, 23] * 4))
     assert v["recommended"] == "a" and v["compared"]["a"]["fails_less"] == 8
-    few = judged(made_up("straight", [10.0, 11] * 2, True, limit_exceeded=True), made_up("a", [9.0, 9] * 2))
-    assert few["recommended"] is None  # two of two may be chance
+    half = [dict(t, limit_exceeded=k % 2 == 0) for k, t in enumerate(made_up("s", [10.0] * 4)[1])]
+    few = judged((made_up("straight", [], True)[0], half), made_up("a", [10.0] * 4))
+    assert few["recommended"] is None  # one of two may be chance
+
+
+def test_a_line_that_always_fails_is_none_to_compare_with():
+    """Red: "no route shown better" than a line that fails in every member, since few of them show nothing."""
+    failing = made_up("straight", [10.0, 11] * 2, True, limit_exceeded=True)
+    v = judged(failing, made_up("a", [20.0, 20] * 2))
+    assert v["code"] == "better" and v["recommended"] == "a"
+    said = text_route.answer({"verdict": v, "objective": "work", "routes": [{"name": "a", "label": "route 1"}]})
+    assert said == ("Take route 1: the straight line fails in all 2 members that judged, and route 1 in none; so few "
+                    "may be chance.")
+    assert judged(failing, made_up("a", [20.0, 20] * 2, missed=True, arrived=False))["recommended"] is None
+
+
+def test_the_default_members_can_show_fewer_failures():
+    """Red: ten, of which five judge: five of five are 0.031."""
+    c = verdict.compared(*(made_up("a", [1.0] * route.MEMBERS, limit_exceeded=over)[1] for over in (False, True)),
+                         verdict.halves(route.MEMBERS)[1], "work")
+    assert verdict.shown(c)
 
 
 # ---- the command

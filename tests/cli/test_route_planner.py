@@ -395,6 +395,31 @@ def test_a_goal_that_drifts_away():
     assert found.routes[0].duration == pytest.approx(900 / 0.3)
 
 
+@pytest.mark.parametrize("speed", [0.36, 0.38])
+def test_a_goal_that_drifts_hardly_slower_than_the_tow(speed):
+    """It is met where it is on arrival, which is known. Red: it drifts away, or the planned way ends elsewhere."""
+    drift = 0.345
+    options = dict(extent=(0, -200, 6400, 200), drift=(-drift, 0), water=(-drift, 0), radius=20)
+    straight = route_through(NONE, BERG, (50, 0), (290, 0), speed=speed, **options)
+    assert straight.duration == pytest.approx(240 / (speed - drift), rel=1e-6)
+    floe = Ice([disc(200, 0, 20)], [2])
+    found = plan(floe, BERG, (50, 0), (290, 0), speeds=(speed,), routes=1, **options)
+    assert len(found.routes) == 2
+    for r in found.routes:
+        np.testing.assert_allclose(r.waypoints[-1], [290 + drift * r.duration, 0], atol=1e-4)
+    assert plan(NONE, BERG, (50, 0), (290, 0), speeds=(0.344,), **options).status == "goal_drifts_away"
+
+
+def test_a_slow_speed_that_arrives_where_the_goal_has_left_the_domain():
+    """The faster one finds what it finds alone. Red: the goal lies outside the domain, for both."""
+    options = dict(extent=(0, 0, 1000, 600), drift=(-0.5, 0), water=(-0.5, 0), routes=1)
+    found = plan(NONE, BERG, (50, 300), (400, 300), speeds=(0.6, 1.5), **options)
+    assert found.status == "ok" or found.status == "fewer_routes"
+    assert [r.duration for r in found.routes] == [
+        r.duration for r in plan(NONE, BERG, (50, 300), (400, 300), speeds=(1.5,), **options).routes]
+    assert plan(NONE, BERG, (50, 300), (400, 300), speeds=(0.6, 0.55), **options).status == "goal_outside"
+
+
 def test_current_across_and_against():
     """Water drag is of the velocity through the water: closed forms. Red: the sign of the current."""
     for water, force in ((0.5, 0), 1e4 * 0.25), ((-0.5, 0), 1e4 * 2.25), ((0, 0.75), 1e4 * 1.25), ((2, 0), 10):

@@ -24,6 +24,8 @@ from . import apart
 OBJECTIVES = ("work", "time", "peak", "length")  # bt_route_objective
 STATUS = ("ok", "fewer_routes", "no_route", "start_outside", "goal_outside", "start_no_go", "goal_no_go",
           "start_too_thick", "goal_too_thick", "goal_drifts_away", "at_goal")  # bt_route_status
+UNREACHED = {"goal_drifts_away": "the goal drifts away from the ice faster than the body is towed; raise the speed",
+             "no_route": "the turns do not fit where the goal then is; give a smaller radius"}
 FAULTS = {1: "no_go", 2: "outside", 4: "force_limit", 8: "turns"}
 MOST_STATES, MOST_CELLS = 20e6, 20e6  # about 1 GB
 Points = Union[np.ndarray, Sequence[Sequence[float]]]
@@ -318,8 +320,7 @@ def route_through(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[fl
     found = task.call("bt_route_through", len(points), _pointer(points))
     try:
         if not found.n:
-            raise BergtowError("the goal drifts away faster than the berg follows, or the way has turns that do not "
-                               "fit; raise the speed, or give a smaller radius")
+            raise BergtowError(UNREACHED[STATUS[found.status]])
         return _route(found.route[0], "planned" if len(points) else "straight", task.task.width, found.cell)
     finally:
         _library.library().bt_route_free(ctypes.byref(found))

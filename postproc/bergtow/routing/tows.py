@@ -17,7 +17,7 @@ tow are for the time up to then, or to its end if the goal is missed.
 """
 from dataclasses import dataclass, field
 
-from bergtow.errors import CASE, RunError
+from bergtow.errors import CASE, BergtowError, RunError
 from bergtow.result.run import least
 from bergtow.routing import apart, planner
 from bergtow.study.runs import CaseRuns
@@ -180,17 +180,18 @@ def candidate(name, label, route, situation):
 
 def candidates(routes, speeds, situation, at_speed):
     """(Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ;
-    [{"label", "kind", "speed"}] of those that do not). at_speed(route, m/s): the route at that speed, or None."""
+    [{"label", "kind", "speed", "reason"}] of those that do not). at_speed(route, m/s): the route at that speed; raises
+    BergtowError with the reason if there is none."""
     out, unreached, k = [], [], 0
     for route in routes:
         k += route.kind != "straight"
         name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
         for speed in speeds:
             more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
-            if same := at_speed(route, speed):
-                out.append(candidate(name + more[0], label + more[1], same, situation))
-            else:
-                unreached.append({"label": label, "kind": route.kind, "speed": speed})
+            try:
+                out.append(candidate(name + more[0], label + more[1], at_speed(route, speed), situation))
+            except BergtowError as e:
+                unreached.append({"label": label, "kind": route.kind, "speed": speed, "reason": str(e)})
         if len(set(route.legs["speed"].tolist())) > 1:
             out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, situation))
     return out, unreached

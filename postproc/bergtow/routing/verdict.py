@@ -4,7 +4,9 @@
 The best of several routes looks better than it is in the members that were used to select it. So one half of the
 members selects, and the other half judges: the interval is that of the paired differences to the straight line in
 members that had no part in the selection. A tow fails if it misses the goal, touches a no-go area, parts its line, or
-exceeds the force limit. Tows are ranked first by their failures, then by the mean of the objective.
+exceeds the force limit. Tows are ranked first by their failures, then by the mean of the objective. A straight line
+that fails in every member that judges is no line to compare with: if the chosen route fails in none of them, it is
+taken, however few they are.
 """
 from bergtow.stats.mean import LEVEL, t_interval
 
@@ -88,5 +90,6 @@ def of(candidates, outcomes, objective):
                            "straight": first.straight, "lost": sum(np.isfinite(b) and not a <= b for a, b in values)}
     if n < 2:
         return out | {"code": "one_member"}
-    better = shown(out["compared"][others[0].name])
+    c = out["compared"][others[0].name]
+    better = shown(c) or c["fails_less"] == len(judge)
     return out | {"code": "better" if better else "not_shown", "recommended": others[0].name if better else None}

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The results of bergtow route, as tables and sentences. found: as in route.json."""
+import math
+
+from bergtow.stats.mean import LEVEL
 from bergtow.table import number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
@@ -7,6 +10,7 @@ WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak fo
 FAULTS = {"missed": "misses the goal", "no_go_contact": "touches a no-go area",
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
+CHANCE = (1 - LEVEL) / 2
 PLANNED = {"no_go": "crosses a no-go area", "outside": "leaves the domain",
            "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
 
@@ -30,12 +34,15 @@ def plan(found, markdown=False):
 
 
 def unreached(found):
-    """[sentence] of the routes that some speeds do not bring to the goal."""
-    slow = {r["speed"] for r in found["unreached"] if r["kind"] == "straight"}
-    return [f"Left out: {number(v)} m/s, at which the goal drifts away from the ice faster than the body is towed."
-            for v in sorted(slow)] + [
-        f"Left out: {r['label']} at {number(r['speed'])} m/s, since its turns do not fit where the goal then is."
-        for r in found["unreached"] if r["speed"] not in slow]
+    """[sentence] of the routes that some speeds do not bring to the goal; once if that is so of all routes at a speed
+    for the same reason."""
+    left, same = found["unreached"], {}
+    for r in left:
+        same.setdefault(r["speed"], set()).add(r["reason"])
+    whole = {r["speed"] for r in left if r["kind"] == "straight" and len(same[r["speed"]]) == 1
+             and not any(x["speed"] == r["speed"] for x in found["routes"])}
+    return [f"Left out: {number(v)} m/s: {min(same[v])}." for v in sorted(whole)] + [
+        f"Left out: {r['label']} at {number(r['speed'])} m/s: {r['reason']}." for r in left if r["speed"] not in whole]
 
 
 def percent(x):
@@ -80,6 +87,10 @@ def answer(found):
     c = v["compared"].get(v["chosen"])
     if code == "better":
         low, high = c["relative_95"]
+        if c["fails_less"] == len(v["judged"]):
+            few = "" if c["chance_of_fails"] <= CHANCE else "; so few may be chance"
+            return (f"Take {chosen}: the straight line fails in all {len(v['judged'])} members that judged, and "
+                    f"{chosen} in none{few}.")
         if c["fails_less"]:
             return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in "
                     f"which {chosen} does not.")
@@ -103,6 +114,8 @@ def interval(c):
     if c is None or c["relative"] is None:
         return "cannot be compared, since one of the two fails"
     low, high = c["relative_95"]
+    if low is None or math.isnan(low):
+        return f"is {percent(c['relative'])}; one pair has no interval"
     return f"is {percent(c['relative'])}, {percent(low)} to {percent(high)} at 95 %"
 
 
