@@ -152,12 +152,16 @@ def stated(value, low, high, unit, least=None):
 
 
 def level(value, ends, factor=1.0):
-    """A level, to three digits, and its interval, to the digits that it justifies."""
+    """A level, to three digits, and its interval, to the digits that it justifies; a lower end above zero that would
+    be left without any, to two of its own."""
     low, high = ends[0], bound(value, ends[1])
     place = last_place(value / factor, low / factor, high / factor)
     if place is None or np.isnan([low, high]).any():
         return number(value / factor), pair((low, high), factor)
-    return number(value / factor), " to ".join(to_place(v / factor, place) for v in (low, high))
+    below, above = (to_place(v / factor, place) for v in (low, high))
+    if low > 0 and float(below) == 0:
+        below = number(low / factor, 2)
+    return number(value / factor), f"{below} to {above}"
 
 
 def pair(values, factor=1.0):

@@ -212,6 +212,19 @@ def test_converge_of_another_case_does_not_fit():
     assert why(ice__field="other.h5") == "ice.field is other.h5 there and /a/field.h5 here"
 
 
+def test_the_extent_of_no_lead_is_no_other_case():
+    """It follows from the tow. Red: converge.json of a shorter run is refused for lead.length."""
+    def texts(mode, length):
+        return {"ice.size": "2 m", "lead.mode": mode, "lead.length": length}
+    short, long = texts("none", "500 m"), texts("none", "600 m")
+    assert compared.misfit({"values": short}, [long]) == compared.alone({"values": short}, [long]) == ""
+    assert list(compared.unlike(short, long)) == []
+    short, long = texts("channel", "500 m"), texts("channel", "600 m")
+    assert compared.misfit({"values": short}, [long]) == "lead.length is 500 m there and 600 m here"
+    assert compared.alone({"values": short}, [long]) == "lead.length 500 m"
+    assert list(compared.unlike(short, long)) == [("lead.length", "500 m", "600 m")]
+
+
 def test_the_file_that_is_named_is_read(tmp_path):
     """Red: that beside it was, whatever the name."""
     for name, title in (("converge", "OTHER"), ("converge-80", "NAMED")):

@@ -226,6 +226,9 @@ def test_levels_have_the_digits_that_they_are_worth():
     assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.64", "0.1 to no bound")
     assert text_table.level(1642.0, (np.nan, np.nan), 1e3) == ("1.64", "–")
     assert text_table.level(3.0, (-0.04, 5.0), 1.0) == ("3.00", "0.0 to 5.0")  # no minus zero
+    assert text_table.level(203e3, (3929.0, np.inf)) == ("2.03e+05", "3900 to no bound")  # red: from 0
+    assert text_table.level(203e6, (3.929e6, 3e8), 1e6) == ("203", "3.9 to 300")
+    assert text_table.level(203e3, (0.0, np.inf)) == ("2.03e+05", "0 to no bound")
     assert report_case.short("2.60245e-16 m") == "0 m" and report_case.short("-3.24837e-17 m") == "0 m"
 
 

@@ -149,6 +149,16 @@ def test_layers_of_the_series_need_no_frames(tmp_path):
         assert done.returncode == IO and "holds no frames" in done.stderr
 
 
+def test_a_run_without_a_body_has_no_loads(tmp_path):
+    """Its position is in the file, but not a number. Red: a traceback from JSON; points without coordinates."""
+    there = run(tmp_path, changed(BASIN, body={"shape": "none"}, tow=None, run__duration=2)).dir
+    with Run(there) as r:
+        assert "body_x" in r and not np.isfinite(r["body_x"]).any()
+    for name in "none.geojson", "none.gpkg":
+        done = call("export", there, "-o", tmp_path / name, "--layer", "loads")
+        assert done.returncode == IO and "has no loads" in done.stderr and not (tmp_path / name).exists()
+
+
 def test_time_zero_is_the_first_frame(tmp_path):
     """Red: the last one."""
     there, placed = towed(tmp_path), []

@@ -436,7 +436,7 @@ def test_every_load_is_there_with_its_unit_and_without_the_start(statement):
 def test_the_branch_that_bears_more_is_designed_for(statement):
     first, second = ({name: c["loads"][name]["design"]["value"] for name in LOADED[2:]}
                      | {"said": c["design"]["tension"]} for c in statement[2]["conditions"])
-    assert first["said"]["label"] == "line tension" and first["said"]["value"] == first["line_tension_1"]
+    assert first["said"]["label"] == "tension of the first branch" and first["said"]["value"] == first["line_tension_1"]
     assert second["said"]["label"] == "tension of the second branch"
     assert second["said"]["value"] == second["line_tension_2"] > second["line_tension_1"]
 

@@ -754,3 +754,19 @@ def test_the_largest_load_may_lie_before_the_window():
     assert ("largest peak", "none in the window; in the start before it 2.65 MN") in report_run.impacts(run)["rows"]
     parted, = [row for row in report_run.forces(run) if "second branch" in row[0]]
     assert parted[1] == "345 kN" and "it parted" in parted[3]
+
+
+@pytest.mark.parametrize("time, said", [(np.nan, ""), (3.0, "correlation time 3.00 s")])
+def test_an_unknown_correlation_time_is_left_out(time, said):
+    """Red: "correlation time nan s"."""
+    run = SimpleNamespace(towed=None, window=(10.0, 20.0), window_name="window", verdict=("steady", ""),
+                          number=lambda key, other=0.0: time if "correlation" in key else 0.0, summary={"window": {}})
+    assert dict((what, remark) for what, _, remark in report_run.quality(run))["independent samples in it"] == said
+
+
+def test_the_first_of_two_branches_is_named_as_the_second(tmp_path):
+    """Red: as the whole line is."""
+    for branches, names in (1, ["line tension"]), (2, ["tension of the first branch", "tension of the second branch"]):
+        case = changed(MOVING, run__duration=4, tow__line={"branches": branches})
+        with Run(run(tmp_path / str(branches), case).dir) as r:
+            assert [r.label(s) for s in ("line_tension_1", "line_tension_2") if np.isfinite(r[s]).any()] == names

@@ -196,6 +196,19 @@ def test_members_are_the_map_within_its_errors(tmp_path):
         assert call("check", s.case, *sets).returncode == DONE
 
 
+def test_floes_have_room_across_a_periodic_seam():
+    """Red: as much as most, so that members move floes into each other's images."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    floes = [square + at for at in ([0.7, 5], [9.1, 5], [5, 0.4], [5, 9.2])]  # 0.6 m apart in x, 0.2 m in y
+    for period, room in (((0, 0), (2, 2, 2, 2)), ((10, 0), (0.3, 0.3, 2, 2)), ((0, 10), (2, 2, 0.1, 0.1)),
+                         ((10, 10), (0.3, 0.3, 0.1, 0.1))):
+        assert members.room(floes, 2, period) == pytest.approx(room)
+    corners = [square + at for at in ([0.6, 0.6], [9.1, 9.1], [9.0, 0.0])]
+    assert members.room(corners[:2], 2, (10, 10)) == pytest.approx([0.5 * np.hypot(0.5, 0.5)] * 2)
+    assert members.room([square + [0.6, 9.1], square + [9.1, 0.6]], 2, (10, 10)) == pytest.approx(
+        [0.5 * np.hypot(0.5, 0.5)] * 2)
+
+
 def test_a_map_without_floes_has_members_without_floes():
     nothing = members.Floes(np.zeros((0, 2)), np.zeros(1, dtype=int), np.zeros((0, 3)), np.zeros(0), np.zeros(0), {})
     assert nothing.outlines() == []

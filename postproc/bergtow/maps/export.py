@@ -188,8 +188,8 @@ def tracks_layer(run, _):
 
 
 def loads_layer(run, _):
-    """Forces and loads of each sample, at the position of the iceberg."""
-    if "body_x" not in run:
+    """Forces and loads of each sample, at the position of the iceberg. Without one the series are there, but NaN."""
+    if "body_x" not in run or not np.isfinite(run["body_x"]).any():
         return Layer("loads", "Point", {}, [])
     xy = np.column_stack([run["body_x"], run["body_y"]])
     names = [name for name in run.by_role("balance", "force", "load") if np.isfinite(run[name]).any()]

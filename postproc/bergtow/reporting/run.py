@@ -236,7 +236,8 @@ def quality(run):
              f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples",
              rule),
             ("independent samples in it", style.short(n("window.n_independent")),
-             f"correlation time {style.short(n('window.correlation_time_s'))} s")
+             f"correlation time {style.short(n('window.correlation_time_s'))} s"
+             if np.isfinite(n("window.correlation_time_s")) else "")
         ]
     if run.towed is not None:
         rows += [(f"balance of the body: ice − ({run.balance})",

@@ -80,15 +80,19 @@ def _differ(a, b):
     return a.rpartition("/")[2] != b.rpartition("/")[2]
 
 
+def _physical(texts):
+    """(key) -> does it make a different case? If none of these cases has a lead, its extent, which follows from the
+    tow, does not."""
+    lead = any(text.get("lead.mode") != "none" for text in texts)
+    physical = tuple(key for key in PHYSICAL if lead or key != "lead.")
+    return lambda key: key.startswith(physical) and key not in PLACES
+
+
 def unlike(a, b, but=()):
-    """(key, its text in a, in b) of differences that make b a different case: keys that both have, except `but`. If
-    neither has a lead, its extent, which follows from the tow, does not count."""
-    physical = PHYSICAL
-    if a.get("lead.mode") == b.get("lead.mode") == "none":
-        physical = tuple(key for key in PHYSICAL if key != "lead.")
+    """(key, its text in a, in b) of differences that make b a different case: keys that both have, except `but`."""
+    physical = _physical((a, b))
     for key, value in a.items():
-        if (key.startswith(physical) or key == "run.dt") and key not in (*PLACES, *but) and key in b \
-                and _differ(value, b[key]):
+        if (physical(key) or key == "run.dt") and key not in but and key in b and _differ(value, b[key]):
             yield key, value, b[key]
 
 
@@ -113,9 +117,11 @@ def stale(found, e):
 
 def _physical_values(found, texts):
     """(key, its text in the result, its texts in the members' cases) for the keys that make a different case."""
-    for key, value in (found.get("values") or {}).items():
+    values = found.get("values") or {}
+    physical = _physical((values, *texts))
+    for key, value in values.items():
         some = list(dict.fromkeys(text[key] for text in texts if key in text))
-        if some and key.startswith(PHYSICAL) and key not in PLACES:
+        if some and physical(key):
             yield key, value, some
 
 

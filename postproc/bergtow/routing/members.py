@@ -94,19 +94,24 @@ class Floes:
                      self.thickness[kept], self.area[kept], self.attributes)
 
 
-def room(outlines, most):
-    """[n] half the distance from each floe to its nearest neighbour, m, at most `most`."""
+def room(outlines, most, period=(0.0, 0.0)):
+    """[n] half the distance from each floe to its nearest neighbour, m, at most `most`. period: of the domain along
+    each axis, across which floes are neighbours, too; 0 for none."""
     out = np.full(len(outlines), float(most))
     if len(outlines) < 2 or not most > 0:
         return out
     centre = np.array([o.mean(axis=0) for o in outlines])
     reach = np.array([apart.radius(o, c) for o, c in zip(outlines, centre)])
     tree = cKDTree(centre)
-    for i, near in enumerate(tree.query_ball_point(centre, reach + reach.max() + 2 * most)):
-        for j in near:
-            if j > i and np.hypot(*(centre[i] - centre[j])) - reach[i] - reach[j] < 2 * max(out[i], out[j]):
-                half = apart.of(outlines[i], outlines[j]) / 2
-                out[i], out[j] = min(out[i], half), min(out[j], half)
+    # the opposite images give the same pairs: i moved by a period beside j, or j moved back beside i
+    images = {(a * period[0], b * period[1]) for a, b in ((0, 0), (1, 0), (0, 1), (1, 1), (1, -1))}
+    for image in sorted(images):
+        for i, near in enumerate(tree.query_ball_point(centre + image, reach + reach.max() + 2 * most)):
+            for j in near:
+                if (j > i or j != i and any(image)) and np.hypot(*(centre[i] + image - centre[j])) - reach[i] - \
+                        reach[j] < 2 * max(out[i], out[j]):
+                    half = apart.of(outlines[i] + image, outlines[j]) / 2
+                    out[i], out[j] = min(out[i], half), min(out[j], half)
     return out
 
 
@@ -121,6 +126,11 @@ def clear_of_hull(outlines, situation, start=None, yaw=None):
                      for o, centre in zip(outlines, centres)], dtype=bool)
 
 
+def _periodic(situation):
+    """[2] of bool: along which axes the domain repeats itself."""
+    return np.array([situation.values[f"domain.{side}"] == "periodic" for side in ("ends", "sides")])
+
+
 def drawn(n, situation, errors, folder):
     """n Members, or a single one for a map without errors. Raises RunError."""
     as_read = reading(situation.values, situation.field)
@@ -130,7 +140,8 @@ def drawn(n, situation, errors, folder):
         raise RunError("water.current_table", "leaves no room for an error of the drift", "set --drift-error 0, or "
                        "give a constant current in water.current_x and current_y", CASE)
     floes = Floes.read(situation.field)
-    own = room(floes.outlines(), 4 * errors.position) if errors.position else None
+    period = np.where(_periodic(situation), np.subtract(situation.extent[2:], situation.extent[:2]), 0.0)
+    own = room(floes.outlines(), 4 * errors.position, period) if errors.position else None
     folder.mkdir(parents=True, exist_ok=True)
     return [one(k, floes, own, situation, errors, folder, as_read) for k in range(n)]
 
@@ -156,8 +167,8 @@ def one(k, floes, own, situation, errors, folder, as_read):
     factor = np.exp(sigma * half * (thick + each) - sigma ** 2 / 2)
     moved = Floes(floes.vertices, floes.offsets, pose, np.clip(floes.thickness * factor, 1e-6, 100), floes.area,
                   floes.attributes)
-    periodic = np.array([values[f"domain.{side}"] == "periodic" for side in ("ends", "sides")])
-    moved.pose[:, :2] = np.where(periodic, low + (moved.pose[:, :2] - low) % (high - low), moved.pose[:, :2])
+    at = moved.pose[:, :2]
+    moved.pose[:, :2] = np.where(_periodic(situation), low + (at - low) % (high - low), at)
     kept = np.all((moved.pose[:, :2] >= low) & (moved.pose[:, :2] <= high), axis=1)
     kept &= clear_of_hull(moved.outlines(), situation)
     file = folder / f"m{k + 1:03d}.h5"
