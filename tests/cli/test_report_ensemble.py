@@ -354,7 +354,7 @@ variants:
     assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
     e = Members(tmp_path / "out")
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
-    cases = report_ensemble.statement.cases(e, s)
+    cases = report_ensemble.design_value.cases(e, s)
     limits = report_method.limits(cases)
     for said in ("For variant rafting; variant more: floes are rigid except that they slide over each other (raft) "
                  "above a load that grows with the square of their thickness, κ = 10 to 17. They do not break, bend or "
@@ -392,7 +392,7 @@ variants:
 def test_limits_tell_how_floes_give_way(values, jams, said):
     texts = {f"ice.{key}": value for key, value in values.items()}
     rigid = not {"crushing.pressure", "rafting.kappa"} & set(values)
-    case = report_ensemble.statement.Case(rigid, jams, "speed", {}, np.nan, 0.0, texts)
+    case = report_ensemble.design_value.Case(rigid, jams, "speed", {}, np.nan, 0.0, texts)
     assert said in report_method.limits([({"label": "the case", "values": {}, "units": {}}, case)])
 
 

@@ -97,7 +97,7 @@ REACHED = 0.95
 
 
 def too_slow(case, made):
-    """Does the vessel of a case, {key: text}, not reach the ordered speed? made: the speed made good, None if unknown."""
+    """Does the vessel of a case, {key: text}, not reach the ordered speed? made: speed made good, None if unknown."""
     return case.get("tow.mode") == "thrust" and case.get("tow.programme", "none") == "none" and made is not None and \
         made["value"] < REACHED * case_value(case, "tow.speed", 0.0)
 
