@@ -242,8 +242,7 @@ class Run(Frames):
         return str(plain(self._dataset(f"series/{name}").attrs.get(what, "")))
 
     def label(self, name):
-        """The name of a series in pictures and tables. If the line has two branches, that of a tension says of which it
-        is."""
+        """The name of a series in pictures and tables. On a bridle, line_tension_1 is named after its branch."""
         if name == "line_tension_1" and "line_tension_2" in self and np.isfinite(self["line_tension_2"]).any():
             return "tension of the first branch"
         return self.attribute(name, "label") or name.replace("_", " ")
