@@ -113,8 +113,8 @@ def over_fields(statistic, samples, low=-np.inf, scale=None):
 
 def ratio_over_fields(counts, sizes, high=np.inf, scale=LOG, events=None):
     """Sum of counts / sum of sizes, one of each per field, with its interval. Equal counts leave the jackknife no
-    scatter, so the interval then covers at least that of a Poisson number of events [Garwood 1936], of which the counts
-    consist (default: counts of events)."""
+    scatter: the interval then covers at least that of a Poisson number of events [Garwood 1936]. events: their number
+    in each field, if the counts are of something else."""
     counts, sizes = np.asarray(counts, dtype=float), np.asarray(sizes, dtype=float)
     without, value = (counts.sum() - counts) / np.maximum(sizes.sum() - sizes, 1e-300), counts.sum() / sizes.sum()
     ends = jackknife(value, without, 0.0, high, scale)
