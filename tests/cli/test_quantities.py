@@ -191,8 +191,8 @@ def test_pictures_and_report_follow_the_roles(left):
         assert [p.split(" (")[0] for p in panels] == [q["label"] for q in by_role["diagnostic"]]
         rows = [row[0].split(",")[0] for row in report_run.forces(run) if "it parted" not in row[3]]
         for q in forces + by_role["load"]:
-            assert (q["label"] in rows) == (np.isfinite(run.number(q["summary"]))
-                                            or q["name"] in ("ice_resistance", "tow_force")), q["name"]
+            assert (run.label(q["name"]) in rows) == (np.isfinite(run.number(q["summary"]))
+                                                      or q["name"] in ("ice_resistance", "tow_force")), q["name"]
         for q in (q for q in by_role["diagnostic"] if q["name"] == "moving_ice"):
             assert np.isfinite(run.number(q["summary"]))
         rows = {row["label"]: row for row in report_run.estimates(run)}
