@@ -32,18 +32,6 @@ void *bt_cells_after_contacts(bt_cell *cell, size_t bytes)
     return (char *)cell->contacts + own;
 }
 
-/// Give back the memory beyond the contacts.
-static void rest(bt_cell *cell)
-{
-    const size_t bytes = (size_t)cell->n_contacts * sizeof *cell->contacts;
-    if (cell->contact_bytes - cell->contact_bytes / 8 > bytes) move_contacts(cell, bytes);
-}
-
-void bt_cells_rest(bt_cells *cells)
-{
-    for (bt_idx k = 0; k < cells->n; k++) rest(&cells->cell[k]);
-}
-
 void bt_cells_idle(bt_cell *cell)
 {
     bt_cells_forget_pairs(cell);

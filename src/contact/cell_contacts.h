@@ -51,9 +51,6 @@ void bt_cells_make_room(bt_cell *cell, size_t bytes);
 /// Make room for this many bytes after the contacts, which stay but may move; returns the start of that room.
 void *bt_cells_after_contacts(bt_cell *cell, size_t bytes);
 
-/// Give back the memory beyond the contacts, which must not be packed.
-void bt_cells_rest(bt_cells *cells);
-
 /// Free the contacts, pairs and bounds of a cell whose bodies rest; the records of contact laws stay.
 void bt_cells_idle(bt_cell *cell);
 

@@ -13,7 +13,6 @@
 #include "output/folder.h"
 #include "output/state.h"
 #include "base/table.h"
-#include "solve/solver.h"
 
 #define FRAMES_BY_DEFAULT 200
 
@@ -78,7 +77,6 @@ char *bt_running_identity(const bt_case *input, const bt_field *field, bt_snapsh
 
 bt_status bt_running_save(bt_running *running, bt_snapshot *snap, const char *name, bt_errors *err)
 {
-    bt_solver_rest(running->w);
     if (running->comm->rank == 0) bt_checkpoint_begin(snap, running->o->dir, name, err);
     bt_status status = bt_state_save(running->w, running->comm, snap, err);
     if (running->comm->rank == 0) {

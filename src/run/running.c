@@ -93,7 +93,6 @@ static bt_status record_frame(run *running, bt_errors *err)
 {
     if (!running->record) return BT_OK;
     running->framed = running->w->step;
-    bt_solver_rest(running->w);
     bt_frame_row *rows;
     bt_piece_row *pieces;
     int64_t n_pieces;

@@ -40,7 +40,7 @@ void bt_rounds_scale(bt_problem *problem, const bt_cells *t)
 
 // --- residual passes -------------------------------------------------------------------------------------------------
 
-void bt_rounds_rest(bt_solver *solver)
+void bt_rounds_free_lists(bt_solver *solver)
 {
     for (bt_idx k = 0; k < solver->n_work; k++) {
         free(solver->work[k].list);
@@ -54,7 +54,7 @@ void bt_rounds_begin(bt_world *world)
     bt_cells *cells = world->cells;
     bt_solver *solver = world->solver;
     if (cells->cell[0].work) return;
-    bt_rounds_rest(solver);
+    bt_rounds_free_lists(solver);
     free(solver->work);
     solver->work = bt_alloc((size_t)cells->n, sizeof *solver->work);
     solver->n_work = cells->n;

@@ -178,8 +178,8 @@ typedef struct bt_work_list {
 /// Make the work lists of the cells after new labels, all empty.
 void bt_rounds_begin(bt_world *world);
 
-/// Free memory that the next step allocates anew.
-void bt_rounds_rest(struct bt_solver *solver);
+/// Free the work lists of all cells.
+void bt_rounds_free_lists(struct bt_solver *solver);
 
 /// Give a cell an empty list with room for all its contacts; a residual pass calls this first.
 void bt_rounds_list(bt_cell *cell);

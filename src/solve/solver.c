@@ -82,10 +82,6 @@ bool bt_restitution_lower(bt_world *world)
 
 // --- a step ----------------------------------------------------------------------------------------------------------
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
 #define UPDATES 6.0 // updates of every contact that one of max_sweeps allows
 
 bt_solver *bt_solver_create(void)
@@ -95,33 +91,15 @@ bt_solver *bt_solver_create(void)
     return solver;
 }
 
-static void give_back(bt_solver *solver)
-{
-    bt_rounds_rest(solver);
-    free(solver->before);
-    free(solver->shift);
-    solver->before = solver->shift = NULL;
-    solver->cap_before = solver->cap_bodies = 0;
-}
-
 void bt_solver_free(bt_solver *solver)
 {
     if (!solver) return;
     bt_islands_free(solver->islands);
-    give_back(solver);
+    bt_rounds_free_lists(solver);
     free(solver->work);
+    free(solver->before);
+    free(solver->shift);
     free(solver);
-}
-
-void bt_solver_rest(bt_world *world)
-{
-    give_back(world->solver);
-    bt_cells_rest(world->cells);
-#ifdef __GLIBC__
-    // Free chunks of some kilobytes between chunks in use are too small for arrays of all floes, and would stay
-    // allocated.
-    malloc_trim(0);
-#endif
 }
 
 /// The tow line when the cell is the last one, on the rank that owns the large bodies; otherwise NULL.

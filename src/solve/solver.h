@@ -95,9 +95,6 @@ void bt_solver_begin_cell(bt_world *world, bt_cell *cell);
 /// velocities from the problem.
 bt_visit bt_solver_residual_of_cell, bt_solver_sweep_cell;
 
-/// Free memory that the next step allocates anew, to make room for output between steps.
-void bt_solver_rest(bt_world *world);
-
 /// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
 /// same rows without friction; they move poses and never touch velocities.
 void bt_solver_project(bt_world *world);
