@@ -31,6 +31,11 @@
 #define ROUNDED 5                // in UNITs: less than two per body from rounding the turn, and all other rounding
 #define AROUND 50                // ties around the best within which separations are exact: they bound leads
 
+// Bodies that are apart by less than this share of a tie touch. Where corners coincide to rounding, as on the two sides
+// of a crack, their nearest features are an accident of rounding: it may be an edge whose line passes through the other
+// body. The edge that separates them most gives the normal then.
+#define TOUCHING 1e-6
+
 typedef struct {
     const double *v;     ///< outline, relative to the centroid
     const double *per_length; ///< of the edges
@@ -359,7 +364,7 @@ static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margi
     const bounds most = bounds_of(world, margin);
     clip_points(&shape[ref], &side[ref], NULL, &shape[!ref], facing_edge(&shape[!ref], &side[ref], side[!ref].i), ref,
                 d, most, manifold);
-    if (!(sep > 0)) {
+    if (!(sep > TOUCHING * tie)) {
         if (manifold->n_points == 0) deepest_point(&shape[ref], &side[ref], &shape[!ref], ref, d, manifold);
         return true;
     }
@@ -558,7 +563,7 @@ static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint1
     const edge side[2] = {best_that_counts(&p[0], &p[1]), best_that_counts(&p[1], &p[0])};
     const bool ref = reference_is_b(&side[0], &side[1], tie, reference_before);
     const double sep = side[ref].s;
-    if (best > 0) {
+    if (best > TOUCHING * tie) {
         if (sep > 0 && sep >= best - tie) {
             clip_what_counts(&p[ref], &side[ref], &p[!ref], ref, d, most, manifold);
             if (manifold->n_points > 0 && bt_min(manifold->p[0].gap, manifold->p[manifold->n_points - 1].gap) <=

@@ -176,6 +176,39 @@ TEST(gaps_are_distances_of_outlines)
     if (lost > in / 100) fail_msg("%d of %d overlaps were not seen", lost, in);
 }
 
+/// Two outlines that meet at a corner, to rounding, as those on the two sides of a crack: neither is inside the other.
+TEST(corners_that_meet_are_not_deep)
+{
+    uint64_t rng = 11;
+    int met = 0;
+    for (int k = 0; k < 20000; k++) {
+        bt_params p = params_of_world(0.1);
+        bt_world *w = bt_world_create(&p);
+        double v[2 * BT_MAX_VERTICES], q[2 * BT_MAX_VERTICES], nx = 0, ny = 0;
+        add_outline(w, random_star(&rng, 1, v), v, 0, 0, 7 * scene_uniform(&rng), 0, 0);
+        const int m = k % 2 ? random_star(&rng, 1, q) : scene_random_polygon(&rng, 0.5, q);
+        add_outline(w, m, q, 0, 0, 7 * scene_uniform(&rng), 0, 0);
+        int n0 = outline_at(w, 0, 0, 0, v), n1 = outline_at(w, 1, 0, 0, q);
+        const int i = (int)(n0 * scene_uniform(&rng)), j = (int)(n1 * scene_uniform(&rng));
+        w->bodies.pose[1].x = v[2 * i] - q[2 * j], w->bodies.pose[1].y = v[2 * i + 1] - q[2 * j + 1];
+        n1 = outline_at(w, 1, w->bodies.pose[1].x, w->bodies.pose[1].y, q);
+        if (distance_of(n0, v, n1, q, &nx, &ny) > 0 && depth_of(n0, v, n1, q) < 1e-12 &&
+            depth_of(n1, q, n0, v) < 1e-12) {
+            const double tie = 0.01 * bt_min(w->bodies.radius[0], w->bodies.radius[1]);
+            const bt_pose at = w->bodies.pose[1];
+            met++;
+            for (int l = 0; l < 20; l++) { // rounding decides which features are nearest
+                w->bodies.pose[1].x = at.x + 1e-15 * (scene_uniform(&rng) - 0.5);
+                w->bodies.pose[1].y = at.y + 1e-15 * (scene_uniform(&rng) - 0.5);
+                const double gap = least_gap(w, 0.05, &nx, &ny);
+                if (gap < -tie) fail_msg("pair %d: depth %g", k, -gap);
+            }
+        }
+        bt_world_free(w);
+    }
+    assert_true(met > 1000);
+}
+
 TEST(detect_equals_brute_force_with_parts)
 {
     uint64_t rng = 9;
