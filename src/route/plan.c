@@ -519,7 +519,8 @@ static bt_lattice *lattice_of(bt_planner *planner)
     bt_arrivals arrivals = {.time = first_guess(planner)};
     double x = 0, y = 0, far = arrivals.time * task->speed[0];
     for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice on arrival at the fastest speed
-        way_goal(planner, next_arrival(&arrivals, far / task->speed[0], ARRIVALS), task->start[0], task->start[1], goal);
+        const double time = next_arrival(&arrivals, far / task->speed[0], ARRIVALS);
+        way_goal(planner, time, task->start[0], task->start[1], goal);
         x = goal[0] - task->start[0], y = goal[1] - task->start[1], far = bt_hypot(x, y);
     }
     if (!isnan(task->start_heading)) bt_sincos(task->start_heading, &ay, &ax);
