@@ -74,20 +74,37 @@ static void way_goal(const bt_planner *planner, double t, double x, double y, do
 typedef struct {
     int n;
     double time, change; ///< the last ones, s
+    double late;         ///< of the time before the last one, s: by how much the arrival was later
     bool nearing;        ///< the changes decrease
 } bt_arrivals;
 
 /// The time for which to move the goal next, from that of arrival at the last one: the same; but after `plain` steps
-/// every third one is Aitken's extrapolation, since a plain step gains only a factor drift / speed.
+/// every third one is Aitken's extrapolation, since a plain step gains only a factor drift / speed. Where the goal
+/// comes to meet the tow faster than that moves, plain steps swing ever wider about the arrival: then it is the secant.
 static double next_arrival(bt_arrivals *a, double time, int plain)
 {
     const double change = time - a->time;
     a->nearing = fabs(change) < fabs(a->change);
     if (++a->n > plain && a->n % 3 == 0 && a->nearing && change * a->change > 0)
         time += change * change / (a->change - change);
+    else if (!a->nearing && change * a->late < 0) time = a->time - change * a->change / (change - a->late);
+    a->late = change;
     a->change = time - a->time;
     a->time = time;
     return time;
+}
+
+/// First guess of an arrival, s: where the ice drifts faster than the tow moves, of the straight line, from
+/// |d − u t| = v t; otherwise 0.
+static double first_guess(const bt_planner *planner)
+{
+    const bt_route_task *task = &planner->task;
+    const double *u = task->drift, v = task->speed[0], faster = u[0] * u[0] + u[1] * u[1] - v * v;
+    double goal[2];
+    way_goal(planner, 0, task->start[0], task->start[1], goal);
+    const double x = goal[0] - task->start[0], y = goal[1] - task->start[1], along = x * u[0] + y * u[1];
+    const double root = along * along - faster * (x * x + y * y);
+    return faster > 0 && along > 0 && root >= 0 ? (x * x + y * y) / (along + sqrt(root)) : 0;
 }
 
 /// Put the end of a way where the goal is at the time of arrival.
@@ -101,7 +118,8 @@ static void end_at_goal(const bt_planner *planner, bt_way *way)
         const double was[2] = {end[0], end[1]};
         way_goal(planner, next_arrival(&arrivals, way->cost.time, PLAIN), was[0], was[1], end);
         way_price(planner, way);
-        if (k >= PLAIN && !arrivals.nearing) return;
+        const bool lost = k > 2 && way->cost.faults & BT_ROUTE_OUTSIDE; // it grows by a factor with every step
+        if ((k >= PLAIN || lost) && !arrivals.nearing) return;
         if ((u[0] == 0 && u[1] == 0) || bt_hypot(end[0] - was[0], end[1] - was[1]) < fine) return;
     }
 }
@@ -385,7 +403,7 @@ static bool into_route(const bt_planner *planner, const bt_lattice_way *way, boo
     if (direct && isnan(task->start_heading)) {
         straight.point = bt_alloc((size_t)(straight.cap = 16), sizeof *straight.point);
         straight.n = 1;
-        way_goal(planner, 0, task->start[0], task->start[1], straight.point[0]);
+        way_goal(planner, first_guess(planner), task->start[0], task->start[1], straight.point[0]);
         way_price(planner, &straight);
         way_shorten(planner, &straight);
         if (bt_swath_better(&straight.cost, &w.cost)) way_copy(&w, &straight);
@@ -406,7 +424,7 @@ static int through(const bt_planner *planner, int n, const double (*corner)[2], 
 {
     const bt_route_task *task = &planner->task;
     enum { PLAIN = 200, STEPS = 260 };
-    bt_arrivals arrivals = {0};
+    bt_arrivals arrivals = {.time = first_guess(planner)};
     bt_way way = {.point = bt_alloc((size_t)n + 1, sizeof *way.point), .n = n + 1, .cap = n + 1};
     if (n) memcpy(way.point, corner, (size_t)n * sizeof *corner);
     const double *from = n ? corner[n - 1] : task->start;
@@ -414,7 +432,7 @@ static int through(const bt_planner *planner, int n, const double (*corner)[2], 
     const double wide = task->extent[2] - task->extent[0] + task->extent[3] - task->extent[1];
     const bool still = task->drift[0] == 0 && task->drift[1] == 0;
     bool there = false;
-    way_goal(planner, 0, from[0], from[1], end);
+    way_goal(planner, arrivals.time, from[0], from[1], end);
     for (int k = 0; k < STEPS && !there; k++) {
         way_price(planner, &way);
         if (way.cost.faults & BT_ROUTE_TURNS) { // they may fit where the goal is on arrival
@@ -498,9 +516,11 @@ static bt_lattice *lattice_of(bt_planner *planner)
     const bt_route_task *task = &planner->task;
     const double area = (task->extent[2] - task->extent[0]) * (task->extent[3] - task->extent[1]);
     double goal[2], ax = 1, ay = 0, h = task->spacing, cell = task->cell;
-    double x = 0, y = 0, far = 0;
+    bt_arrivals arrivals = {.time = first_guess(planner)};
+    double x = 0, y = 0, far = arrivals.time * task->speed[0];
     for (int k = 0; k < ARRIVALS; k++) { // where the goal is in the ice on arrival at the fastest speed
-        way_goal(planner, far / task->speed[0], task->start[0], task->start[1], goal);
+        const double time = next_arrival(&arrivals, far / task->speed[0], ARRIVALS);
+        way_goal(planner, time, task->start[0], task->start[1], goal);
         x = goal[0] - task->start[0], y = goal[1] - task->start[1], far = bt_hypot(x, y);
     }
     if (!isnan(task->start_heading)) bt_sincos(task->start_heading, &ay, &ax);

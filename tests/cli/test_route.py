@@ -58,7 +58,7 @@ def test_degrees_are_those_of_the_program(tmp_path):
     case = ROOT / "cases/outlines/outlines.yml"
     call("field", case, "-o", tmp_path / "f.geojson")
     call("field", case, "-o", tmp_path / "f.h5")
-    floes, place = members.Floes.read(tmp_path / "f.h5").outlines(), situation.place_of(Case(case), tmp_path / "f.h5")
+    floes, place = members.Floes.read(tmp_path / "f.h5").outlines(), situation.place_of(Case(case), None)
     for feature, floe in zip(json.loads((tmp_path / "f.geojson").read_text())["features"], floes):
         ring = np.array(feature["geometry"]["coordinates"][0][:-1])
         own = place.degrees(floe)
@@ -103,7 +103,7 @@ def test_a_field_keeps_its_place_unless_the_case_gives_one(tmp_path):
     for ice, wanted in ({}, (20, 76.5)), (own, (30, 70)):
         case = write_case(tmp_path, changed(BASIN, ice={"field": "f.h5"} | ice))
         assert map_of(case)["origin"] == pytest.approx(wanted)
-        assert np.degrees(situation.place_of(Case(case), tmp_path / "f.h5").origin) == pytest.approx(wanted)
+        assert np.degrees(situation.place_of(Case(case), lambda: tmp_path / "f.h5").origin) == pytest.approx(wanted)
 
 
 def map_of(case):
@@ -207,6 +207,15 @@ def test_floes_have_room_across_a_periodic_seam():
     assert members.room(corners[:2], 2, (10, 10)) == pytest.approx([0.5 * np.hypot(0.5, 0.5)] * 2)
     assert members.room([square + [0.6, 9.1], square + [9.1, 0.6]], 2, (10, 10)) == pytest.approx(
         [0.5 * np.hypot(0.5, 0.5)] * 2)
+
+
+def test_the_image_of_a_floe_keeps_clear_of_the_hull():
+    """Red: the floe whose image lies under the hull stays."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    for sides, clear in ("periodic", [False, True, True]), ("wall", [True, True, True]):
+        s = SimpleNamespace(start=(5, 0.6), outline=square, hull=SimpleNamespace(radius=0.8), extent=(0, 0, 10, 10),
+                            values={"body.yaw": 0, "domain.ends": "open", "domain.sides": sides})
+        assert members.clear_of_hull([square + at for at in ([5, 9.9], [5, 5], [9.9, 0.6])], s).tolist() == clear
 
 
 def test_a_map_without_floes_has_members_without_floes():
@@ -339,21 +348,23 @@ def test_each_speed_has_its_own_prediction(tmp_path):
 
 
 def test_every_route_has_every_speed_that_reaches_the_goal(tmp_path):
-    """And those that do not are named. Red: a speed below that of the ice refuses all; a route whose turns do not fit
-    where the goal is without drift is left out without a word."""
+    """And those that do not are named. Red: a speed below that of the ice refuses all; one hardly above it is towed
+    through water beyond the map; a route whose turns do not fit where the goal is without drift is left out without a
+    word."""
     write_case(tmp_path, changed(LINE, domain__length=900, water={"current_x": -0.35}))
-    done = called("route", "case.yml", "--to", "330,0", "--speeds", "0.3,0.6,1.2", "--routes", "1", "--plan-only", "-o",
-                  "out", cwd=tmp_path)
+    done = called("route", "case.yml", "--to", "330,0", "--speeds", "0.3,0.4,0.6,1.2", "--routes", "1", "--plan-only",
+                  "-o", "out", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
     found = json.loads((tmp_path / "out/route.json").read_text())
     assert [(r["kind"], r["speed"]) for r in found["routes"]] == [
         (kind, v) for kind in ("straight", "planned") for v in (0.6, 1.2)]
     assert re.findall("Left out: .*", done.stdout) == [
-        "Left out: 0.300 m/s: the goal drifts away from the ice faster than the body is towed; raise the speed."]
-    left = [{"label": "route 1", "kind": "planned", "speed": 1.2, "reason": "the turns do not fit"},
+        "Left out: 0.300 m/s: the goal drifts away from the ice faster than the body is towed; raise the speed.",
+        "Left out: 0.400 m/s: the way leaves the domain, which moves with the ice; raise the speed."]
+    left = [{"label": "route 1, 1.2 m/s", "kind": "planned", "speed": 1.2, "reason": "the turns do not fit"},
             {"label": "straight line", "kind": "straight", "speed": 0.3, "reason": "another"}]
     assert text_route.unreached({"routes": [{"speed": 1.2}], "unreached": left}) == [
-        "Left out: 0.300 m/s: another.", "Left out: route 1 at 1.20 m/s: the turns do not fit."]
+        "Left out: 0.300 m/s: another.", "Left out: route 1, 1.2 m/s: the turns do not fit."]
     s = read_situation(tmp_path, changed(LINE, ice__concentration=0))
     with pytest.raises(BergtowError, match="^the turns do not fit"):
         planner.route_through(s.ice, s.hull, s.start, (330, 0), [(200, 0), (210, 90)], speed=0.5, radius=200,

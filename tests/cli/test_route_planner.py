@@ -410,6 +410,19 @@ def test_a_goal_that_drifts_hardly_slower_than_the_tow(speed):
     assert plan(NONE, BERG, (50, 0), (290, 0), speeds=(0.344,), **options).status == "goal_drifts_away"
 
 
+@pytest.mark.parametrize("drift, aside", [(0.6, 0), (1.5, 0), (0.8, 0.1)])
+def test_a_goal_that_comes_to_meet_the_tow_faster_than_that_moves(drift, aside):
+    """The straight line meets it at |way - drift t| = speed t. Red: it drifts away."""
+    options = dict(extent=(-900, -400, 1400, 400), drift=(drift, aside), water=(drift, aside), radius=20, routes=1)
+    found = plan(Ice([disc(150, 0, 20)], [2]), BERG, (0, 0), (900, 0), speeds=(0.5,), **options)
+    straight, around = found.routes
+    first = min(np.roots([drift ** 2 + aside ** 2 - 0.25, -2 * 900 * drift, 900 ** 2]).real)
+    assert straight.duration == pytest.approx(first, rel=1e-6)
+    for r in straight, around:
+        np.testing.assert_allclose(r.waypoints[-1], [900 - drift * r.duration, -aside * r.duration], atol=1e-4)
+    assert around.duration < 1.1 * first
+
+
 def test_a_slow_speed_that_arrives_where_the_goal_has_left_the_domain():
     """The faster one finds what it finds alone. Red: the goal lies outside the domain, for both."""
     options = dict(extent=(0, 0, 1000, 600), drift=(-0.5, 0), water=(-0.5, 0), routes=1)

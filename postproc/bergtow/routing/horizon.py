@@ -204,17 +204,19 @@ def follow(a, w, s, goal, weights, factor, runs, files, found, plan):
             left -= w["replan"]
         noted(k, time, new.status, route)
     by_name = {r["name"]: r for r in found["routes"]}
-    straight, some = next(c for c in files.some if c.straight), {}
-    for name, towed in (("horizon", way), ("once", once), ("straight", way_of(straight.route, s))):
-        track = straight.track if name == "straight" else towed.points
-        c = tows.Candidate(name, name, straight.route, h.speed, {}, track)
+    ways, some = {"horizon": (way, way.points), "once": (once, once.points)}, {}
+    ways |= {"straight": (way_of(c.route, s), c.track) for c in files.some if c.straight}
+    for name, (towed, track) in ways.items():
+        c = tows.Candidate(name, name, first.routes[0], h.speed, {}, track)
         found["horizon"]["tows"][name], some[name] = h.whole(f"tow-{name}", towed, c)
         files.write(found)
-    by_name["straight"]["simulated"] = command.means([found["horizon"]["tows"]["straight"]])
+    if "straight" in by_name:
+        by_name["straight"]["simulated"] = command.means([found["horizon"]["tows"]["straight"]])
     c = tows.Candidate("horizon", "with new looks", route or first.routes[0], h.speed, h.keys(
         way, h.duration(way)), way.points, points=way.points[1:])
     output.case(c, files.folder / "route-base.yml", files.folder / "horizon.yml", a.force)
     files.write(found, picture=True)
     told = writing.plain(found)
     print(words.rounds(told))
-    command.page(a, found, [("with new looks", some["horizon"]), ("straight line", some["straight"])], files.folder)
+    command.page(a, found, [(heading, some[name]) for name, heading in (
+        ("horizon", "with new looks"), ("straight", "straight line")) if name in some], files.folder)

@@ -94,18 +94,27 @@ class Floes:
                      self.thickness[kept], self.area[kept], self.attributes)
 
 
+def period_of(situation):
+    """[2] m, of the domain along each axis; 0 along one that does not repeat itself."""
+    repeats = [situation.values[f"domain.{side}"] == "periodic" for side in ("ends", "sides")]
+    return np.where(repeats, np.subtract(situation.extent[2:], situation.extent[:2]), 0.0)
+
+
+def images(period):
+    """Shifts to a floe and its neighbouring images; of each two that are opposite only one, since i moved by a period
+    beside j is j moved back beside i."""
+    return sorted({(a * period[0], b * period[1]) for a, b in ((0, 0), (1, 0), (0, 1), (1, 1), (1, -1))})
+
+
 def room(outlines, most, period=(0.0, 0.0)):
-    """[n] half the distance from each floe to its nearest neighbour, m, at most `most`. period: of the domain along
-    each axis, across which floes are neighbours, too; 0 for none."""
+    """[n] half the distance from each floe to its nearest neighbour, m, at most `most`. period: as of period_of()."""
     out = np.full(len(outlines), float(most))
     if len(outlines) < 2 or not most > 0:
         return out
     centre = np.array([o.mean(axis=0) for o in outlines])
     reach = np.array([apart.radius(o, c) for o, c in zip(outlines, centre)])
     tree = cKDTree(centre)
-    # the opposite images give the same pairs: i moved by a period beside j, or j moved back beside i
-    images = {(a * period[0], b * period[1]) for a, b in ((0, 0), (1, 0), (0, 1), (1, 1), (1, -1))}
-    for image in sorted(images):
+    for image in images(period):
         for i, near in enumerate(tree.query_ball_point(centre + image, reach + reach.max() + 2 * most)):
             for j in near:
                 if (j > i or j != i and any(image)) and np.hypot(*(centre[i] + image - centre[j])) - reach[i] - \
@@ -116,19 +125,16 @@ def room(outlines, most, period=(0.0, 0.0)):
 
 
 def clear_of_hull(outlines, situation, start=None, yaw=None):
-    """[n] of bool: floes that do not lie on the towed body at its start."""
+    """[n] of bool: floes that do not lie on the towed body at its start, nor does any image of them."""
     start = np.array(situation.start if start is None else start)
     yaw = situation.values["body.yaw"] if yaw is None else yaw
     hull = place(situation.outline, (*start, yaw))
     reach = situation.hull.radius
     centres = [o.mean(axis=0) for o in outlines]
-    return np.array([np.hypot(*(centre - start)) > reach + apart.radius(o, centre) or apart.of(o, hull) > 0
+    shifts = {(sign * x, sign * y) for x, y in images(period_of(situation)) for sign in (1, -1)}
+    return np.array([all(np.hypot(*(centre + shift - start)) > reach + apart.radius(o, centre) or
+                         apart.of(o + shift, hull) > 0 for shift in shifts)
                      for o, centre in zip(outlines, centres)], dtype=bool)
-
-
-def _periodic(situation):
-    """[2] of bool: along which axes the domain repeats itself."""
-    return np.array([situation.values[f"domain.{side}"] == "periodic" for side in ("ends", "sides")])
 
 
 def drawn(n, situation, errors, folder):
@@ -140,8 +146,7 @@ def drawn(n, situation, errors, folder):
         raise RunError("water.current_table", "leaves no room for an error of the drift", "set --drift-error 0, or "
                        "give a constant current in water.current_x and current_y", CASE)
     floes = Floes.read(situation.field)
-    period = np.where(_periodic(situation), np.subtract(situation.extent[2:], situation.extent[:2]), 0.0)
-    own = room(floes.outlines(), 4 * errors.position, period) if errors.position else None
+    own = room(floes.outlines(), 4 * errors.position, period_of(situation)) if errors.position else None
     folder.mkdir(parents=True, exist_ok=True)
     return [one(k, floes, own, situation, errors, folder, as_read) for k in range(n)]
 
@@ -168,7 +173,7 @@ def one(k, floes, own, situation, errors, folder, as_read):
     moved = Floes(floes.vertices, floes.offsets, pose, np.clip(floes.thickness * factor, 1e-6, 100), floes.area,
                   floes.attributes)
     at = moved.pose[:, :2]
-    moved.pose[:, :2] = np.where(_periodic(situation), low + (at - low) % (high - low), at)
+    moved.pose[:, :2] = np.where(period_of(situation) > 0, low + (at - low) % (high - low), at)
     kept = np.all((moved.pose[:, :2] >= low) & (moved.pose[:, :2] <= high), axis=1)
     kept &= clear_of_hull(moved.outlines(), situation)
     file = folder / f"m{k + 1:03d}.h5"

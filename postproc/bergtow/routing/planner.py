@@ -25,7 +25,8 @@ OBJECTIVES = ("work", "time", "peak", "length")  # bt_route_objective
 STATUS = ("ok", "fewer_routes", "no_route", "start_outside", "goal_outside", "start_no_go", "goal_no_go",
           "start_too_thick", "goal_too_thick", "goal_drifts_away", "at_goal")  # bt_route_status
 UNREACHED = {"goal_drifts_away": "the goal drifts away from the ice faster than the body is towed; raise the speed",
-             "no_route": "the turns do not fit where the goal then is; give a smaller radius"}
+             "no_route": "the turns do not fit where the goal then is; give a smaller radius",
+             "outside": "the way leaves the domain, which moves with the ice; raise the speed"}
 FAULTS = {1: "no_go", 2: "outside", 4: "force_limit", 8: "turns"}
 MOST_STATES, MOST_CELLS = 20e6, 20e6  # about 1 GB
 Points = Union[np.ndarray, Sequence[Sequence[float]]]

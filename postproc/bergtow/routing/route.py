@@ -47,7 +47,8 @@ STATUS = {
                    "choose a goal in free water, or give less --clearance"),
     "start_outside": ("--from", "the body would reach outside the domain", "start elsewhere, or enlarge the domain"),
     "goal_outside": ("--to", "the goal lies outside the domain, or too close to its edge for the body",
-                     "choose a goal inside it, or enlarge the domain"),
+                     "choose a goal inside it, or enlarge the domain; where ice drifts, the domain moves with it until "
+                     "the tow arrives, and a higher speed helps"),
     "start_too_thick": ("--from", "the ice about the start takes more than --force-limit at every speed",
                         "start elsewhere, or give a lower speed or a higher limit"),
     "goal_too_thick": ("--to", "the ice about the goal takes more than --force-limit at every speed",
@@ -394,7 +395,7 @@ def perform(a):
     case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)
     if a.start:
         values = Case(case)
-        place = situation.place_of(values, situation.floes_of(program, case, values, work))
+        place = situation.place_of(values, lambda: situation.floes_of(program, case, values, work))
         x, y = situation.position(a.start, place, "--from")
         body = {"body.x": f"{x:.12g} m", "body.y": f"{y:.12g} m"}
         case, ramp = situation.own_case(a.case, a.set, body, folder, a.map, a.force)

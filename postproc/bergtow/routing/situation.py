@@ -294,12 +294,15 @@ def floes_of(program, case, values, folder):
 
 
 def place_of(values, file):
-    """The Place of a case, from its own keys, or from the file of its floes if they give none."""
-    with h5py.File(file) as f:
-        found = dict(f["floes"].attrs)
+    """The Place of a case, from its own keys, or from the file of its floes if they give none.
+    file(): its path; called only if it may tell, since the ice is made for it."""
     north_first, keys = values["domain.frame"] == "geographic", (values["ice.origin_lon"], values["ice.origin_lat"])
     if None not in keys:
         return Place(north_first, keys)
+    if not (values["ice.outlines"] or values["ice.field"]):
+        return Place(north_first)
+    with h5py.File(file()) as f:
+        found = dict(f["floes"].attrs)
     if "crs" in found:
         return Place(north_first, (float(found["origin_east"]), float(found["origin_north"])), plain(found["crs"]))
     return Place(north_first, tuple(map(float, np.radians([found["origin_lon"], found["origin_lat"]])))
@@ -312,7 +315,7 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     values = Case(case)
     checked(values)
     field_file = floes_of(program, case, values, folder)
-    place = place_of(values, field_file)
+    place = place_of(values, lambda: field_file)
     areas = [polygon for file in no_go for polygon in no_go_file(file, place)]
     with Simulation(Case(case, reading(values, field_file)), threads=1) as sim:
         body, motion, ice = sim.towed, sim.motions, sim.thicknesses > 0

@@ -181,19 +181,22 @@ def candidate(name, label, route, situation):
 def candidates(routes, speeds, situation, at_speed):
     """(Every route at every speed that brings it to its goal, and also at the speeds of its legs if these differ;
     [{"label", "kind", "speed", "reason"}] of those that do not). at_speed(route, m/s): the route at that speed; raises
-    BergtowError with the reason if there is none."""
+    BergtowError with the reason if there is none. Hardly faster than the drift, a tow has a long way through the ice.
+    Where that leaves the domain, the map knows no ice, and a tow would not be comparable."""
     out, unreached, k = [], [], 0
     for route in routes:
         k += route.kind != "straight"
         name, label = ("straight", "straight line") if route.kind == "straight" else (f"route-{k}", f"route {k}")
-        for speed in speeds:
-            more = (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
+        for speed in (*speeds, *[np.nan] * (len(set(route.legs["speed"].tolist())) > 1)):
+            more = ("-legs", ", speed by legs") if np.isnan(speed) else \
+                (f"-{speed:.4g}", f", {speed:.4g} m/s") if len(speeds) > 1 else ("", "")
             try:
-                out.append(candidate(name + more[0], label + more[1], at_speed(route, speed), situation))
+                towed = route if np.isnan(speed) else at_speed(route, speed)
+                if "outside" in towed.faults:
+                    raise BergtowError(planner.UNREACHED["outside"])
+                out.append(candidate(name + more[0], label + more[1], towed, situation))
             except BergtowError as e:
-                unreached.append({"label": label, "kind": route.kind, "speed": speed, "reason": str(e)})
-        if len(set(route.legs["speed"].tolist())) > 1:
-            out.append(candidate(f"{name}-legs", f"{label}, speed by legs", route, situation))
+                unreached.append({"label": label + more[1], "kind": route.kind, "speed": speed, "reason": str(e)})
     return out, unreached
 
 

@@ -72,7 +72,7 @@ def of(candidates, outcomes, objective):
     n = len(next(iter(outcomes.values())))
     choose, judge = halves(n)
     order = sorted(candidates, key=lambda c: (rank(outcomes[c.name], choose, objective), c.name))
-    lines = [c for c in order if c.straight and not set(c.route.faults) & {"no_go", "outside"}]
+    lines = [c for c in order if c.straight and "no_go" not in c.route.faults]
     others = [c for c in order if not c.straight]
     out = {"members": n, "chose": [i + 1 for i in choose], "judged": [i + 1 for i in judge],
            "order": [c.name for c in order], "straight": lines[0].name if lines else None,

@@ -11,8 +11,8 @@ FAULTS = {"missed": "misses the goal", "no_go_contact": "touches a no-go area",
           "limit_exceeded": "exceeds the force limit", "parted": "parts its line", "slack": "has a slack line",
           "no_load": "has a load without bound in some steps"}
 CHANCE = (1 - LEVEL) / 2
-PLANNED = {"no_go": "crosses a no-go area", "outside": "leaves the domain",
-           "force_limit": "exceeds the force limit by prediction", "turns": "begins with a turn that is too sharp"}
+PLANNED = {"no_go": "crosses a no-go area", "force_limit": "exceeds the force limit by prediction",
+           "turns": "begins with a turn that is too sharp"}
 
 
 def amount(x, unit):
@@ -39,10 +39,10 @@ def unreached(found):
     left, same = found["unreached"], {}
     for r in left:
         same.setdefault(r["speed"], set()).add(r["reason"])
-    whole = {r["speed"] for r in left if r["kind"] == "straight" and len(same[r["speed"]]) == 1
+    whole = {r["speed"] for r in left if r["kind"] == "straight" and r["speed"] and len(same[r["speed"]]) == 1
              and not any(x["speed"] == r["speed"] for x in found["routes"])}
     return [f"Left out: {number(v)} m/s: {min(same[v])}." for v in sorted(whole)] + [
-        f"Left out: {r['label']} at {number(r['speed'])} m/s: {r['reason']}." for r in left if r["speed"] not in whole]
+        f"Left out: {r['label']}: {r['reason']}." for r in left if r["speed"] not in whole]
 
 
 def percent(x):
