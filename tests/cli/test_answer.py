@@ -639,7 +639,8 @@ def held_back_answer(mean, value, interval, ramp=None):
     """The answer about a steady tow with this mean force, value and interval, N, and a vessel of 500 kN."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
     row = {"id": "steady.1", "label": "c", "speed_m_s": 0.5, "concentration": 0.3, "fields": 5, "mean": {"n": mean},
-           "value": {"kind": "return_level", "n": value, "interval_95": interval}, "time_scale_s": 30.0, "start_up": 4e5}
+           "value": {"kind": "return_level", "n": value, "interval_95": interval}, "time_scale_s": 30.0,
+           "start_up": 4e5}
     asked = {"speed_m_s": 0.5, "efficiency": 1.0, "line_factor": None, "line_found": tow().line, "time_scale_s": 30.0,
              "probability": 0.05, "tow_hours": 24.0}
     bend = load_cases.row("course_change", 2.4e5, "largest_of_n", "runs")

@@ -23,7 +23,8 @@ SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coef
            ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
            ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
-           ("s", "height of the body above the water, m"), ("U", "wind from ahead, relative to the body, m/s"),
+           ("s", "height of the body above the water, m"),
+           ("U", "wind from ahead, relative to the body, m/s"),
            ("ρ", "density, kg/m³; of ice with i, of water with w, of air with a"), ("kN, t", "1 t of force is 9.80665 kN"))
 STANDARDS = ("No rule of a standard or of a class society is applied, and none was available: not ISO 19906, not ISO "
              "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
@@ -157,9 +158,9 @@ def check(run, estimates, label=""):
     reporting/run.py; label: of the condition."""
     if run is None:
         return [lines("No member can be read.")]
-    out = [lines(f"By hand, with the numbers of the first field ({label}). All ice in the way of the body is accelerated "
-                 "to its speed once: ice pushed aside needs less force; ice that passes the push on, rubs or rafts needs "
-                 "more.")]
+    out = [lines(f"By hand, with the numbers of the first field ({label}). All ice in the way of the body is "
+                 "accelerated to its speed once: ice pushed aside needs less force; ice that passes the push on, rubs "
+                 "or rafts needs more.")]
     rows = by_hand(run)
     out += [table(["what", "by hand", "force", "mean of the simulation", "simulated / by hand"], rows)] if rows else \
         [lines("Nothing is towed at a known speed.")]

@@ -416,7 +416,8 @@ def context(folder, place=None, given=None, also=()):
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block,
         "marked": report_case.marked(block),
-        "sentence": scrubbed(sentence), "remarks": [scrubbed(text) for text in remarks], "answer": answer(e, s, cases, results, told), "tables": tables,
+        "sentence": scrubbed(sentence), "remarks": [scrubbed(text) for text in remarks],
+        "answer": answer(e, s, cases, results, told), "tables": tables,
         "operation": document.operation(s, cases, values, told), "check": checked, "evidence": document.evidence(),
         "sources": document.sources(values, estimates),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),

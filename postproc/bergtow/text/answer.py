@@ -338,8 +338,9 @@ def remarks(answer):
         out.append(f"the free-running speed of the vessel is assumed, {speed(v['free_speed_m_s'])}")
     if own := v["own_resistance"]:
         more = " to ".join(f"{math.ceil(n / TONNE)} t" for n in v["needed_with_ice_n"] if known(n))
-        out.append(f"the bollard pull leaves out the resistance of the vessel itself in this ice, {kn(own['low_n'])} to "
-                   f"{kn(own['high_n'])} kN, an order of magnitude ({own['source']})" + (f"; with it {more}" if more else ""))
+        out.append("the bollard pull leaves out the resistance of the vessel itself in this ice, "
+                   f"{kn(own['low_n'])} to {kn(own['high_n'])} kN, an order of magnitude ({own['source']})"
+                   + (f"; with it {more}" if more else ""))
     if answer["line"]["factor"] is None:
         out.append("the line has no safety factor: name one with --line-factor")
     return out
