@@ -220,7 +220,7 @@ def test_levels_have_the_digits_that_they_are_worth():
     some = (99.96, 1642.0, 0.09996, 1.5e7, None)
     assert [text_table.number(v) for v in some] == ["100", "1640", "0.100", "1.5e+07", "–"]
     assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1640", "100 to 10000")
-    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("616", "500 to 8800")
+    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("616", "470 to 8770")
     assert text_table.level(681.4e3, (667.2e3, 709.4e3), 1e3) == ("681", "667 to 709")
     assert text_table.level(1642.0, (87.44, np.inf), 1e3) == ("1.64", "0.1 to no bound")
     assert text_table.level(1642.0, (np.nan, np.nan), 1e3) == ("1.64", "–")
