@@ -25,7 +25,8 @@ SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coef
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("s", "height of the body above the water, m"),
            ("U", "wind from ahead, relative to the body, m/s"),
-           ("ρ", "density, kg/m³; of ice with i, of water with w, of air with a"), ("kN, t", "1 t of force is 9.80665 kN"))
+           ("ρ", "density, kg/m³; of ice with i, of water with w, of air with a"),
+           ("kN, t", "1 t of force is 9.80665 kN"))
 STANDARDS = ("No rule of a standard or of a class society is applied, and none was available: not ISO 19906, not ISO "
              "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
              "the user named that factor and any efficiencies of the vessel. Whoever approves the tow chooses the "
