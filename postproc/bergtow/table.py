@@ -9,8 +9,6 @@ import numpy as np
 
 from bergtow.result.at_least import AtLeast
 
-FAR = 10.0  # multiple of a level: an interval end beyond it counts as no bound
-
 
 def counted(n, noun="member"):
     """"1 member", "2 members"."""
@@ -127,12 +125,6 @@ def to_place(value, place):
     return f"{round(value, -place) + 0.0:.{max(0, -place)}f}" if np.isfinite(value) else "no bound"
 
 
-def bound(value, high):
-    """The upper end of the interval of a level. If it exceeds FAR times the level it is no bound, but shows that the
-    sample does not determine the tail, and becomes infinite."""
-    return np.inf if np.isfinite([value, high]).all() and value > 0 and high > FAR * value else high
-
-
 def stated(value, low, high, unit, least=None):
     """(value, interval) in words with their unit, the ends rounded to the place that the interval justifies
     (last_place), "–" for unknown values. A mean has the digits of its interval; a design load (least: the largest
@@ -140,7 +132,6 @@ def stated(value, low, high, unit, least=None):
     if not np.isfinite(value):
         return "–", "–"
     factor, name = scale([value], unit)
-    high = bound(value, high) if least is not None else high
     place = None if np.isnan([low, high]).any() else last_place(value / factor, low / factor, high / factor)
     if least is not None:
         said = quantity(designed(value, least), unit)
@@ -154,7 +145,7 @@ def stated(value, low, high, unit, least=None):
 def level(value, ends, factor=1.0):
     """A level, to three digits, and its interval, to the digits that it justifies; a lower end above zero that would
     be left without any, to two of its own."""
-    low, high = ends[0], bound(value, ends[1])
+    low, high = ends
     place = last_place(value / factor, low / factor, high / factor)
     if place is None or np.isnan([low, high]).any():
         return number(value / factor), pair((low, high), factor)

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Shared by the checks of a case and of a study: refusals, warnings, and the ice with which a run would begin.
-//
-// Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full
-// scale) and much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
 #include <math.h>
 
 #include "app/cmd_check.h"
@@ -63,18 +60,12 @@ static bt_check_ice ice_of(const bt_case *input, const bt_field *field)
     return ice;
 }
 
-bt_check_step bt_check_step_of(const bt_case *input, const bt_check_ice *ice)
+bt_time_step bt_check_step(const bt_case *input, const bt_check_ice *ice)
 {
-    bt_check_step step = {.longest = input->domain.frame == BT_FRAME_BASIN ? 0.1 : 5,
-                          .pieces = input->lead.mode == BT_LEAD_MANAGED && input->lead.floe_size < ice->size};
-    step.size = step.pieces ? input->lead.floe_size : ice->size;
     bt_track track = ice->count < 1 ? (bt_track){0}
                                     : bt_setup_track(input, ice->size, ice->thickness, ice->concentration);
-    step.speed = bt_max(bt_case_reference_speed(input), bt_track_speed(&track) * (1 - 1e-9)); // rounding
+    const bt_time_step step = bt_time_step_of(input, ice->count, ice->size, &track);
     bt_setup_track_free(&track);
-    step.passed = ice->count < 1 ? 0 : input->run.dt * step.speed / step.size;
-    step.contact = input->run.dt <= step.longest;
-    step.floes = step.passed <= 0.1;
     return step;
 }
 
@@ -118,16 +109,8 @@ bt_status bt_check_ready(const bt_case *input, const bt_comm *comm, bt_field *fi
 
 static void warn_of_step(const bt_case *input, const bt_check_ice *ice, bt_errors *warnings)
 {
-    const bt_check_step step = bt_check_step_of(input, ice);
-    if (!step.contact)
-        bt_warn(warnings, BT_WARN_LONG_STEP,
-                      "run.dt: %g s is longer than a collision lasts %s; use at most %g s",
-                      input->run.dt,
-                      input->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", step.longest);
-    if (!step.floes)
-        bt_warn(warnings, BT_WARN_FAST_FLOES,
-            "run.dt: in %g s %s move %.3g of their size, more than 0.1; use at most %.3g s",
-            input->run.dt, step.pieces ? "pieces of the lead" : "floes", step.passed, 0.1 * step.size / step.speed);
+    const bt_time_step step = bt_check_step(input, ice);
+    bt_time_step_warn(input, &step, warnings);
     const double reference = bt_case_reference_speed(input);
     if (ice->count >= 1 && step.speed > SLOW * reference)
         bt_warn(warnings, BT_WARN_LOW_REFERENCE_SPEED,

@@ -385,7 +385,7 @@ static void steps(sink *to, const bt_checked *c)
     const bt_case *input = c->input;
     const bool any = c->ice->count >= 1;
     const double speed = bt_case_reference_speed(input), dt = input->run.dt;
-    const bt_check_step step = bt_check_step_of(input, c->ice);
+    const bt_time_step step = bt_check_step(input, c->ice);
     number(to, "run.n_steps", "steps", "%.0f", (double)bt_case_steps(input));
     number(to, "run.dt_s", NULL, " of %g s", dt);
     // whole steps may take longer than the case asks

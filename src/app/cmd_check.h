@@ -6,6 +6,7 @@
 #include "app/cmd.h"
 #include "bergtow/case.h"
 #include "bergtow/field.h"
+#include "case/time_step.h"
 #include "field/lead.h"
 
 typedef struct bt_check_ice {
@@ -14,15 +15,6 @@ typedef struct bt_check_ice {
     double split, parts; ///< floes that are not convex, and their convex parts
     double made;         ///< floes to be generated
 } bt_check_ice;
-
-/// The time step against the rule in check.c.
-typedef struct bt_check_step {
-    double longest;      ///< longest step that resolves a collision, s
-    double speed;        ///< of the contacts: the reference speed, or the planned one through the ice if that is more
-    double size, passed; ///< of the floes, or of the pieces of a managed lead, m; sizes moved in a step
-    bool pieces;
-    bool contact, floes; ///< is the step short enough for a collision; for the size of the floes
-} bt_check_step;
 
 /// Refuse a case if `run` would refuse it before its first step, in the same words, as far as possible without
 /// generating a field: size against memory and disk, the field that is read, its lead, bodies that overlap or have no
@@ -35,7 +27,7 @@ bt_status bt_check_ready(const bt_case *input, const struct bt_comm *comm, bt_fi
 void bt_check_warn(const bt_case *input, const bt_field *field, const bt_check_ice *ice, bt_errors *warnings);
 /// Verdict on a time step in the printed list.
 static inline const char *bt_check_verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
-bt_check_step bt_check_step_of(const bt_case *input, const bt_check_ice *ice);
+bt_time_step bt_check_step(const bt_case *input, const bt_check_ice *ice);
 /// Loads that split the mean floe, as a square of its area (split/law.h), N.
 typedef struct bt_check_split { double three_point, opening; } bt_check_split;
 bt_check_split bt_check_split_of(const bt_case *input, const bt_check_ice *ice);

@@ -106,7 +106,7 @@ static bt_status check_condition(const bt_study *study, int64_t condition, numbe
     bt_status status = bt_member_case(study, &member, &input, err);
     if (status == BT_OK) status = bt_check_ready(&input, &ranks, &field, &ice, &run, &lead, err);
     if (status == BT_OK) {
-        const bt_check_step step = bt_check_step_of(&input, &ice);
+        const bt_time_step step = bt_check_step(&input, &ice);
         const bt_cost_disk disk = bt_cost_disk_of(&input, run.count, run.corners, ranks.size);
         bt_check_warn(&input, &field, &ice, warnings);
         *sums = (numbers){ice.count,

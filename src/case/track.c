@@ -20,8 +20,10 @@ static double between(const bt_track *track, int64_t i, int64_t j)
 double bt_track_speed(const bt_track *track)
 {
     double most = 0;
-    for (int64_t i = 1; i < track->n; i++)
-        most = bt_max(most, between(track, i - 1, i) / (track->time[i] - track->time[i - 1]));
+    for (int64_t i = 1; i < track->n; i++) {
+        const double speed = between(track, i - 1, i) / (track->time[i] - track->time[i - 1]);
+        if (speed > most) most = speed; // not where it is not known
+    }
     return most;
 }
 

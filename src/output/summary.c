@@ -20,6 +20,7 @@
 #include "case/case_tow.h"
 #include "case/constraints.h"
 #include "case/ice_bounds.h"
+#include "case/time_step.h"
 #include "case/warning.h"
 #include "estimate/packing.h"
 #include "geometry/path.h"
@@ -409,6 +410,10 @@ void bt_summary_make(bt_summary *summary, const bt_history *history, const bt_ca
         n_floes > 0 && totals->n_steps > 0 ? 1e9 * totals->wall_time / ((double)n_floes * (double)totals->n_steps)
                                            : nan;
 
+    const bt_track track = {.n = body ? history->n : 0, .time = history->column[BT_COL_TIME],
+                            .x = history->column[BT_COL_IN_ICE_X], .y = history->column[BT_COL_IN_ICE_Y]};
+    const bt_time_step step = bt_time_step_of(input, (double)n_floes, totals->mean_size, &track);
+    bt_time_step_warn(input, &step, &summary->warnings);
     bt_case_warn_idle(input, &summary->warnings);
     bt_case_warn_tables(input, &summary->warnings);
     bt_case_warn_body(input, &summary->warnings);

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The answer of `bergtow design`: coverage of its intervals, closed forms of its load cases, ranges, remedies, and one
 call on a small case."""
+import html
 import json
 import math
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +23,7 @@ from bergtow.reporting import design
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.result.members import Members
 from bergtow.result.run import Run
+from bergtow.stats import conditions as stat_conditions
 from bergtow.stats import extreme, largest
 from bergtow.stats import load as stat_load
 from bergtow.stats import loads as stat_loads
@@ -472,6 +475,25 @@ def test_the_band_names_the_ranges_that_it_lacks(made):
     assert "without" not in words.WORDS["band"](made["band"], made)
 
 
+def test_what_the_terminal_remarks_is_on_the_page(made):
+    """Red: the assumed free-running speed in the terminal alone, and the tug's own resistance nowhere."""
+    page = (Path(made["case"]).parent / "out/report.html").read_text(encoding="utf-8")
+    said = words.remarks(made)
+    assert any("free-running speed of the vessel is assumed" in text for text in said)
+    assert all(html.escape(text) in page for text in said)
+    own = {"own_resistance": {"low_n": 2e4, "high_n": 9e4, "source": "S"}, "needed_with_ice_n": [2e5, 9e5]}
+    sentence, remarks, _ = report_ensemble.of_answer(made | {"vessel": made["vessel"] | own})
+    assert any("20.0 to 90.0 kN, an order of magnitude (S); with it 21 t to 92 t" in text for text in remarks)
+
+
+def test_the_time_of_a_call_is_in_the_rows_of_its_table(made):
+    """Red: the statistics in the total alone."""
+    cost = made["cost"]
+    assert cost["fields_s"] + cost["statistics_s"] + cost["cases_s"] == pytest.approx(cost["wall_s"])
+    assert {"of it fields", "of it statistics", "of it load cases and ranges"} < {
+        row[0] for row in words.took(made)[0].rows}
+
+
 def test_speeds_of_one_call(made):
     """A tow at another speed goes as far; the vessel of the call holds none of them."""
     slow, fast = made["speeds"]
@@ -531,6 +553,22 @@ def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):
     assert row["value"]["n"] == max(f["peak"].max() for f in fields)
     said = words.warnings({"conditions": [row]})
     assert any("the sample does not know the tail" in text for text in said)
+
+
+@pytest.mark.parametrize("kind, zero", [("normal", -33.0), ("exponential", -80.0)])
+def test_marks_do_not_depend_on_a_constant_part_of_the_load(tmp_path, kind, zero):
+    """A load whose level is close to zero, and the same with a drag of 1 kN. Red: no bound, by a level close to zero;
+    beside the drag no margin above the largest of the one, and a tail of the other that is known well."""
+    def found(add):
+        e = ensemble(tmp_path / f"{add}", lambda rng: add + 10 * getattr(rng, kind)(size=600), n=6)
+        [c] = e.conditions()
+        o = answer.options(time_scale=1.0)
+        s = stat_conditions.condition(e, c, {m: stat_conditions.member(e, m) for m in c.finished}, o)
+        ends = [np.isfinite(level["level_95"]).tolist() for kind in stat_loads.TAILS
+                for level in s["loads"]["tow_force"][kind]["levels"]]
+        tow = s["design"]["tow"]
+        return ends, "value" in tow and report_ensemble.marks(tow), [w["what"] for w in s["design"]["warnings"]]
+    assert found(zero) == found(1000.0)
 
 
 def test_thicknesses_and_winds_beside_those_of_the_case():
@@ -597,14 +635,30 @@ def test_a_lower_bound_is_no_proof_that_a_vessel_can_tow(made):
         {"n": found["n"], "case": found["id"]}, a)
 
 
-def held_back_answer(mean, value, interval):
+def held_back_answer(mean, value, interval, ramp=None):
     """The answer about a steady tow with this mean force, value and interval, N, and a vessel of 500 kN."""
     v = gear.Vessel("tug", 5e5, 7.0, "assumed", np.nan, np.nan)
     row = {"id": "steady.1", "label": "c", "speed_m_s": 0.5, "concentration": 0.3, "fields": 5, "mean": {"n": mean},
-           "value": {"kind": "return_level", "n": value, "interval_95": interval}, "time_scale_s": 30.0}
-    asked = {"speed_m_s": 0.5, "efficiency": 1.0, "line_factor": None, "line_found": tow().line}
+           "value": {"kind": "return_level", "n": value, "interval_95": interval}, "time_scale_s": 30.0,
+           "start_up": 4e5}
+    asked = {"speed_m_s": 0.5, "efficiency": 1.0, "line_factor": None, "line_found": tow().line, "time_scale_s": 30.0,
+             "probability": 0.05, "tow_hours": 24.0}
     bend = load_cases.row("course_change", 2.4e5, "largest_of_n", "runs")
-    return answer.of(asked, None, [row], [bend], None, [], v, tow(water=mean, ice=0.0, value=value), {})
+    return answer.of(asked, None, [row], [bend], ramp, [], v, tow(water=mean, ice=0.0, value=value), {})
+
+
+def test_a_start_with_the_ramp_of_the_case_is_a_load_case_until_another_ramp_holds():
+    """Red: 300 kN as the design value, beside starts that took 400 kN."""
+    ramp = {"s": 600.0, "n": 3e5, "by": "closed_form", "verified": False, "case_s": 60.0, "case_n": 4e5}
+    found = held_back_answer(2.8e5, 3e5, [2.9e5, 3.1e5], ramp)
+    [row] = [c for c in found["load_cases"] if c["id"] == "case.own_start"]
+    assert (found["design"]["row"], found["design"]["n"], row["runs"], row["values"]["ramp_s"]) == (
+        row["id"], 4e5, 5, 60.0)
+    assert found["feasible"]["verdict"] == "open" and "start as the case orders it" in words.written(
+        words.load_cases(found))
+    assert "The largest load simulated is 400 kN" in words.sentence(found)
+    confirmed = held_back_answer(2.8e5, 3e5, [2.9e5, 3.1e5], ramp | {"by": "runs", "verified": True})
+    assert confirmed["design"]["n"] == 3e5
 
 
 def test_a_body_that_the_current_carries_faster_is_not_towed():

@@ -163,12 +163,11 @@ def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
 @pytest.mark.parametrize("value, low, high, words", [
     (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")),
     (123456.0, 20000.0, 1.2e6, ("123 kN", "20 to 1200 kN")),
-    (123456.0, 20000.0, 1.5e6, ("123 kN", "20 to no bound kN")),  # ten times the value away
     (947e3, 924e3, 2200e3, ("947 kN", "920 to 2200 kN")),
     (5.2e6, 4.13e6, np.inf, ("5.20 MN", "4.1 to no bound MN")),
     (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
     (12.0, np.nan, np.nan, ("12.0 N", "–")), (0.0, 0.0, 0.0, ("0 N", "–")),
-    (17.0, 0.0, 3e6, ("17.0 N", "0 to no bound N")), (1049e3, 900e3, 3200e3, ("1050 kN", "900 to 3200 kN")),
+    (17.0, 0.0, np.inf, ("17.0 N", "0 to no bound N")), (1049e3, 900e3, 3200e3, ("1050 kN", "900 to 3200 kN")),
     (1051e3, 1050.5e3, 9000e3, ("1050 kN", "1050 to 9000 kN"))
 ])
 def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
@@ -198,7 +197,7 @@ def test_a_value_is_not_rounded_below_the_largest_simulated(value, largest, word
 ])
 def test_a_value_is_marked_by_its_tail(value, largest, model, beyond, marks):
     d = {"value": value, "interval_95": (value - 17e3, value + 166e3), "largest": largest, "model": model,
-         "beyond_data": beyond}
+         "beyond_data": beyond, "mean": 0.0}
     assert report_ensemble.marks(d) == marks and all(mark in report_ensemble.FOOTNOTES for mark in marks)
 
 
@@ -221,9 +220,9 @@ def test_levels_have_the_digits_that_they_are_worth():
     some = (99.96, 1642.0, 0.09996, 1.5e7, None)
     assert [text_table.number(v) for v in some] == ["100", "1640", "0.100", "1.5e+07", "–"]
     assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1640", "100 to 10000")
-    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("616", "470 to no bound")
+    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("616", "470 to 8770")
     assert text_table.level(681.4e3, (667.2e3, 709.4e3), 1e3) == ("681", "667 to 709")
-    assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.64", "0.1 to no bound")
+    assert text_table.level(1642.0, (87.44, np.inf), 1e3) == ("1.64", "0.1 to no bound")
     assert text_table.level(1642.0, (np.nan, np.nan), 1e3) == ("1.64", "–")
     assert text_table.level(3.0, (-0.04, 5.0), 1.0) == ("3.00", "0.0 to 5.0")  # no minus zero
     assert text_table.level(203e3, (3929.0, np.inf)) == ("2.03e+05", "3900 to no bound")  # red: from 0

@@ -8,6 +8,7 @@ import pytest
 from harness import ROOT, TOW, changed, run
 
 from bergtow.reporting import document
+from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import run as report_run
 from bergtow.result import origins
 from bergtow.result.run import Run
@@ -47,9 +48,10 @@ def test_the_load_that_a_limit_is_held_against(load, expected):
 
 def test_without_a_vessel_no_limit_is_made_up():
     rule, found = rows([(None, UNKNOWN)])
-    assert "No vessel is named" in rule
+    assert "No vessel is named" in rule and found["concentration of the ice"][0] == "varied, 50 to 90 %"
+    assert found.pop("concentration of the ice")[1] == "no vessel to hold it against"
     assert {limit for _, limit in found.values()} == {"not looked for"}
-    assert found["concentration of the ice"][0] == "varied, 50 to 90 %" and found["wind"][0] == "-10 m/s and 0 m/s"
+    assert found["wind"][0] == "-10 m/s and 0 m/s"
     assert found["thickness of the ice"][0] == "–"
 
 
@@ -87,13 +89,26 @@ def test_limits_of_what_was_varied():
     assert found["wind"] == "not looked for"
 
 
+def test_a_speed_that_was_varied_was_looked_at():
+    """Red: "not looked for"."""
+    answer = {"speeds": [{"speed_m_s": v, "has_n": 8e5, "feasible": f} for v, f in ((0.4, "yes"), (0.6, "held_back"))]}
+    assert rows([], answer)[1]["speed of the tow"][1] == \
+        "can the vessel named hold the steady tow? 0.400 m/s: yes, 0.600 m/s: held back"
+    some = {"conditions": [condition(name, largest=n) | {"values": {"tow.speed": v}}
+                           for name, n, v in (("slow", 3e5, 0.4), ("fast", 9e5, 0.6))]}
+    for pull, said in ((8e5, ": slow; above"), (np.nan, "no vessel to hold it against")):
+        _, table = document.operation(some, [(None, SimpleNamespace(bollard_pull=pull))], VALUES, None)
+        assert said in next(row[2] for row in table["rows"] if row[0] == "speed of the tow")
+
+
 def test_the_check_by_hand_is_that_of_the_numbers_it_names(tmp_path):
     """Each formula, with its numbers as they stand there, gives the force beside it; open water is the simulation's."""
-    r = run(tmp_path, changed(TOW, output=None, run__duration=20, output__window_start=10, ice__concentration=0.3))
-    with Run(r.dir) as opened:
+    case = changed(TOW, output=None, run__duration=20, output__window_start=10, ice__concentration=0.3)
+    with Run(run(tmp_path, case).dir) as opened:
         found, estimates = document.by_hand(opened), report_run.estimates(opened)
         drag, ice, both = found
-        blocks = document.check(opened, estimates)
+        blocks = document.check(opened, estimates, "60 %")
+    assert "first field (60 %)" in blocks[0]["lines"][0]
     for what, words, force, simulated, ratio in (drag, ice):
         product = eval(re.sub(r" (kg/m³|m/s|m)", "", words.partition(" = ")[2]).replace("½", "0.5").replace(
             "×", "*").replace("²", "**2"))
@@ -104,6 +119,24 @@ def test_the_check_by_hand_is_that_of_the_numbers_it_names(tmp_path):
     n = [float(row[2].split()[0]) for row in found]
     assert n[0] + n[1] == pytest.approx(n[2], rel=0.01)
     assert [row[0] for row in blocks[-1]["rows"]] == [e["label"] for e in estimates]
+
+
+def test_the_drag_of_the_wind_is_not_compared_with_that_of_the_water(tmp_path):
+    """Red: drag of the water by hand, with the wind in the simulated one."""
+    case = changed(TOW, output=None, run__duration=20, output__window_start=10, ice__concentration=0.3, air__wind_x=-9)
+    with Run(run(tmp_path, case).dir) as opened:
+        water, wind, drag, _, both = document.by_hand(opened)
+    assert (water[3], water[4], wind[4]) == ("–", "–", "–") and 0.97 < float(drag[4]) < 1.03
+    n = [float(row[2].split()[0]) for row in (water, wind, drag)]
+    assert n[0] + n[1] == pytest.approx(n[2], rel=0.01) and n[1] > 0.2 * n[0]
+
+
+def test_the_check_is_of_the_condition_that_was_asked_for():
+    """Red: the largest load of all, at a speed beside that of the case."""
+    s = {"conditions": [condition("a", largest=1e5), condition("b", largest=2e5), condition("c", largest=9e5)]}
+    told = {"conditions": [{"id": f"steady.{k + 1}"} for k in range(3)],
+            "load_cases": [{"id": "case.start"}, {"id": "case.steady", "of": "steady.2"}]}
+    assert report_ensemble.governs(s, told)["label"] == "b" and report_ensemble.governs(s, None)["label"] == "c"
 
 
 def test_the_evidence_is_what_the_validation_says():

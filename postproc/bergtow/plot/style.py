@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 from bergtow import table as text_table
 from bergtow.result.origins import source_of_ice
+from bergtow.result.run import SLOWER
 
 import matplotlib
 import numpy as np
@@ -63,8 +64,8 @@ FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#eaf3f8", "#e8bfd9", "#
 #: floes by thickness: thin ice is grey-blue, thick ice is white, as seen from an aircraft
 THICKNESS_MAP = LinearSegmentedColormap.from_list("thickness", ["#5d8fb5", "#9cc3dc", "#d3e6f1", "#fbfdfe"])
 
-#: words for the tow by its mode; a relative difference of speed made good from ordered speed too small to mention
-TOWED_BY, SLOWER = {"line": " on a line", "thrust": " by a vessel"}, 0.05
+#: words for the tow by its mode
+TOWED_BY = {"line": " on a line", "thrust": " by a vessel"}
 
 DPI = 150
 MANY = 20000  #: samples, or floe vertices, above which a vector drawing embeds them as an image

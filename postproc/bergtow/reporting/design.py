@@ -345,7 +345,8 @@ def answer_of(work, a, plan, began):
              "line_factor": a.line_factor, "efficiency": a.efficiency, "budget_min": a.budget,
              "time_scale_s": answer.stat_loads.TIME_SCALE, "probability": answer.stat_loads.PROBABILITY,
              "tow_hours": answer.stat_loads.TOW_HOURS, "line_found": line}
-    cost = {"wall_s": now - began, "fields_s": spent - began, "cases_s": now - before, "case_runs": count}
+    cost = {"wall_s": now - began, "fields_s": spent - began, "statistics_s": before - spent, "cases_s": now - before,
+            "case_runs": count}
     found = writing.plain(answer.of(asked, plan, rows, cases, ramp, ranges, vessel, t, cost, title=e.title,
                                     case=str(a.file), report="report.html"))
     writing.write_json(found, a.output / "answer.json", a.force)

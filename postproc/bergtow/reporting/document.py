@@ -5,6 +5,7 @@ import numpy as np
 
 from bergtow.result import answers
 from bergtow.result.origins import short as in_short
+from bergtow.result.run import within
 from bergtow.table import number, quantity
 from bergtow.text import loads as loads_text
 
@@ -22,7 +23,10 @@ SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coef
            ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
            ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
-           ("ρ", "density, kg/m³; of ice with i, of water with w"), ("kN, t", "1 t of force is 9.80665 kN"))
+           ("s", "height of the body above the water, m"),
+           ("U", "wind from ahead, relative to the body, m/s"),
+           ("ρ", "density, kg/m³; of ice with i, of water with w, of air with a"),
+           ("kN, t", "1 t of force is 9.80665 kN"))
 STANDARDS = ("No rule of a standard or of a class society is applied, and none was available: not ISO 19906, not ISO "
              "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
              "the user named that factor and any efficiencies of the vessel. Whoever approves the tow chooses the "
@@ -74,6 +78,14 @@ def held(s, pull, what):
     return "; ".join(f"{where}: {loads_text.several(names)}" for where, names in places.items() if names)
 
 
+def at_speeds(answer):
+    """In words, at which speed the vessel of an answer holds the tow; "" if none was looked at."""
+    if most := (answer.get("feasible") or {}).get("not_above_m_s"):
+        return f"not above {number(most)} m/s with the vessel named"
+    some = ", ".join(f"{number(s['speed_m_s'])} m/s: {s['feasible'].replace('_', ' ')}" for s in answer["speeds"])
+    return f"can the vessel named hold the steady tow? {some}" if some else ""
+
+
 def operation(s, cases, values, answer):
     """Blocks of the operational limits."""
     text = {v.key: in_short(v.value) for v in values}
@@ -81,17 +93,17 @@ def operation(s, cases, values, answer):
     head_sea = next((c for c in (answer or {}).get("load_cases", []) if c["id"] == "case.head_sea"), None)
     for name, keys in LIMITING:
         said = " and ".join(text[k] for k in keys if k in text) or "–"
-        limit = "not looked for"
-        looked_at = keys[0] == "ice.concentration" or keys[0] != "tow.speed" and any(
+        looked_at = keys[0] == "ice.concentration" or any(
             len({c["values"].get(k) for c in s["conditions"]}) > 1 for k in keys)
-        if looked_at and np.isfinite(pull):
+        limit = "no vessel to hold it against" if looked_at and not np.isfinite(pull) else "not looked for"
+        if keys[0] == "tow.speed" and answer and np.isfinite(pull):
+            limit = at_speeds(answer) or limit
+        elif looked_at and np.isfinite(pull):
             limit = held(s, pull, what) or limit
         elif keys[0] == "air.wind_x" and head_sea and head_sea["n"]:
             air, water = (number(head_sea["values"][k]) for k in ("wind_m_s", "current_m_s"))
             limit = (f"at {air} m/s with {water} m/s of current from ahead the tow needs "
                      f"{quantity(head_sea['n'], 'N')}")
-        elif keys[0] == "tow.speed" and answer and (most := (answer.get("feasible") or {}).get("not_above_m_s")):
-            limit = f"not above {number(most)} m/s with the vessel named"
         rows.append([name, said, limit])
     rule = ("Nothing is known outside the simulated conditions. Where ice is denser, thicker or of larger floes, wind "
             "or current stronger, or the tow faster than in this table, the tow stops, or the load is computed anew.")
@@ -106,36 +118,50 @@ def _row(what, by_hand, n, simulated):
             number(simulated / n, 2) if n and np.isfinite(simulated) else "–"]
 
 
+def wind_ahead(run):
+    """Mean wind from ahead that the body meets in the window, m/s, along the first leg of the tow; 0 in still air."""
+    there = within(run["time"], *run.window)
+    wind = np.array([run[f"wind_{k}"][there].mean() for k in "xy"])
+    return float(run.speed_made_good - run.headings[0] @ wind) if wind.any() else 0.0
+
+
 def by_hand(run):
-    """Rows of a hand calculation with the numbers of one run: water drag, momentum of the ice that the body meets, and
-    their sum."""
+    """Rows of a hand calculation with the numbers of one run: drag of water and wind, momentum of the ice that the
+    body meets, and their sums."""
     e = run.summary.get("estimates") or {}
     width, speed = (e.get(k) if e.get(k) is not None else np.nan for k in ("width_m", "water_speed_m_s"))
     draft, form, water = (run.value(k) for k in ("body.draft", "body.drag.water_form", "water.density"))
     thick, concentration, ice = e.get("thickness_m", np.nan), e.get("concentration", np.nan), run.value("ice.density")
     if not np.isfinite([width, speed, draft, form, water]).all():
         return []
-    drag = 0.5 * water * form * width * draft * speed ** 2
+    drag, simulated = 0.5 * water * form * width * draft * speed ** 2, run.number("mean_drag_force_n")
+    wind = wind_ahead(run)
     out = [_row("drag of the water", f"½ ρw C W d V² = ½ × {number(water, 4)} kg/m³ × {number(form)} × "
-                f"{number(width)} m × {number(draft)} m × ({number(speed)} m/s)²", drag,
-                run.number("mean_drag_force_n"))]
+                f"{number(width)} m × {number(draft)} m × ({number(speed)} m/s)²", drag, np.nan if wind else simulated)]
+    if wind:
+        air, form, sail = (run.value(k) for k in ("air.density", "body.drag.air_form", "body.sail"))
+        blown = 0.5 * air * form * width * sail * wind * abs(wind)
+        out += [_row("drag of the wind", f"½ ρa C W s U² = ½ × {number(air)} kg/m³ × {number(form)} × "
+                     f"{number(width)} m × {number(sail)} m × ({number(wind)} m/s)²", blown, np.nan),
+                _row("drag of water and wind", "sum", drag + blown, simulated)]
+        drag += blown
     if np.isfinite([thick, concentration, ice]).all():
         push = ice * thick * concentration * width * speed ** 2
         out += [_row("ice brought to the speed of the body", f"ρi h A W V² = {number(ice, 4)} kg/m³ × "
                      f"{number(thick)} m × {number(concentration)} × {number(width)} m × ({number(speed)} m/s)²", push,
                      run.number("mean_ice_resistance_n")),
-                _row("both", "sum", drag + push, run.number("mean_tow_force_n"))]
+                _row("drag and ice", "sum", drag + push, run.number("mean_tow_force_n"))]
     return out
 
 
-def check(run, estimates):
+def check(run, estimates, label=""):
     """Blocks of the independent check. run: first field of the governing condition, or None; estimates: rows of
-    reporting/run.py."""
+    reporting/run.py; label: of the condition."""
     if run is None:
         return [lines("No member can be read.")]
-    out = [lines("By hand, with the numbers of the first field of the governing condition. All ice in the way of the "
-                 "body is accelerated to its speed once: ice pushed aside needs less force; ice that passes the push "
-                 "on, rubs or rafts needs more.")]
+    out = [lines(f"By hand, with the numbers of the first field ({label}). All ice in the way of the body is "
+                 "accelerated to its speed once: ice pushed aside needs less force; ice that passes the push on, rubs "
+                 "or rafts needs more.")]
     rows = by_hand(run)
     out += [table(["what", "by hand", "force", "mean of the simulation", "simulated / by hand"], rows)] if rows else \
         [lines("Nothing is towed at a known speed.")]

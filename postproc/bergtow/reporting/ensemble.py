@@ -64,20 +64,20 @@ def blocks(parts):
     return out
 
 
-MARGIN = 1.05  # times the largest simulated value: a lower design value leaves little room for unseen loads
+MARGIN = 1.05  # times the height of the largest simulated value above the mean: less leaves little room for more
 #: marks after a design value, and their footnotes
 FOOTNOTES = {
     "*": "beyond the hours simulated: extrapolated with the tail of the distribution.",
     "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few, or farther apart "
          "than the return time.",
-    "‡": "less than 5 % above the largest simulated: little margin for so long a return time."
+    "‡": "less than 5 % farther above the mean than the largest simulated: little margin for so long a return time."
 }
 
 
 def marks(d):
     """The marks of FOOTNOTES that apply to a design value."""
     carried = {"*": d["beyond_data"], "†": d["model"] == "GEV",
-               "‡": d["model"] != CONSTANT and d["value"] < MARGIN * d["largest"]}
+               "‡": d["model"] != CONSTANT and d["value"] - d["mean"] < MARGIN * (d["largest"] - d["mean"])}
     return "".join(mark for mark, there in carried.items() if there)
 
 
@@ -141,7 +141,7 @@ def governing(s):
         x = text_table.designed(x, least)
         return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
             "without bound"
-    said, high = without_value(s, d["value"]), text_table.bound(d["value"], d["interval_95"][1])
+    said, high = without_value(s, d["value"]), d["interval_95"][1]
     said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
              f"{both(d['value'], d['largest'])}; upper end of its interval {both(high)}")
     if np.isinf(high):
@@ -356,25 +356,30 @@ def ranges(results, told):
 
 
 def of_answer(found):
-    """(sentence, [(heading, blocks)]) from the answer of bergtow design; ("", []) without one."""
+    """(sentence, remarks, [(heading, blocks)]) from the answer of bergtow design; ("", [], []) without one."""
     if found is None:
-        return "", []
+        return "", [], []
     from bergtow.text import answer as answer_text
-    return answer_text.sentence(found), [(heading, blocks(some)) for heading, some in answer_text.tables(found)]
+    return (answer_text.sentence(found), answer_text.remarks(found),
+            [(heading, blocks(some)) for heading, some in answer_text.tables(found)])
 
 
-def governs(s):
-    """The condition of the statistics with the largest load, by document.load."""
-    return max(s["conditions"], key=lambda c: document.load(c) or -np.inf)
+def governs(s, told):
+    """The condition of the statistics that the answer of bergtow design is about, the hardest at the requested speed;
+    without an answer the one with the largest load, by document.load."""
+    told = told or {"load_cases": [], "conditions": []}
+    of = [c["of"] for c in told["load_cases"] if c["id"] == "case.steady"]
+    asked = [c for row, c in zip(told["conditions"], s["conditions"]) if row["id"] in of]
+    return max(asked or s["conditions"], key=lambda c: document.load(c) or -np.inf)
 
 
-def independent_check(e, s):
+def independent_check(e, s, told):
     """(blocks of the check, rows of the estimates) for the first field of the governing condition."""
-    c = governs(s)
+    c = governs(s, told)
     rows = next(of.members for of in e.conditions() if of.index == c["index"])
     def checked(run):
         estimates = report_run.estimates(run)
-        return document.check(run, estimates), estimates
+        return document.check(run, estimates, unbroken(c["label"])), estimates
     return next(e.each(rows[e.status[rows] == FINISHED], checked), None) or (document.check(None, []), [])
 
 
@@ -403,15 +408,16 @@ def context(folder, place=None, given=None, also=()):
     block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})
     warned = loads_text.warnings(s) + intro
     told = document.answer_beside(e.path)
-    sentence, tables = of_answer(told)
-    checked, estimates = independent_check(e, s)
+    sentence, remarks, tables = of_answer(told)
+    checked, estimates = independent_check(e, s, told)
     drawn = pictures(e, options, s)
     if len(s["conditions"]) < 2:  # the chart would have a single point
         drawn = {name: p for name, p in drawn.items() if not name.startswith(("sweep", "map", "variants"))}
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block,
         "marked": report_case.marked(block),
-        "sentence": scrubbed(sentence), "answer": answer(e, s, cases, results, told), "tables": tables,
+        "sentence": scrubbed(sentence), "remarks": [scrubbed(text) for text in remarks],
+        "answer": answer(e, s, cases, results, told), "tables": tables,
         "operation": document.operation(s, cases, values, told), "check": checked, "evidence": document.evidence(),
         "sources": document.sources(values, estimates),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),

@@ -27,6 +27,9 @@ from bergtow.result import at_least, integrity
 from bergtow.result.frames import Frames
 from bergtow.result.hdf5 import first_line, opened, plain
 
+#: share of the ordered speed by which the speed made good may differ from it and still count as reached, assumed
+SLOWER = 0.05
+
 
 def within(time, start, end):
     """[n] of bool: samples that end between two times, inclusive. A last sample with fewer steps than the others, left

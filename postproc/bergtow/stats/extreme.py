@@ -37,6 +37,7 @@ SHARE = 0.1          # of the peaks above the threshold; or more, until there ar
 IRREGULAR = -0.5     # shape: below this value the likelihood is irregular
 EMPTY = 0.05         # share of blocks without a peak: above this value no GEV is fitted
 RESAMPLES = 199       # of the p-values
+FAR = 10.0           # height above the mean / that of the level: an upper end beyond it is no bound
 TIE = 1e-9           # of the largest value: values that differ by less are the same
 SATURATED = 0.1      # share of the clusters at the largest value: above, it is a limit, and excesses are not GPD
 
@@ -49,6 +50,14 @@ def tie(peak):
 def exceeds(peak, level):
     """[n] of bool: is a peak above the level by more than rounding?"""
     return peak > level + tie(peak)
+
+
+def bounded(fields, level, ends):
+    """The interval of a level of fields. An upper end that is more than FAR times as far above the mean of the peaks as
+    the level is no bound, but shows that the sample does not determine the tail, and becomes infinite. Rejected: FAR
+    times the level, which depends on a constant part of the load, such as a drag."""
+    mean = np.mean(np.concatenate([f["peak"] for f in fields]))
+    return ends[0], np.inf if level > mean and ends[1] - mean > FAR * (level - mean) else ends[1]
 
 
 def commonest(values):
@@ -180,7 +189,7 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
             "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
             "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
                                         resamples), "interval": interval_note(len(fields)),
-            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
+            "levels": [{"hours": T, "level": z, "level_95": bounded(fields, z, ends), "beyond_data": bool(T > hours)}
                        for T, (z, ends) in zip(hours_of_levels, levels)]}
 
 
@@ -310,7 +319,7 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
         "empty": int(empty.sum()), "location": location, "scale": scale,
         "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
         "anderson_darling": fitted["anderson_darling"], "p_value": fitted["p_value"], "interval": interval_note(n),
-        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)}
+        "levels": [{"hours": T, "level": z, "level_95": bounded(fields, z, ends), "beyond_data": bool(T > total)}
                    for T, (z, ends) in zip(hours_of_levels, levels)]
     }
 

@@ -30,7 +30,7 @@ from bergtow.result.run import Run, least
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
-from bergtow.table import bound, counted, quantity
+from bergtow.table import counted, quantity
 
 TIME_SCALE = 30.0     # s, full scale
 TOW_HOURS = 24.0      # h, full scale
@@ -188,12 +188,12 @@ def _of_a_constant(value, hours, total):
 
 def _design(found, hours, total):
     """The level of the last return time from peaks over a threshold, or from block maxima if there are too few. There
-    is none if its interval is not bounded (table.bound): the sample then does not determine the tail, and such a level
+    is none if its interval is not bounded: the sample then does not determine the tail, and such a level
     has been a hundred times the largest simulated load."""
     for kind, model in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
         level = found[kind].get("levels", [{"level": np.nan}])[-1]
         if np.isfinite(level["level"]):
-            if np.isinf(bound(level["level"], level["level_95"][1])):
+            if np.isinf(level["level_95"][1]):
                 return {"refused": "the sample does not know the tail: the interval of its level has no upper bound; "
                                    "run more fields", "return_hours": hours, "unbounded": True}
             return {"value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,

@@ -19,7 +19,7 @@ from types import SimpleNamespace
 
 from bergtow import table, towing
 from bergtow.result.members import FINISHED
-from bergtow.result.run import Run, case_value, parse_case
+from bergtow.result.run import SLOWER, Run, case_value, parse_case
 from bergtow.stats import conditions as stat_conditions
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import largest as stat_largest
@@ -92,14 +92,11 @@ def options(**more):
     return SimpleNamespace(**stat_conditions.DEFAULTS | {"hours": [], "resamples": 1} | more)
 
 
-#: share of the ordered speed below which a vessel does not reach it, assumed: the load is then that of a slower tow
-REACHED = 0.95
-
-
 def too_slow(case, made):
-    """Does the vessel of a case, {key: text}, not reach the ordered speed? made: speed made good, None if unknown."""
+    """Does the vessel of a case, {key: text}, not reach the ordered speed? The load is then that of a slower tow. made:
+    speed made good, None if unknown."""
     return case.get("tow.mode") == "thrust" and case.get("tow.programme", "none") == "none" and made is not None and \
-        made["value"] < REACHED * case_value(case, "tow.speed", 0.0)
+        made["value"] < (1 - SLOWER) * case_value(case, "tow.speed", 0.0)
 
 
 def value_of(e, c, found, fields, slow=False):
@@ -116,10 +113,9 @@ def value_of(e, c, found, fields, slow=False):
         return {"kind": "constant", "n": found["mean"]["value"]}
     d = found["design"]
     if "value" in d:
-        low, high = d["interval_95"]
         # rounded here, so that every sentence and table of it states the same load
         return {"kind": "return_level", "n": table.designed(d["value"], found["largest"]),
-                "interval_95": [low, table.bound(d["value"], high)], "model": d["model"],
+                "interval_95": list(d["interval_95"]), "model": d["model"],
                 "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
     largest = stat_largest.largest_of([f["peak"].max() for f in fields], [f["hours"] for f in fields])
     return {"kind": "largest_of_n", **largest, "reason": "unbounded_tail" if d.get("unbounded") else "no_tail"}
@@ -236,6 +232,15 @@ def steady_case(row):
                           interval_95=value.get("interval_95"), reason=value.get("reason"))
 
 
+def own_start(row, ramp):
+    """The start as the case orders it, from the steady tows: a load case as long as no run confirms the ramp that is
+    to take its place."""
+    n = row["fields"]
+    such = {} if row["value"]["kind"] == "constant" else {"n_tows": n, "share_below": stat_largest.share_below(n)}
+    return load_cases.row("own_start", row["start_up"], "largest_of_n" if such else "constant", "ensemble", runs=n,
+                          values=such | {"ramp_s": ramp["case_s"]})
+
+
 def bounds(row):
     """Ends of a load for a verdict. The largest of a few runs is only a lower bound, so no pull is known to hold it."""
     return row.get("interval_95") or ((row["n"], None) if row["kind"] in LOWER else None)
@@ -330,6 +335,8 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     the load_cases.Tow of the hardest condition, None without a value."""
     worst = hardest(rows, asked["speed_m_s"])
     cases = ([steady_case(worst)] if worst else []) + cases
+    if ramp and ramp["by"] == "closed_form" and worst["start_up"] is not None:
+        cases.append(own_start(worst, ramp))
     some = [c for c in cases if c["in_design"] and np.isfinite(c["n"]) and not held_back(worst)]
     top = max((c for c in some if c["acts_on"] == "tow"), key=lambda c: c["n"], default=None)
     hold = max(some, key=lambda c: c["n"], default=None)

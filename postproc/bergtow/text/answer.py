@@ -10,9 +10,11 @@ KNOT = 1852 / 3600
 TONNE = 9806.65
 HEADINGS = {"load_cases": "Load cases", "parts": "What the tow force is made of", "assumed": "What is assumed",
             "speeds": "Speeds", "plan": "What it took"}
-CASES = {"case.steady": "steady tow", "case.start": "start", "case.course_change": "course change",
+CASES = {"case.steady": "steady tow", "case.start": "start", "case.own_start": "start as the case orders it",
+         "case.course_change": "course change",
          "case.stop": "stop", "case.loss_of_thrust": "loss of thrust", "case.line_parted": "a line parts",
          "case.head_sea": "head current and wind"}
+STARTS = "case.start", "case.own_start"
 PARTS = {"ice": "ice", "water": "water drag", "wind": "wind", "coriolis": "Coriolis", "slope": "slope of the sea",
          "inertia": "inertia", "fluctuation": "above the mean"}
 KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at_least": "at least",
@@ -117,7 +119,8 @@ def _largest(v, a):
     few = next(c["values"] for c in a["load_cases"] if c["id"] == v["case"])
     of = (f", of {few['n_tows']} runs: a lower bound, below which at least {percent(few['share_below'])} of such runs "
           "stay with 95 % confidence") if "share_below" in few else ""
-    return f"The largest load simulated outside the start is {force(v['n'])} {_over(a)}{_in_case(v, a)}{of}"
+    where = "" if v["case"] in STARTS else " outside the start"
+    return f"The largest load simulated{where} is {force(v['n'])} {_over(a)}{_in_case(v, a)}{of}"
 
 
 def _covers(v, a):
@@ -308,6 +311,7 @@ def took(a):
     c = a["cost"]
     rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
             ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
+            ["of it statistics", f"{short(c['statistics_s'] / 60, 2)} min"],
             ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
     return [Table(["what", "took"], rows)]
 
@@ -332,6 +336,11 @@ def remarks(answer):
     v = answer["vessel"]
     if v["free_speed_from"] == "assumed":
         out.append(f"the free-running speed of the vessel is assumed, {speed(v['free_speed_m_s'])}")
+    if own := v["own_resistance"]:
+        more = " to ".join(f"{math.ceil(n / TONNE)} t" for n in v["needed_with_ice_n"] if known(n))
+        out.append("the bollard pull leaves out the resistance of the vessel itself in this ice, "
+                   f"{kn(own['low_n'])} to {kn(own['high_n'])} kN, an order of magnitude ({own['source']})"
+                   + (f"; with it {more}" if more else ""))
     if answer["line"]["factor"] is None:
         out.append("the line has no safety factor: name one with --line-factor")
     return out

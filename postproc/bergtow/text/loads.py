@@ -7,6 +7,7 @@ import numpy as np
 from bergtow import table as text_table
 from bergtow.result.members import worded
 from bergtow.stats import load as stat_load
+from bergtow.stats.extreme import FAR
 from bergtow.table import Table, Warned, hours_text, marked, number, pair, quantity, scale
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
@@ -40,8 +41,7 @@ def value(d, factor):
 def ends(d, factor):
     if "refused" in d:
         return "–"
-    low, high = d["interval_95"]
-    return pair((low, text_table.bound(d["value"], high)), factor)
+    return pair(d["interval_95"], factor)
 
 
 def design(s):
@@ -305,7 +305,7 @@ def returns(s, markdown):
             "likelihood, widened by the scatter between fields that are alike. * beyond the hours simulated: "
             "extrapolated. ! shape below -0.5: the levels "
             "are little more than the largest value seen. No bound: the upper end is more than "
-            f"{text_table.FAR:g} times the level.")
+            f"{FAR:g} times as far above the mean as the level.")
     # advice on the remedy is only for a terminal
     said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
             for (load, tail), some in refused.items())
