@@ -182,8 +182,9 @@ def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool 
 
 
 class Outlines:
-    """The result of `outlines`: `map`, and `file`, the GeoJSON for ice.outlines, both absolute; `record`, all numbers as
-    a dictionary (coordinates, plane, changes with areas, floes); `text`, the same in words, with lines for a case."""
+    """The result of `outlines`: `map`, and `file`, the GeoJSON for ice.outlines, both absolute; `record`, all numbers
+    as a dictionary (coordinates, plane, changes with areas, floes); `text`, the same in words, with lines for a case.
+    """
 
     def __init__(self, map: str | os.PathLike[str], file: str | os.PathLike[str], record: dict[str, Any], text: str,
                  options: list[str]) -> None:
