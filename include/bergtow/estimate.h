@@ -86,6 +86,9 @@ typedef struct bt_estimate_input {
     double water_speed, water_along; ///< the same through the water
     double ordered;          ///< ΔV·d if the body kept the ordered speed, m/s; NaN: no tow
     bool turns;              ///< the course changes within the window of the run: no comparison with estimates
+    /// the ordered speed changes within the window: no comparison with estimates that depend on it, since their mean is
+    /// not the value at the mean speed
+    bool changes_speed;
     double restitution;      ///< e, ice on body
     bool ship;               ///< the body is a ship
     double ice_density, water_density; ///< kg/m³
@@ -101,8 +104,8 @@ typedef struct bt_estimate {
     double force;     ///< N against the tow; NaN: the formula has no value here
     double low, high; ///< N, its range; equal to force if there is none
     bool valid;       ///< the formula is meant for these conditions
-    /// valid, and it depends on the concentration: a run is compared with it. Not in a channel, nor if the body nearly
-    /// stands still and the force depends on its speed
+    /// valid, and it depends on the concentration: a run is compared with it. Not in a channel, nor, if the force
+    /// depends on the speed, where the body nearly stands still or its ordered speed changes
     bool compares;
     const char *note; ///< regime, or why it is not valid; static
 } bt_estimate;

@@ -170,6 +170,10 @@ class Case(MutableMapping[str, Any]):
             raise KeyError(f"{key}: has not been set")
         self._resolve({k: v for k, v in self.overrides.items() if k != key})
 
+    def pop(self, key: str, *default: Any) -> Any:  # type: ignore[override]
+        """Remove a value set here, and return it; `default`, if given, for a key that has not been set."""
+        return default[0] if default and key not in self.overrides else super().pop(key)
+
     def popitem(self) -> tuple[str, Any]:
         """Remove the value set last, and return its key and value."""
         if not self.overrides:

@@ -182,12 +182,14 @@ def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool 
 
 
 class Outlines:
-    """The result of `outlines`: `file`, the GeoJSON for ice.outlines; `record`, all numbers as a dictionary
-    (coordinates, plane, changes with areas, floes); `text`, the same in words, with lines for a case."""
+    """The result of `outlines`: `map`, and `file`, the GeoJSON for ice.outlines, both absolute; `record`, all numbers
+    as a dictionary (coordinates, plane, changes with areas, floes); `text`, the same in words, with lines for a case.
+    """
 
-    def __init__(self, map: Path, file: Path, record: dict[str, Any], text: str, options: list[str]) -> None:
-        self.map, self.file, self.record, self.text = map, file, record, text
-        self._options = options
+    def __init__(self, map: str | os.PathLike[str], file: str | os.PathLike[str], record: dict[str, Any], text: str,
+                 options: list[str]) -> None:
+        self.map, self.file = Path(here(), map), Path(here(), file)
+        self.record, self.text, self._options = record, text, options
 
     def picture(self) -> Picture:
         """The map next to the floes, with the parts that were left out."""
@@ -225,7 +227,7 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
         record = Path(there) / "record.json"
         text = _call("outlines", map, "-o", file, "--record", record, *(["--force"] if replace else []), *words)
         text = text.replace(f"{record}\n", "")
-        return Outlines(Path(map), Path(file), json.loads(record.read_text(encoding="utf-8")), text, words)
+        return Outlines(map, file, json.loads(record.read_text(encoding="utf-8")), text, words)
 
 
 def export(run: Of, file: str | os.PathLike[str], *, replace: bool = False, **options: Any) -> Path:

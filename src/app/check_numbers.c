@@ -169,14 +169,14 @@ static void print_outlines(sink *to, const bt_outline_counts *counts)
         printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64
                " double or collinear vertices dropped\n",
                counts->read, counts->turned, counts->dropped);
-    if (counts->read) printf("coordinates          %s\n", counts->crs);
-    if (counts->read && isfinite(counts->east))
+    if (*counts->crs) printf("coordinates          %s\n", counts->crs);
+    if (*counts->crs && isfinite(counts->east))
         printf("origin               %.10g m east, %.10g m north at x = y = 0\n", counts->east, counts->north);
     if (counts->rounded)
         printf("not convex           %" PRId64 " floes by rounding alone: %" PRId64
                " corners left out, which adds %.3g m2\n",
                counts->rounded, counts->rounded_corners, counts->rounded_area);
-    if (counts->read && isfinite(counts->lon))
+    if (*counts->crs && isfinite(counts->lon))
         printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", counts->lon * 180 / BT_PI,
                counts->lat * 180 / BT_PI);
     if (counts->hulled)

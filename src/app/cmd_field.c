@@ -56,8 +56,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option field_options[] = {
     {"output", 'o', "FILE", 0,
-     "file to write: HDF5 (FIELD.h5), outlines on the map (FIELD.geojson, in degrees if ice.origin_lon places the "
-     "field, otherwise in metres east and north), or fixed floes, for example a coast from a map (COAST.yml)",
+     "file to write: HDF5 (FIELD.h5), outlines on the map (FIELD.geojson, in degrees if the case, its outlines or its "
+     "field file give longitude and latitude, otherwise in metres east and north), or fixed floes, for example a coast "
+     "from a map (COAST.yml)",
      0},
     {"force", KEY_FORCE, NULL, 0, "replace any file of that name", 0},
     {0},

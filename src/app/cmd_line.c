@@ -48,6 +48,15 @@ static void check_options(const struct argp *argp, int argc, char **argv)
     }
 }
 
+static bool parsing;
+
+/// argp ends the program itself after --help, --usage and --version: see there, too, whether the text was lost.
+static void leave_argp(void)
+{
+    const int code = parsing ? bt_cmd_end(&bt_comm_alone, BT_OK, &(bt_errors){0}) : BT_OK;
+    if (code != BT_OK) _exit(bt_comm_end(code));
+}
+
 // All ranks have the same command line, so they find the same errors in it and exit with the same code; one prints why.
 static void parse_aloud(const struct argp *argp, int argc, char **argv, void *input)
 {
@@ -56,7 +65,10 @@ static void parse_aloud(const struct argp *argp, int argc, char **argv, void *in
     static char name[32];
     snprintf(name, sizeof name, "bergtow %.20s", argv[0]);
     argv[0] = name;
+    atexit(leave_argp);
+    parsing = true;
     argp_parse(argp, argc, argv, 0, NULL, input);
+    parsing = false;
 }
 
 void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)

@@ -295,9 +295,10 @@ void bt_provenance_keep(bt_h5 *h5, bt_h5_reader *old)
     for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
         char *before = bt_h5_read_word(old, names[k]);
         if (!before) continue;
-        const char *space = strrchr(before, ' '), *last = space ? space + 1 : before;
-        const bool other = !strcmp(names[k], "revision") && strcmp(last, BT_REVISION) != 0;
-        char *text = bt_text_of("%s%s", before, other ? ", " BT_REVISION : "");
+        static const char own[] = ", " BT_REVISION;
+        const size_t n = strlen(before), most = sizeof own - 1;
+        const bool last = !strcmp(before, BT_REVISION) || (n > most && !strcmp(before + n - most, own));
+        char *text = bt_text_of("%s%s", before, strcmp(names[k], "revision") || last ? "" : own);
         bt_h5_attr_text(h5, "/", names[k], text);
         free(text);
         free(before);

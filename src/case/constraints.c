@@ -5,7 +5,8 @@
 // Keys without effect. A file that gives both keys contradicts itself, and is refused. If they come from different
 // places, the key may be inherited, from a base or from the case that a study or --set changes: then the run warns that
 // it is not used. Defaults cause no message, nor do files with every key, such as a resolved case and a scaled twin.
-// Rows of ALWAYS are refused wherever the key comes from: what it asks for would be missing.
+// Rows of ALWAYS are refused wherever the key comes from: what it asks for would be missing. Rows of WARNED never are:
+// open water is a value of ice.concentration like others.
 //
 // Limits: a value against a number or against another key, and combinations that are refused.
 #include "case/constraints.h"
@@ -25,7 +26,7 @@
 // --- keys without effect ---------------------------------------------------------------------------------------------
 
 /// When keys without effect are refused. NEVER: there is no warning either, since the program itself sets them.
-typedef enum { TOGETHER, ALWAYS, NEVER } refusal;
+typedef enum { TOGETHER, ALWAYS, NEVER, WARNED } refusal;
 
 /// Keys that are not used.
 typedef struct idle {
@@ -40,11 +41,12 @@ typedef struct idle {
     "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
     "tow.branch2.breaking_load"
 
-enum { IDLE = 38 };
+enum { IDLE = 39 };
 
 static void list_idle(const bt_case *input, idle out[IDLE])
 {
-    const bool read = bt_case_reads_field(input), power = input->ice.size_law == BT_SIZE_POWER;
+    const bool read = bt_case_reads_field(input), made = bt_case_makes_ice(input),
+               power = input->ice.size_law == BT_SIZE_POWER;
     // for ice that is read, a moving window measures its room in floes of ice.size (case_window.c)
     const bool sized = input->domain.ends == BT_BOUND_MOVING;
     const bool line = input->tow.mode == BT_TOW_LINE || input->tow.mode == BT_TOW_THRUST;
@@ -62,14 +64,18 @@ static void list_idle(const bt_case *input, idle out[IDLE])
          "on the floes of a field file, which have their own thicknesses"},
         {input->ice.field, TOGETHER, "ice.x_min ice.x_max ice.y_min ice.y_max", "ice.field",
          "on a field file, which has its own ice region"},
-        {!input->ice.field && input->ice.thickness_law == BT_THICK_CONSTANT, TOGETHER, "ice.thickness_spread",
-         "ice.thickness_law", "with ice.thickness_law: constant"},
+        // sizes and mean thickness also belong to the curves of the estimates
+        {!read && !made, WARNED, "ice.shape ice.sides ice.aspect ice.shake ice.extent.x_min ice.extent.x_max "
+               "ice.extent.y_min ice.extent.y_max ice.thickness_law ice.thickness_spread",
+         "ice.concentration", "without ice (ice.concentration: 0)"},
+        {(made || input->ice.outlines) && input->ice.thickness_law == BT_THICK_CONSTANT, TOGETHER,
+         "ice.thickness_spread", "ice.thickness_law", "with ice.thickness_law: constant"},
         {!read && input->ice.size_law == BT_SIZE_SINGLE, TOGETHER, "ice.size_min ice.size_max", "ice.size_law",
          "with ice.size_law: single"},
         {!read && !power, TOGETHER, "ice.size_exponent", "ice.size_law", "without ice.size_law: power"},
         {!read && power, TOGETHER, "ice.size ice.size_spread", "ice.size_law",
          "with ice.size_law: power, whose sizes follow from ice.size_min, size_max and size_exponent"},
-        {!read, TOGETHER, input->ice.shape == BT_ICE_RECTANGLES ? "ice.sides"
+        {made, TOGETHER, input->ice.shape == BT_ICE_RECTANGLES ? "ice.sides"
                 : input->ice.shape == BT_ICE_POLYGONS ? "ice.aspect"
                                                       : "ice.sides ice.aspect",
          "ice.shape", "on floes of this ice.shape"},
@@ -202,7 +208,7 @@ static void refuse(void *to, const char *key, const idle *rule)
     const bt_check *check = to;
     const bool always = rule->refused == ALWAYS;
     if (!bt_check_sound(check, key) || !bt_check_sound(check, rule->cause) ||
-        (!always && (!check->from || says_all(check, key)))) return;
+        rule->refused == WARNED || (!always && (!check->from || says_all(check, key)))) return;
     const char *causes = rule->cause;
     char cause[BT_LONGEST_KEY];
     while (bt_next_name(&causes, cause))

@@ -200,7 +200,7 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
     estimate.compares =
         estimate.valid && !def->on_top && (!def->knows || def->knows(in)) && estimate.force > 0 && !in->turns &&
         !in->channel;
-    if (estimate.compares && in->along < BT_EST_STILL * fabs(in->ordered)) {
+    if (estimate.compares && (in->changes_speed || in->along < BT_EST_STILL * fabs(in->ordered))) {
         bt_estimate_input faster = *in;
         faster.along *= 2, faster.speed *= 2;
         estimate.compares = force_of(def, &faster).force == estimate.force;

@@ -8,7 +8,8 @@
 //     /floes/area       [n]     m², optional when read
 //     /floes            attributes ice_area m² (to which concentration refers), concentration, n_floes, frame (the
 //                       domain.frame of x and y), x_min, y_min, x_max, y_max m (the ice region); the place of x = y =
-//                       0, if known: origin_lon, origin_lat deg, or crs, origin_east, origin_north m
+//                       0, if known: origin_lon, origin_lat deg, or crs, origin_east, origin_north m, where the crs
+//                       of metres that are of no projection is BT_MAP_LOCAL_NAME
 //     /case             the resolved case the field was made from
 // The reader trusts nothing: the file may be cut off, damaged, or made by hand. Files of this program carry a checksum
 // (checksum.h), so damage is refused before HDF5, which some damage crashes, reads a byte. In a file without one, made
@@ -67,7 +68,7 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         if (place.kind == BT_MAP_DEGREES) {
             bt_h5_attr_double(&h5, "/floes", "origin_lon", place.first * 180 / BT_PI);
             bt_h5_attr_double(&h5, "/floes", "origin_lat", place.second * 180 / BT_PI);
-        } else if (place.kind == BT_MAP_PLANE) {
+        } else if (*field->outlines.crs) {
             bt_h5_attr_word(&h5, "/floes", "crs", place.crs);
             bt_h5_attr_double(&h5, "/floes", "origin_east", place.first);
             bt_h5_attr_double(&h5, "/floes", "origin_north", place.second);
@@ -184,14 +185,13 @@ static void read_place(reader *in)
     bt_outline_counts *counts = &in->counts;
     const double lon = read_number(in, "origin_lon"), lat = read_number(in, "origin_lat"),
                  east = read_number(in, "origin_east"), north = read_number(in, "origin_north");
-    char crs[sizeof counts->crs];
-    read_word(in, "crs", sizeof crs, crs);
+    char name[64];
+    read_word(in, "crs", sizeof name, name);
+    const bt_map_crs crs = bt_map_crs_of(name);
     if (lon >= -180 && lon <= 360 && fabs(lat) <= 90) {
-        snprintf(counts->crs, sizeof counts->crs, "OGC:CRS84");
-        counts->lon = lon * BT_PI / 180, counts->lat = lat * BT_PI / 180;
-        counts->east = counts->north = NAN;
-    } else if (bt_map_crs_of(crs).kind == BT_MAP_PLANE && isfinite(east) && isfinite(north)) {
-        memcpy(counts->crs, crs, sizeof crs);
+        bt_map_set_degrees(counts, lon * BT_PI / 180, lat * BT_PI / 180);
+    } else if ((crs.kind == BT_MAP_PLANE || crs.kind == BT_MAP_LOCAL) && isfinite(east) && isfinite(north)) {
+        memcpy(counts->crs, crs.name, sizeof crs.name);
         counts->east = east, counts->north = north;
         counts->lon = counts->lat = NAN;
     }

@@ -11,14 +11,17 @@
 #include "field/field_make.h"
 #include "field/map_crs.h"
 
-/// Note the area that the file's concentration refers to, and the ice area of the domain.
-static void note_region(const bt_case *input, bt_field *field)
+/// Note the area that the file's concentration refers to, the ice area of the domain, and the place that the case
+/// gives instead of that of the file.
+static void note_case(const bt_case *input, bt_field *field)
 {
     bt_region region;
     bt_region_of_domain(&region, input);
     field->outlines.own_area = field->ice_area;
     field->outlines.region_area = region.ice_area;
     bt_region_free(&region);
+    if (!isnan(input->ice.origin_lon))
+        bt_map_set_degrees(&field->outlines, input->ice.origin_lon, input->ice.origin_lat);
 }
 
 bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
@@ -29,7 +32,7 @@ bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
     if (status != BT_OK) return status;
     bt_refusals refusals = {.path = input->ice.field, .err = err, .status = BT_OK};
     char why[BT_ICE_WHY];
-    note_region(input, field);
+    note_case(input, field);
     if (*field->frame && strcmp(field->frame, bt_field_frame(input)))
         bt_refuse(&refusals,
                   "was made for domain.frame: %s, whose x and y would be mirrored in the frame of this case, %s; set "

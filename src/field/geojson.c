@@ -641,8 +641,7 @@ bt_status bt_field_write_outlines(const bt_field *field, const bt_case *input, c
             known ? place.first / DEGREE : place.first, known ? place.second / DEGREE : place.second,
             input->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic", field->ice_area);
     if (!known)
-        fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n",
-                place.crs ? place.crs : BT_MAP_LOCAL_NAME);
+        fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n", place.crs);
     fprintf(out, "\"features\":[");
     for (bt_idx i = 0; i < field->n; i++) write_floe(out, &m, i);
     fprintf(out, "\n]}\n");

@@ -124,5 +124,12 @@ bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *inp
     if (map && isfinite(counts->lon)) return (bt_map_place){BT_MAP_DEGREES, counts->lon, counts->lat, NULL};
     if (map && bt_map_crs_of(counts->crs).kind == BT_MAP_PLANE)
         return (bt_map_place){BT_MAP_PLANE, plane ? counts->east : 0, plane ? counts->north : 0, counts->crs};
-    return (bt_map_place){BT_MAP_LOCAL, plane ? counts->east : 0, plane ? counts->north : 0, NULL};
+    return (bt_map_place){BT_MAP_LOCAL, plane ? counts->east : 0, plane ? counts->north : 0, BT_MAP_LOCAL_NAME};
+}
+
+void bt_map_set_degrees(bt_outline_counts *counts, double lon, double lat)
+{
+    snprintf(counts->crs, sizeof counts->crs, "OGC:CRS84");
+    counts->lon = lon, counts->lat = lat;
+    counts->east = counts->north = NAN;
 }

@@ -49,10 +49,13 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
 typedef struct bt_map_place {
     bt_map_kind kind;     ///< BT_MAP_DEGREES, BT_MAP_PLANE (of a projection), BT_MAP_LOCAL (of no place on the earth)
     double first, second; ///< longitude and latitude, rad; or east and north in the plane of the map, m
-    const char *crs;      ///< of the projection, valid as long as the outlines; otherwise NULL
+    const char *crs;      ///< of metres: of the projection, valid as long as the outlines, or BT_MAP_LOCAL_NAME
 } bt_map_place;
 
 /// By ice.origin_lon and ice.origin_lat; without them, that of the outlines or of the field file (NULL or all 0: none).
 bt_map_place bt_map_place_of(const bt_outline_counts *counts, const bt_case *input);
+
+/// The place of x = y = 0 is (lon, lat), rad.
+void bt_map_set_degrees(bt_outline_counts *counts, double lon, double lat);
 
 #endif

@@ -324,6 +324,7 @@ static void judge_events(bt_steady *steady, const bt_case *input, const bt_run_t
                 "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run earlier, or "
                 "read the series",
                 p[2 * i + 1], p[2 * i + 3], steady->start, steady->end);
+        steady->changes_speed = true;
     }
     for (int64_t i = 0; totals->events && i < totals->events->n; i++) {
         const bt_event *event = &totals->events->event[i];
@@ -492,7 +493,8 @@ void bt_steady_find(bt_steady *steady, const bt_history *history, const bt_case 
     if (!isfinite(steady->series[BT_REPORTED_ICE].mean.mean) || !isfinite(steady->series[BT_REPORTED_TOW].mean.mean))
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_NOT_FINITE,
                 "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
-    if (steady->start < ramp * (1 - 1e-12))
+    steady->changes_speed = steady->start < ramp * (1 - 1e-12);
+    if (steady->changes_speed)
         bt_warn(because(steady, BT_NOT_STEADY), BT_WARN_WITHIN_RAMP,
                 "the window begins at %g s, before the %s at %g s: raise output.window_start",
                 steady->start, input->tow.n_programme > 0 ? "tow reaches the largest speed of its programme"

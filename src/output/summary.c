@@ -335,6 +335,7 @@ static void order_window(bt_summary *summary, const bt_history *history, const b
     if (isfinite(yaw) && !steady->turns) straight.body.yaw = yaw;
     bt_estimate_conditions(&straight, in);
     in->turns = steady->turns;
+    in->changes_speed = steady->changes_speed;
     tow[0] = straight.tow.speed * bt_cos(straight.tow.direction);
     tow[1] = straight.tow.speed * bt_sin(straight.tow.direction);
 }

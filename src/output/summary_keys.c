@@ -51,17 +51,12 @@ static const char *lead_mode(const view *from) { return is_channel(from) ? "chan
 static double mean_piece(const view *from) { return number_or_nan(lead(from)->pieces > 0, lead(from)->mean_piece); }
 
 static const bt_outline_counts *outlines(const view *from) { return &from->t->outlines; }
-static double origin_lon(const view *from)
-{
-    return number_or_nan(outlines(from)->read, outlines(from)->lon * 180 / BT_PI);
-}
-static double origin_lat(const view *from)
-{
-    return number_or_nan(outlines(from)->read, outlines(from)->lat * 180 / BT_PI);
-}
-static double origin_east(const view *from) { return number_or_nan(outlines(from)->read, outlines(from)->east); }
-static double origin_north(const view *from) { return number_or_nan(outlines(from)->read, outlines(from)->north); }
-static const char *crs(const view *from) { return outlines(from)->read ? outlines(from)->crs : ""; }
+static bool has_map(const view *from) { return *outlines(from)->crs; }
+static double origin_lon(const view *from) { return number_or_nan(has_map(from), outlines(from)->lon * 180 / BT_PI); }
+static double origin_lat(const view *from) { return number_or_nan(has_map(from), outlines(from)->lat * 180 / BT_PI); }
+static double origin_east(const view *from) { return number_or_nan(has_map(from), outlines(from)->east); }
+static double origin_north(const view *from) { return number_or_nan(has_map(from), outlines(from)->north); }
+static const char *crs(const view *from) { return outlines(from)->crs; }
 
 static const char *verdict(const view *from)
 {
@@ -280,7 +275,7 @@ static const bt_json_key rows[] = {
     NUMBER("outlines.origin_lat_deg", origin_lat, "degree", "latitude of x = y = 0"),
     NUMBER("outlines.origin_east_m", origin_east, "m", "easting of x = y = 0 in the plane of the file"),
     NUMBER("outlines.origin_north_m", origin_north, "m", "northing of x = y = 0 in the plane of the file"),
-    TEXT("outlines.crs", crs, "coordinates of the file"),
+    TEXT("outlines.crs", crs, "coordinates of the file; empty without a map"),
     OF_TOTALS("outlines.nearly_thickness", outlines.unnamed, "1",
         "features without a thickness that have a property of nearly this name"),
     MEAN("ice_resistance", ice, "contact force of ice and walls on the towed body against the tow"),

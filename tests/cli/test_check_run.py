@@ -58,6 +58,15 @@ def test_keys_that_the_ice_leaves_unused(tmp_path):
     assert again.returncode == DONE and IDLE in again.stdout
 
 
+def test_keys_that_only_make_the_ice_are_named_in_open_water(tmp_path):
+    """They may stay beside ice.concentration: 0, each named once. Red: silence."""
+    case = changed(TOW, ice__concentration=0, ice__shape="rectangles", ice__aspect=1.2, ice__thickness_spread=0.3)
+    r = call("check", write_case(tmp_path, case))
+    assert r.returncode == DONE, r.stderr
+    assert [line.split(None, 1)[1] for line in r.stdout.splitlines() if "no effect" in line] == [
+        "ice.shape, ice.aspect, ice.thickness_spread: no effect without ice (ice.concentration: 0)"]
+
+
 def test_a_file_that_has_every_key_may_have_those_without_effect(tmp_path):
     """A resolved case as a base, also without its first line, says what is, not what is wanted. In a scaled twin what
     has no effect and was not given keeps its default."""

@@ -83,6 +83,21 @@ def test_exported_floes_come_back_as_ice_outlines(tmp_path, place):
         assert size == pytest.approx(area(ours), rel=1e-9)
 
 
+@pytest.mark.parametrize("crs", [LOCAL, "EPSG:32633"])
+def test_a_field_file_keeps_the_place_of_its_map(tmp_path, crs):
+    """In the summary and on the map. Red: local metres count from x = y = 0, a summary that has no place."""
+    first = towed(tmp_path, crs, (560e3, 8490e3), ice__origin_east=560e3, ice__origin_north=8490e3)
+    assert call("field", tmp_path / "case.yml", "-o", tmp_path / "f.h5").returncode == DONE
+    again = run(tmp_path, changed(TOW, ice={"field": "f.h5", "nonconvex": "split"}), name="again").dir
+    places = []
+    for there in first, again:
+        assert call("export", there, "-o", there / "map.geojson").returncode == DONE
+        said = json.loads((there / "summary.json").read_text())["outlines"]
+        places.append([{k: v for k, v in said.items() if k == "crs" or "origin" in k},
+                       json.loads((there / "map.geojson").read_text())])
+    assert places[0] == places[1] and places[0][0]["origin_north_m"] == 8490e3
+
+
 def test_degrees_are_those_of_geodesics(tmp_path):
     """Distance and direction of each vertex from the origin, as its x and y say them; anticlockwise [RFC 7946], and no
     crs. Red: longitude of north, a sphere."""

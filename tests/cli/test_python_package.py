@@ -46,6 +46,11 @@ def test_a_case_is_read_checked_and_changed(tmp_path):
     with pytest.raises(bergtow.CaseError, match="body.x"):
         case["domain.length"] = 15
     assert (case["domain.length"], case["body.x"]) == (30, 20)
+    assert case.pop("tow.speed", None) is None and case["tow.speed"] == 0.13
+    with pytest.raises(KeyError, match="tow.speed: has not been set"):
+        case.pop("tow.speed")
+    case["tow.speed"] = 0.2
+    assert case.pop("tow.speed", None) == 0.2 and "tow.speed" not in case.overrides
     case["tow.speed"] = 0.2
     assert case.popitem() == ("tow.speed", 0.2) and list(case.overrides) == ["domain.length", "body.x"]
     case.clear()

@@ -8,11 +8,13 @@ import shutil
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import h5py
 import matplotlib
 import numpy as np
 import pytest
+from bergtow import functions
 from bergtow.plot import style
 from harness import ROOT, TOW, call, changed, environment, make, run, script, write_case
 from python_package import bergtow, installed_by_pip
@@ -73,6 +75,13 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path, monkeypatch):
         picture.save(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="out: no such"):
         picture.save(tmp_path / "kept.pdf")
+
+
+def test_outlines_keep_their_files_when_the_folder_changes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = functions.Outlines("map.gpkg", Path("floes.geojson"), {}, "", [])
+    monkeypatch.chdir("/")
+    assert (made.map, made.file) == (tmp_path / "map.gpkg", tmp_path / "floes.geojson")
 
 
 @pytest.mark.slow

@@ -164,12 +164,12 @@ def test_a_resumed_result_tells_how_the_run_began_and_every_revision(tmp_path):
     path = run(tmp_path, TOW, "--quiet", "--steps", 20).dir / "result.h5"
     with edited(path) as f:
         command, revision = f.attrs["command_line"], f.attrs["revision"]
-        f.attrs["start_time"], f.attrs["revision"] = "2026-01-02T03:04:05Z", "0123456"
+        f.attrs["start_time"], f.attrs["revision"] = "2026-01-02T03:04:05Z", f"fork of {revision}"
     for words in ("--steps", 20), ():
         resumed(tmp_path, "out", *words)
         with h5py.File(path) as f:
             assert f.attrs["start_time"] == "2026-01-02T03:04:05Z" and f.attrs["command_line"] == command
-            assert f.attrs["revision"] == f"0123456, {revision}"
+            assert f.attrs["revision"] == f"fork of {revision}, {revision}"
 
 
 # ---- the folder ----

@@ -104,6 +104,21 @@ def test_a_field_keeps_its_place_unless_the_case_gives_one(tmp_path):
         case = write_case(tmp_path, changed(BASIN, ice={"field": "f.h5"} | ice))
         assert map_of(case)["origin"] == pytest.approx(wanted)
         assert np.degrees(situation.place_of(Case(case), lambda: tmp_path / "f.h5").origin) == pytest.approx(wanted)
+        with Run(run(tmp_path, case, "--steps", 1, "--force").dir) as r:
+            assert r.number("outlines.origin_lon_deg") == pytest.approx(wanted[0])
+
+
+@pytest.mark.parametrize("crs, found", [(np.bytes_(b"EPSG:32633"), True), ("EPSG:32633", False),
+                                        (np.bytes_(_library.limit("map_local_crs")), False)])
+def test_routes_read_the_place_of_a_field_as_the_program_does(tmp_path, crs, found):
+    """A string of variable length is none. Red: a place for routes that the program does not know."""
+    call("field", write_case(tmp_path, BASIN), "-o", tmp_path / "f.h5")
+    floes = members.Floes.read(tmp_path / "f.h5")
+    floes.attributes |= {"crs": crs, "origin_east": 5e5, "origin_north": 8e6}
+    floes.write(tmp_path / "g.h5")
+    case = write_case(tmp_path, changed(BASIN, ice={"field": "g.h5"}))
+    assert (situation.place_of(Case(case), lambda: tmp_path / "g.h5").origin is not None) == found
+    assert ("EPSG" in map_of(case)["crs"]) == found
 
 
 def map_of(case):

@@ -275,9 +275,12 @@ def test_a_table_that_cannot_be_printed(tmp_path):
     with open("/dev/full", "w") as full:
         result = subprocess.run([BERGTOW, "run", str(path), "-o", str(tmp_path / "out"), "--steps", "5"], stdout=full,
                                 stderr=subprocess.PIPE, text=True, env=environment(OMP_NUM_THREADS=1), timeout=30)
-        listed = subprocess.run([BERGTOW, "--list-keys", "--json"], stdout=full, stderr=subprocess.PIPE, text=True)
+        told = [subprocess.run([BERGTOW, *words], stdout=full, stderr=subprocess.PIPE, text=True) for words in (
+            ["--list-keys", "--json"], ["run", "--help"], ["help", "check"], ["resume", "--usage"],
+            ["field", "--version"], ["report", "--help"])]
     assert result.returncode == IO and "standard output" in result.stderr
-    assert listed.returncode == IO and "standard output" in listed.stderr
+    for done in told:
+        assert done.returncode == IO and "standard output" in done.stderr, done.args
     assert Run(tmp_path / "out", result).summary["n_steps"] == 5
     for closed, code in (">&-", IO), ("2>&-", DONE):  # as some services start their programs
         done = subprocess.run(["sh", "-c", f'"$0" contents out {closed}', BERGTOW], cwd=tmp_path, capture_output=True,

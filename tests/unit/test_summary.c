@@ -331,6 +331,29 @@ TEST(estimates_take_the_speed_of_the_window)
     free(json);
 }
 
+/// Their mean is not the value at the mean speed, unless they depend on none.
+TEST(a_changing_speed_is_held_against_no_estimate_that_depends_on_it)
+{
+    bt_case c = made_up_case();
+    c.output.window_start = 30;
+    c.body.shape = BT_BODY_RECTANGLE, c.body.length = 4, c.body.width = 2;
+    c.tow.speed = 0.5;
+    double programme[] = {0, 0.5, 40, 0.5, 50, 0.25};
+    for (int k = 0; k < 3; k++) {
+        bt_case d = c;
+        bt_run_totals t = totals(600);
+        t.concentration = 0.8;
+        if (k == 1) d.tow.ramp = 40;
+        if (k == 2) d.tow.programme = programme, d.tow.n_programme = 3;
+        char *json = summary_of(&d, 600, &t, FLOES, sound_tow);
+        const char *momentum = strstr(json, "\"marchenko_momentum\": {");
+        assert_string_equal(json_value(momentum, "compares"), k == 0 ? "true" : "false");
+        const char *rafting = strstr(json, "\"marchenko_rafting\": {");
+        assert_string_equal(json_value(rafting, "compares"), "true");
+        free(json);
+    }
+}
+
 static void never_touched(bt_sample *s, int i)
 {
     s->ice_resistance = s->ice_resistance_budget = i < 100 ? 50 : 0;

@@ -17,7 +17,6 @@ from bergtow.arguments import read
 from bergtow.case import Case
 from bergtow.errors import CASE, USAGE, BergtowError, Refused, RunError
 from bergtow.result.frames import lonlat_of, place as turned
-from bergtow.result.hdf5 import plain
 from bergtow.routing import planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
@@ -303,8 +302,10 @@ def place_of(values, file):
         return Place(north_first)
     with h5py.File(file()) as f:
         found = dict(f["floes"].attrs)
-    if "crs" in found:
-        return Place(north_first, (float(found["origin_east"]), float(found["origin_north"])), plain(found["crs"]))
+    # as src/field/field_io.c reads it: h5py gives a string of fixed length as bytes
+    crs = found["crs"].decode() if isinstance(found.get("crs"), bytes) else ""
+    if crs not in ("", _library.limit("map_local_crs")):
+        return Place(north_first, (float(found["origin_east"]), float(found["origin_north"])), crs)
     return Place(north_first, tuple(map(float, np.radians([found["origin_lon"], found["origin_lat"]])))
                  if "origin_lon" in found else None)
 
