@@ -27,7 +27,7 @@ from bergtow.table import counted, hours_text, quantity, short
 
 LONG = 2.0          # the tow of the statement / the simulated tow: above, the value is for a longer tow than simulated
 FAR = 10.0          # times the simulated hours: an extrapolation beyond this is reported
-WIDE = 3.0          # upper end of the interval / value, above the mean: beyond, it is only an order of magnitude
+WIDE = 3.0          # times the size of the value: with an upper end beyond it, it is only an order of magnitude
 SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (result/members.py: DOUBTS) that concern the value
 DOUBTFUL = {
@@ -189,10 +189,8 @@ def _of_the_sample(e, rows, c, load):
     if d["irregular"]:
         out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, "
                     "and the value can be too small", f"shape {d['shape']:.2g}"))
-    value, high = (x - load["mean"]["value"] for x in (d["value"], d["interval_95"][1]))
-    if value > 0 and high > WIDE * value:
-        out.append((f"the interval reaches more than {WIDE:g} times as far above the mean as the value: an order of "
-                    "magnitude at best", ""))
+    if stat_extreme.beyond(d["interval_95"][1], WIDE, d["value"], load["mean"]["value"]):
+        out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
     return out + _of_the_models(load)
 
 

@@ -37,7 +37,7 @@ SHARE = 0.1          # of the peaks above the threshold; or more, until there ar
 IRREGULAR = -0.5     # shape: below this value the likelihood is irregular
 EMPTY = 0.05         # share of blocks without a peak: above this value no GEV is fitted
 RESAMPLES = 199       # of the p-values
-FAR = 10.0           # height above the mean / that of the level: an upper end beyond it is no bound
+FAR = 10.0           # times the size of a level: an upper end beyond it is no bound
 TIE = 1e-9           # of the largest value: values that differ by less are the same
 SATURATED = 0.1      # share of the clusters at the largest value: above, it is a limit, and excesses are not GPD
 
@@ -52,12 +52,18 @@ def exceeds(peak, level):
     return peak > level + tie(peak)
 
 
+def beyond(end, times, level, mean):
+    """Is the upper end of a level's interval more than some times the size of the level? The size is the level itself:
+    a load that is mostly drag is known well even if its varying part is not. Of a load that crosses zero, whose level
+    may happen to be close to it, it is the height above the mean."""
+    return end - level > (times - 1) * max(abs(level), level - mean)
+
+
 def bounded(fields, level, ends):
-    """The interval of a level of fields. An upper end that is more than FAR times as far above the mean of the peaks as
-    the level is no bound, but shows that the sample does not determine the tail, and becomes infinite. Rejected: FAR
-    times the level, which depends on a constant part of the load, such as a drag."""
+    """The interval of a level of fields. An upper end beyond FAR is no bound, but shows that the sample does not
+    determine the tail, and becomes infinite."""
     mean = np.mean(np.concatenate([f["peak"] for f in fields]))
-    return ends[0], np.inf if level > mean and ends[1] - mean > FAR * (level - mean) else ends[1]
+    return ends[0], np.inf if beyond(ends[1], FAR, level, mean) else ends[1]
 
 
 def commonest(values):

@@ -143,7 +143,7 @@ def extremes(s):
     text = (f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other "
             "peaks. GPD: peaks over a threshold; GEV: block maxima. Brackets: 95 %. * beyond the hours simulated. ! "
             "shape below -0.5: the levels are little more than the largest peak seen. No bound: the upper end is more "
-            f"than {FAR:g} times as far above the mean of the peaks as the level.")
+            f"than {FAR:g} times the level.")
     return [Table(head, rows), [text, *loads_text.cut_note(short), *(f"No fit for {r}." for r in sorted(refused))]]
 
 

@@ -305,7 +305,7 @@ def returns(s, markdown):
             "likelihood, widened by the scatter between fields that are alike. * beyond the hours simulated: "
             "extrapolated. ! shape below -0.5: the levels "
             "are little more than the largest value seen. No bound: the upper end is more than "
-            f"{FAR:g} times as far above the mean as the level.")
+            f"{FAR:g} times the level (of loads that cross zero, its height above the mean).")
     # advice on the remedy is only for a terminal
     said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
             for (load, tail), some in refused.items())
