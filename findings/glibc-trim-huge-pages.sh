@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# With the tunable glibc.malloc.hugetlb=1 the C library asks for huge pages for its heap. malloc_trim(0) gives free memory
-# back to the system, page by page, also between blocks in use. Where blocks of all sizes alternate, every huge page loses
-# some of its pages and falls apart, and what stays in use is in small pages from then on: 3 % given back cost all huge
-# pages. In a program that trims before each output, later passes over its arrays took half as long again.
+# With the tunable glibc.malloc.hugetlb=1 the C library asks for huge pages for its heap. malloc_trim(0) gives free
+# memory back to the system, page by page, also between blocks in use. Where blocks of all sizes alternate, every huge
+# page loses some of its pages and falls apart, and what stays in use is in small pages from then on: 3 % given back
+# cost all huge pages. A program that trims before each output then passes over its arrays more slowly.
 # Needs a kernel whose /sys/kernel/mm/transparent_hugepage/enabled is madvise or always.
 # shellcheck source=findings/packages.sh
 . "$(dirname "$0")/packages.sh"
