@@ -348,6 +348,14 @@ def test_the_head_tells_the_speed_ordered_from_the_one_made_good(tmp_path):
     assert "towed by a vessel, 0.5 m/s ordered and 0.05" in said("c", 0.5, "thrust")
 
 
+def test_the_head_tells_the_thickness_of_the_floes(tmp_path):
+    """Red: ice.thickness, also where the floes have another, and 1 floes."""
+    with Run(make_run(tmp_path / "run")) as run:
+        assert ", 2 floes, 0.375 m thick, " in style.conditions(run)
+        run.n_pieces = 1
+        assert ", 1 floe, 0.5 m thick, " in style.conditions(run)
+
+
 def test_a_jam_of_one_step_hides_no_force(tmp_path):
     """A force is held against the running mean of the tow, not against its largest sample."""
     folder = make_run(tmp_path / "run")

@@ -9,7 +9,6 @@ import threading
 from contextlib import contextmanager
 
 from bergtow import table as text_table
-from bergtow.result.origins import source_of_ice
 
 import matplotlib
 import numpy as np
@@ -109,12 +108,8 @@ def conditions(run):
     if run.n_floes and np.isfinite(concentration):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
-        words.append(f"{run.n_start} floes")
-        # floes may have individual thicknesses
-        if source_of_ice(run.case):
-            words.append(f"{np.mean(run.thickness[:run.n_start]):.3g} m thick")
-        elif np.isfinite(run.value("ice.thickness")):
-            words.append(f"{run.value('ice.thickness'):g} m thick")
+        words += [f"{run.n_start} floe{'s' if run.n_start > 1 else ''}",
+                  f"{np.mean(run.thickness[:run.n_start]):.3g} m thick"]
     mode, speed, made = run.case.get("tow.mode", ""), run.value("tow.speed"), run.speed_made_good
     if run.towed is not None and mode != "none" and np.isfinite(speed):
         words.append(f"towed{TOWED_BY.get(mode, '')}, {speed:.3g} m/s ordered" +
