@@ -384,6 +384,16 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
                                             "reference 9.00 N (a test), ratio 1.11")
 
 
+def test_samples_beyond_the_axis_are_named(tmp_path):
+    """Red: only those above it."""
+    folder = make_run(tmp_path / "run")
+    with edited(folder / "result.h5") as f:
+        f["series/ice_resistance"][50:52] = [5000.0, -700.0]
+    with Run(folder) as run:
+        said = [t.get_text() for t in plot_force.draw(run).axes[0].texts]
+    assert len(said) == 2 and "5.00 kN" in said[0] and "-700 N" in said[1]
+
+
 def test_the_head_of_the_forces_has_digits_at_any_magnitude(tmp_path):
     folder = make_run(tmp_path / "run")
     summary = json.loads((folder / "summary.json").read_text())
