@@ -14,23 +14,31 @@ function ticks(low, high, n) {
     return out;
 }
 
-// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is above is named,
-// not drawn.
+// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is beyond is named,
+// not drawn. side: 1 for what lies above zero, -1 below.
 function forceRange() {
-    const largest = (values, from) =>
-        values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, v) : top, 0);
-    const steady = curve.window ? curve.window[0] : curve.start;
-    const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start)));
-    const lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
-    const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0),
-                          ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
-    const top = Math.min(wish, highest) || highest || 1;
-    const single = largest(curve.lines[0].high, curve.start);
-    return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: single > 1.05 * top ? single : null};
+    const [ice, ...others] = curve.lines, steady = curve.window ? curve.window[0] : curve.start;
+    const largest = (side, values, from = curve.start) =>
+        values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, side * v) : top, 0);
+    const most = (side, lines) => Math.max(...lines.flatMap((l) => [largest(side, l.low), largest(side, l.high)]));
+    const wish = (side) => Math.min(
+        most(side, curve.lines),
+        Math.max(2.5 * largest(side, ice.smooth), 1.5 * side * (curve.mean || 0),
+                 ...others.map((l) => 1.25 * largest(side, l.smooth, steady))));
+    const [above, below] = [1, -1].map((side) => {
+        const all = most(side, curve.lines);
+        return wish(1) || wish(-1) ? Math.max(wish(side), Math.min(all, 0.3 * wish(-side))) : all;
+    });
+    const beyond = [["up", 1, above], ["down", -1, below]].flatMap(([way, side, end]) => {
+        const single = most(side, [ice]);
+        return single > 1.05 * end ? [`${way} to ${quantity(side * single, ice.unit)}`] : [];
+    });
+    return {low: -1.04 * below, high: 1.04 * above || (below ? 0 : 1), beyond};
 }
 
 const range = curve ? forceRange() : null;
-const prefix = range && range.high >= 2e6 ? [1e6, "M"] : range && range.high >= 2e3 ? [1e3, "k"] : [1, ""];
+const widest = range && Math.max(range.high, -range.low);
+const prefix = widest >= 2e6 ? [1e6, "M"] : widest >= 2e3 ? [1e3, "k"] : [1, ""];
 
 const chartScale = (ratio) => {
     const left = margin.left * ratio, right = chart.width - margin.right * ratio;
@@ -128,12 +136,11 @@ function drawCurves(g, s, ratio, colour) {
         }
     }
     g.restore();
-    if (range.beyond !== null) {
+    if (range.beyond.length) {
         g.fillStyle = colour("--faint");
         g.textAlign = "right";
         g.textBaseline = "top";
-        const {label, unit} = curve.lines[0];
-        g.fillText(`${label}: single samples up to ${quantity(range.beyond, unit)}`, s.right, s.top - 11 * ratio);
+        g.fillText(`${curve.lines[0].label}: single samples ${range.beyond.join(" and ")}`, s.right, s.top - 11 * ratio);
     }
     for (const e of curve.events) {
         g.fillStyle = colour("--warn");
