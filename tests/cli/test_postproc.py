@@ -533,6 +533,24 @@ def test_tow_line_goes_from_the_hull_to_the_carriage(tmp_path):
             assert lines == expected
 
 
+def test_the_towed_body_and_its_line_go_on_across_a_seam(tmp_path):
+    """Red: at one side of the whole domain only."""
+    folder = make_run(tmp_path / "run", ends="periodic", path=((19.5, 19.5),) * 3, mode="line")
+    with edited(folder / "result.h5") as f:
+        case = f["case"][()].decode().replace("sides: wall", "sides: periodic")
+        del f["case"]
+        f["case"] = case
+        f["series/carriage_x"][:], f["series/carriage_y"][:] = 25.0, 19.5
+    with Run(folder) as run:
+        axes = plot_field.draw(run, window="whole").axes[0]
+        colour = matplotlib.colors.to_rgba(style.BODY)
+        [body] = [c for c in axes.collections if len(c.get_facecolor()) and tuple(c.get_facecolor()[0]) == colour]
+        middles = [p.vertices[:4].mean(axis=0) for p in body.get_paths()]
+        assert all(any(np.allclose(m, at) for m in middles) for at in ([19.5, -20.5], [-20.5, 19.5], [-20.5, -20.5]))
+        [line] = [line for line in axes.lines if line.get_marker() == "s"]
+        assert [-15.0, 19.5] in line.get_xydata()[line.get_markevery()].tolist()
+
+
 def _body_centre(tmp_path, frame, position):
     """(row, column) of the towed body's pixels."""
     name = f"{frame}{position[0]:.0f}{position[1]:.0f}"
