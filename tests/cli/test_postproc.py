@@ -483,6 +483,12 @@ def test_the_arrow_goes_along_the_leg_at_hand():
     assert n == 46 and len(rows) == 40 and any("line broken" in row for row in rows)
 
 
+def test_decimals_follow_the_size_of_the_range():
+    """Red: none for a tank of 0.3 m, one for a run of 0.2 s."""
+    said = [style.fixed(*v) for v in ((0.0424, 0.3), (0.12, 0.2), (12.34, 40), (123.4, 2400), (-0.001, 40))]
+    assert said == ["0.042", "0.120", "12.3", "123", "0.0"]
+
+
 def test_a_moving_window_is_shown_about_the_body(tmp_path):
     """60 m northward through a window of 40 m whose frames hold wrapped places: title, track and view say where the
     body is."""
@@ -496,7 +502,7 @@ def test_a_moving_window_is_shown_about_the_body(tmp_path):
     with Run(folder) as run:
         figure = plot_field.draw(run, window="body")
         axes = figure.axes[:3]
-        assert [a.get_title(loc="left").split("(")[1] for a in axes] == ["0, 0) m", "30, 0) m", "60, 0) m"]
+        assert [a.get_title(loc="left").split("(")[1] for a in axes] == ["0.0, 0.0) m", "29.7, 0.0) m", "60.0, 0.0) m"]
         for a in axes:
             low, high = a.get_ylim()
             assert low >= -15 and high <= 25, "beyond the window lies the ice of its other end"

@@ -119,6 +119,12 @@ def conditions(run):
     return ", ".join(words)
 
 
+def fixed(value, span):
+    """A value out of a range, with decimals for a hundredth of that range or less."""
+    decimals = max(0, 2 - int(np.floor(np.log10(span))))
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"  # avoid minus zero
+
+
 def plain(text):
     """Text from a case as one line that matplotlib draws literally."""
     return " ".join(str(text).split()).replace("$", r"\$")

@@ -194,9 +194,12 @@ function quantity(v, unit) {
     return `${+(v / f).toPrecision(3)} ${p}${unit}`;
 }
 
+// A value out of a range, with decimals for a hundredth of that range or less.
+const fixed = (v, span) => v.toFixed(Math.max(0, 2 - Math.floor(Math.log10(span || 1)))).replace(/^-(?=[0.]*$)/, "");
+
 function say() {
-    const t = timeAt(state.p);
-    $("replay-now").textContent = `${t.toFixed(t < 100 ? 1 : 0)} s of ${+head.times[T - 1].toPrecision(6)} s`;
+    const t = timeAt(state.p), end = head.times[T - 1];
+    $("replay-now").textContent = `${fixed(t, end)} s of ${+end.toPrecision(6)} s`;
     $("replay-reading").textContent = reading(t);
     slider.value = state.p;
     slider.setAttribute("aria-valuetext", $("replay-now").textContent);
@@ -288,12 +291,13 @@ function floeAt(sx, sy) {
 const idOf = (i) => head.ids ? head.ids[i] : i;
 
 function describe(i) {
-    const k = nearest(), pose = floePose(i, k), where = head.period[0] || head.period[1] ? " (within the domain)" : "";
+    const k = nearest(), where = head.period[0] || head.period[1] ? " (within the domain)" : "";
+    const [x0, x1, y0, y1] = head.box, [x, y] = floePose(i, k).map((v) => fixed(v, Math.max(x1 - x0, y1 - y0)));
     return [`floe ${idOf(i)}`,
             `speed ${quantity(value("speed", k, i), "m/s")}`,
             `largest contact force ${quantity(value("force", k, i), "N")}`,
             `thickness ${quantity(data.thickness[i], "m")}, area ${quantity(data.area[i], "m²")}`,
-            `x ${pose[0].toFixed(1)} m, y ${pose[1].toFixed(1)} m${where}`,
+            `x ${x} m, y ${y} m${where}`,
             `values of the frame at ${+head.times[k].toPrecision(6)} s`];
 }
 
@@ -454,6 +458,7 @@ window.bergtow = {
         const p = playhead();
         return css(toScreen(...towedPose(p, centre(p)).slice(0, 2), origin(p)));
     },
+    get forces() { return [range.low, range.high]; },  // ends of the force axis
     get metre() { return css([state.scale, 0])[0]; },  // CSS pixels
 };
 
