@@ -504,5 +504,6 @@ def test_only_what_is_in_sight_is_in_the_legend():
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     handles, labels, lost = style.legend_of(axes)
-    assert labels == ["through it", "across", "level", "in part"] and lost == ["above", "beside", "never joined", "no line"]
+    assert labels == ["through it", "across", "level", "in part"]
+    assert lost == ["above", "beside", "never joined", "no line"]
     assert handles[-1].get_linestyle() == ":"

@@ -14,8 +14,8 @@ function ticks(low, high, n) {
     return out;
 }
 
-// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is beyond is named,
-// not drawn. side: 1 for what lies above zero, -1 below.
+// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is beyond is
+// named, not drawn. side: 1 for what lies above zero, -1 below.
 function forceRange() {
     const [ice, ...others] = curve.lines, steady = curve.window ? curve.window[0] : curve.start;
     const largest = (side, values, from = curve.start) =>
@@ -140,7 +140,8 @@ function drawCurves(g, s, ratio, colour) {
         g.fillStyle = colour("--faint");
         g.textAlign = "right";
         g.textBaseline = "top";
-        g.fillText(`${curve.lines[0].label}: single samples ${range.beyond.join(" and ")}`, s.right, s.top - 11 * ratio);
+        const words = `${curve.lines[0].label}: single samples ${range.beyond.join(" and ")}`;
+        g.fillText(words, s.right, s.top - 11 * ratio);
     }
     for (const e of curve.events) {
         g.fillStyle = colour("--warn");
