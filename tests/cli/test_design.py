@@ -496,11 +496,13 @@ def test_only_what_is_in_sight_is_in_the_legend():
     axes.plot([-5, 6], [0.4, 0.6], label="across")
     axes.plot([3], [0.5], "o", label="beside")
     axes.plot([0.5, np.nan, 0.6], [-9, np.nan, 9], label="never joined")
+    axes.plot([0.5, 2], [0.5, np.nan], label="no line")
     axes.axhline(0.5, label="level")
     axes.plot(x, x + 30, label="in part")  # an estimate: beyond its range it is dotted, under the same name
     axes.plot(x, x / 2, ":", label="in part")
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     handles, labels, lost = style.legend_of(axes)
-    assert labels == ["through it", "across", "level", "in part"] and lost == ["above", "beside", "never joined"]
+    assert labels == ["through it", "across", "level", "in part"]
+    assert lost == ["above", "beside", "never joined", "no line"]
     assert handles[-1].get_linestyle() == ":"

@@ -66,7 +66,7 @@ def test_the_picture_has_points_bars_and_curves(runs):
         low, high = (np.nan if v is None else v for v in points[0].conditions["curves"]["valid_range"][name])
         y = np.asarray(lines[label].get_ydata(), dtype=float)
         drawn = np.isfinite(y)
-        assert np.array_equal(drawn, (a >= low) & (a <= high) & (force > 0)), name
+        assert np.array_equal(drawn, (a >= low) & (a <= high) & np.isfinite(force)), name
         assert np.allclose(y[drawn] * scale, force[drawn], rtol=1e-12), name
     alone, averaged = axes.containers
     assert list(alone[0].get_xdata()) == [0.1, 0.95] and np.allclose(alone[0].get_ydata(), [2, 800])
@@ -75,7 +75,7 @@ def test_the_picture_has_points_bars_and_curves(runs):
     assert list(averaged[0].get_xdata()) == [0.5] and np.allclose(averaged[0].get_ydata(), [50])
     [[(_, low), (_, high)]] = averaged[2][0].get_segments()
     assert np.isclose(high, 50 + 12.706 * 10, rtol=1e-4), "t of one degree of freedom, standard error 10"
-    assert 0 < low < 1, "an interval below zero ends below the picture"
+    assert np.isclose(low, 50 - 12.706 * 10, rtol=1e-4), "below the picture"
     tows = lines["simulated, a tow"]
     assert list(tows.get_xdata()) == [0.5, 0.5] and np.allclose(tows.get_ydata(), [40, 60])
     low, high = axes.get_ylim()
@@ -170,9 +170,25 @@ def test_the_default_place_is_beside_the_first_run(runs, tmp_path):
 def test_a_run_without_resistance_or_error_is_shown_as_such(tmp_path):
     points = [plot_resistance.read(made_up(tmp_path / "a", 0.1, 0.0, se=None)),
               plot_resistance.read(made_up(tmp_path / "b", 0.5, 4e4, se=None))]
-    figure = plot_resistance.draw(points)
-    assert any("1 run(s) without resistance" in text.get_text() for text in figure.texts)
+    axes = plot_resistance.draw(points).axes[0]
+    assert axes.get_yscale() == "linear" and axes.get_ylim()[0] == 0
+    assert list(axes.containers[0][0].get_ydata()) == [0, 40]
     assert "–" in plot_resistance.table(points).splitlines()[2]
+
+
+def test_ice_that_pushes_the_body_ahead_is_shown(runs):
+    """Red: no point on the default axis; estimates and drag below zero left out of any."""
+    points = [plot_resistance.read(run) for run in runs]
+    for p in points:
+        p.mean, p.low, p.high = -p.mean, -p.high, -p.low
+        for of in (p.conditions["curves"], *(e.numbers for e in p.estimates.values())):
+            of.update({k: -np.array(of[k], dtype=float) for k in {*p.estimates, "force_n", "low_n", "high_n"} & {*of}})
+    axes = plot_resistance.draw(points).axes[0]
+    low, high = axes.get_ylim()
+    bars = [end for bar in axes.containers for s in bar[2][0].get_segments() for end in s[:, 1]]
+    assert axes.get_yscale() == "linear" and low < min(bars) and max(bars) <= high
+    drawn = {t.get_text() for t in axes.get_legend().get_texts()}
+    assert {"simulated, a tow", "Lichey-Hellmer", "open-water drag (comes on top)"} <= drawn
 
 
 def test_runs_of_other_conditions_are_refused(runs, tmp_path):

@@ -348,6 +348,14 @@ def test_the_head_tells_the_speed_ordered_from_the_one_made_good(tmp_path):
     assert "towed by a vessel, 0.5 m/s ordered and 0.05" in said("c", 0.5, "thrust")
 
 
+def test_the_head_tells_the_thickness_of_the_floes(tmp_path):
+    """Red: ice.thickness, also where the floes have another, and 1 floes."""
+    with Run(make_run(tmp_path / "run")) as run:
+        assert ", 2 floes, 0.375 m thick, " in style.conditions(run)
+        run.n_pieces = 1
+        assert ", 1 floe, 0.5 m thick, " in style.conditions(run)
+
+
 def test_a_jam_of_one_step_hides_no_force(tmp_path):
     """A force is held against the running mean of the tow, not against its largest sample."""
     folder = make_run(tmp_path / "run")
@@ -374,6 +382,16 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
         assert plot_force.draw(run, top=14.0).axes[0].get_ylim()[1] == 14.0
         assert plot_force.findings(run) == ("mean: ice resistance 10.0 N (95 %: 9.0 to 11.0 N); tow force 12.0 N; "
                                             "reference 9.00 N (a test), ratio 1.11")
+
+
+def test_samples_beyond_the_axis_are_named(tmp_path):
+    """Red: only those above it."""
+    folder = make_run(tmp_path / "run")
+    with edited(folder / "result.h5") as f:
+        f["series/ice_resistance"][50:52] = [5000.0, -700.0]
+    with Run(folder) as run:
+        said = [t.get_text() for t in plot_force.draw(run).axes[0].texts]
+    assert len(said) == 2 and "5.00 kN" in said[0] and "-700 N" in said[1]
 
 
 def test_the_head_of_the_forces_has_digits_at_any_magnitude(tmp_path):
@@ -465,6 +483,12 @@ def test_the_arrow_goes_along_the_leg_at_hand():
     assert n == 46 and len(rows) == 40 and any("line broken" in row for row in rows)
 
 
+def test_decimals_follow_the_size_of_the_range():
+    """Red: none for a tank of 0.3 m, one for a run of 0.2 s."""
+    said = [style.fixed(*v) for v in ((0.0424, 0.3), (0.12, 0.2), (12.34, 40), (123.4, 2400), (-0.001, 40))]
+    assert said == ["0.042", "0.120", "12.3", "123", "0.0"]
+
+
 def test_a_moving_window_is_shown_about_the_body(tmp_path):
     """60 m northward through a window of 40 m whose frames hold wrapped places: title, track and view say where the
     body is."""
@@ -478,7 +502,7 @@ def test_a_moving_window_is_shown_about_the_body(tmp_path):
     with Run(folder) as run:
         figure = plot_field.draw(run, window="body")
         axes = figure.axes[:3]
-        assert [a.get_title(loc="left").split("(")[1] for a in axes] == ["0, 0) m", "30, 0) m", "60, 0) m"]
+        assert [a.get_title(loc="left").split("(")[1] for a in axes] == ["0.0, 0.0) m", "29.7, 0.0) m", "60.0, 0.0) m"]
         for a in axes:
             low, high = a.get_ylim()
             assert low >= -15 and high <= 25, "beyond the window lies the ice of its other end"
@@ -513,6 +537,24 @@ def test_tow_line_goes_from_the_hull_to_the_carriage(tmp_path):
                 line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "s" and len(line.get_xydata())
             ]
             assert lines == expected
+
+
+def test_the_towed_body_and_its_line_go_on_across_a_seam(tmp_path):
+    """Red: at one side of the whole domain only."""
+    folder = make_run(tmp_path / "run", ends="periodic", path=((19.5, 19.5),) * 3, mode="line")
+    with edited(folder / "result.h5") as f:
+        case = f["case"][()].decode().replace("sides: wall", "sides: periodic")
+        del f["case"]
+        f["case"] = case
+        f["series/carriage_x"][:], f["series/carriage_y"][:] = 25.0, 19.5
+    with Run(folder) as run:
+        axes = plot_field.draw(run, window="whole").axes[0]
+        colour = matplotlib.colors.to_rgba(style.BODY)
+        [body] = [c for c in axes.collections if len(c.get_facecolor()) and tuple(c.get_facecolor()[0]) == colour]
+        middles = [p.vertices[:4].mean(axis=0) for p in body.get_paths()]
+        assert all(any(np.allclose(m, at) for m in middles) for at in ([19.5, -20.5], [-20.5, 19.5], [-20.5, -20.5]))
+        [line] = [line for line in axes.lines if line.get_marker() == "s"]
+        assert [-15.0, 19.5] in line.get_xydata()[line.get_markevery()].tolist()
 
 
 def _body_centre(tmp_path, frame, position):

@@ -50,6 +50,10 @@ MOVING = changed(
 
 RAFTS = changed(TOW, domain={"length": 15, "width": 8, "ends_closing": 0.15}, ice__concentration=0.75,
                 ice__rafting={"kappa": 5}, run__duration=15)
+#: the ice goes faster than the towed body, which lies on the seam of the sides
+DOWNSTREAM = changed(TOW, output__window_start=2, domain={"length": 20, "width": 8, "ends": "periodic",
+                                                          "sides": "periodic"}, body__y=3.8,
+                     tow={"mode": "speed", "speed": 0.05}, water={"current_x": 0.4}, run__duration=6)
 
 
 def script(*arguments):
@@ -442,6 +446,23 @@ def test_floes_over_each_other_are_shown(chrome, tmp_path, monkeypatch):
                *map(float, middle))
     assert np.abs(np.array(shade) - [int(style.RAFTED[k:k + 2], 16) for k in (1, 3, 5)]).max() < 9
     assert "floes over each other" in text(chrome, "#replay-rafts")[0] and complaints(chrome) == []
+
+
+def test_a_body_on_the_seam_that_the_ice_pushes_ahead(chrome, tmp_path, monkeypatch):
+    """Red: the half beyond the seam beside the water and open water at the other side; a force axis up to 1 N; tenths
+    of a second."""
+    r = run(tmp_path, DOWNSTREAM)
+    ready(chrome, page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch))
+    seek(chrome, 0)
+    body = [int(style.BODY[k:k + 2], 16) for k in (1, 3, 5)]
+    for metres, there in ((7.5, True), (-0.6, False)):
+        shade = js(chrome, """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth;
+            const [x, y] = bergtow.towed(), at = y + bergtow.metre * arguments[0];
+            return [...c.getContext('2d').getImageData(x * ratio, at * ratio, 1, 1).data].slice(0, 3)""", metres)
+        assert (shade == body) == there
+    low, high = js(chrome, "return bergtow.forces")
+    assert low < r.summary["mean_tow_force_n"] < 0 and high < -low
+    assert text(chrome, "#replay-now") == ["0.00 s of 6 s"] and complaints(chrome) == []
 
 
 def test_rigid_floes_have_no_such_legend(page):

@@ -477,6 +477,19 @@ def test_negative_values_are_in_the_picture(tmp_path):
     assert low < -10 and high > 10
 
 
+def test_negative_forces_are_in_the_picture(tmp_path):
+    """Red: intervals below the lowest field cut off, and no estimate below zero."""
+    some = [made_up.member(np.full(30, -100.0 - 10 * r), {"ice.concentration": a}, c,
+                           estimates={n: -f for n, f in made_up.ESTIMATES.items()})
+            for c, a in enumerate((0.3, 0.6)) for r in range(3)]
+    figure = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration")
+    axes = figure.axes[0]
+    low, high = axes.get_ylim()
+    bars = np.array([s[:, 1] for s in axes.containers[0][2][0].get_segments()])
+    assert low < bars.min() < -120 and high > 0
+    assert "Lichey-Hellmer" in [t.get_text() for t in figure.legends[0].get_texts()]
+
+
 @pytest.mark.slow
 def test_every_picture_of_a_grid(plain, tmp_path):
     names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")

@@ -38,8 +38,9 @@ def panel_words(run, label, frame, follow):
         words.insert(0, label)
     lines = [", ".join(words)]
     if follow:
-        x, y = body_place(run, frame)
-        lines.append(f"body at ({x:.0f}, {y:.0f}) m")
+        x0, x1, y0, y1 = run.box
+        x, y = (style.fixed(v, max(x1 - x0, y1 - y0)) for v in body_place(run, frame))
+        lines.append(f"body at ({x}, {y}) m")
     return lines
 
 

@@ -107,7 +107,7 @@ class Film:
         self.cursor.set_data([now, now], self.curve.get_ylim())
         at = max(done - 1, 0)
         self.dot.set_data([self.time[at]], [self.smooth[at] / self.factor])
-        self.clock.set_text(f"t = {now:.{0 if self.time[-1] >= 100 else 1}f} s")
+        self.clock.set_text(f"t = {style.fixed(now, self.time[-1])} s")
         canvas.restore_region(self.ground)
         for artist in self.scene.artists:
             self.scene.axes.draw_artist(artist)

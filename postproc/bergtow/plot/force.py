@@ -50,10 +50,12 @@ def _clip_peaks(axes, raw, smooth, marks, factor, top):
     if high <= low:
         high = low + 1.0
     axes.set_ylim(low / factor, (high if top else 1.04 * high) / factor)
-    if finite.max() > 1.04 * high:
-        axes.annotate(f"single samples up to {style.quantity(finite.max(), 'N')}", (0.995, 0.97),
-                      xycoords="axes fraction", ha="right", va="top", fontsize=9, color=style.FAINT,
-                      bbox=dict(facecolor=style.PAPER, edgecolor="none", alpha=0.8, pad=1.5))
+    for end, beyond, at, va in ((finite.max(), finite.max() > 1.04 * high, 0.97, "top"),
+                                (finite.min(), finite.min() < low, 0.03, "bottom")):
+        if beyond:
+            axes.annotate(f"single samples {'up' if va == 'top' else 'down'} to {style.quantity(end, 'N')}",
+                          (0.995, at), xycoords="axes fraction", ha="right", va=va, fontsize=9, color=style.FAINT,
+                          bbox=dict(facecolor=style.PAPER, edgecolor="none", alpha=0.8, pad=1.5))
 
 
 def draw_ice(axes, run, factor, unit, top=None):

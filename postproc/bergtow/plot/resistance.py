@@ -206,84 +206,64 @@ def draw_estimates(axes, points, factor):
         a, force = curve(first, name)
         low, high = np.array(valid[name], dtype=float)
         inside = (a >= low) & (a <= high)
-        with_force = np.where(force > 0, force, np.nan) / factor
-        axes.plot(a, np.where(inside, with_force, np.nan), color=colour, linewidth=2, label=label)
-        axes.plot(a, with_force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5, label=label)
+        force = force / factor
+        axes.plot(a, np.where(inside, force, np.nan), color=colour, linewidth=2, label=label)
+        axes.plot(a, force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5, label=label)
         spans = [p.estimates[name].numbers for p in points if name in p.estimates and p.estimates[name].force]
         spans = [s for s in spans if None not in (s["force_n"], s["low_n"], s["high_n"])]
         if spans and spans[0]["high_n"] > spans[0]["low_n"]:
             down, up = (spans[0][k] / spans[0]["force_n"] for k in ("low_n", "high_n"))
-            axes.fill_between(a, np.where(inside, with_force * down, np.nan), np.where(inside, with_force * up, np.nan),
+            axes.fill_between(a, np.where(inside, force * down, np.nan), np.where(inside, force * up, np.nan),
                               color=colour, alpha=0.18, linewidth=0, zorder=1.2)
     for estimate in first.estimates.values():
-        if estimate.on_top and estimate.force > 0:
+        if estimate.on_top:
             axes.axhline(estimate.force / factor, color=style.FAINT, linewidth=1, dashes=(6, 3),
                          label=f"{estimate.label} (comes on top)")
 
 
 def limits(points, log):
     """Lower and upper end of the force axis, N, from the runs and the estimates that are valid for them."""
-    seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)] + [r["high"] for r in rows(points)]
-    for p in points:
-        for e in p.of_ice.values():
-            if e.valid and e.force > 0:
-                seen += [e.numbers["low_n"], e.numbers["high_n"]]
-    seen = np.array([x for x in seen if x is not None and np.isfinite(x)])
-    if not log:
-        return min(0.0, seen.min()), 1.1 * max(seen.max(), 1e-12)
-    seen = seen[seen > 0]
-    if not len(seen):
-        return 0.1, 10.0
-    floor = min([p.mean for p in points if p.mean > 0], default=seen.max())
-    # an error bar that reaches zero must not stretch the axis
-    return max(seen.min(), 0.05 * floor) / 2.5, 2.5 * seen.max()
+    around = [p.reference for p in points] + [r[end] for r in rows(points) for end in ("low", "high")]
+    around += [e.numbers[end] for p in points for e in p.of_ice.values() if e.valid for end in ("low_n", "high_n")]
+    return style.force_limits([p.mean for p in points], around, log)
 
 
-def draw_runs(axes, points, factor, low, log):
+def draw_runs(axes, points, factor):
     """Draw the runs, each with its interval if it is the only one at its concentration, the means of several runs with
-    theirs, and the measured values; return how many lie outside the picture."""
+    theirs, and the measured values."""
     averaged = [r for r in rows(points) if r["runs"] > 1]
     alone = np.array([not any(p.asked == r["concentration"] for r in averaged) for p in points])
     a = np.array([p.concentration for p in points])
     mean = np.array([p.mean for p in points])
-    below, above = (np.nan_to_num(np.array(x))
-                    for x in ([p.mean - p.low for p in points], [p.high - p.mean for p in points]))
+    bars = np.nan_to_num([[p.mean - p.low for p in points], [p.high - p.mean for p in points]]) / factor
     steady = np.array([p.steady for p in points])
-    shown = mean > 0 if log else np.full(len(mean), True)
-    below = np.minimum(below, mean - low / 2) if log else below
     for which, face, label in ((steady & alone, style.ICE, "simulated, 95 % of the run's mean"),
                                (~steady & alone, style.PAPER, "window not steady or too short")):
-        which = which & shown
         if which.any():
-            axes.errorbar(a[which], mean[which] / factor,
-                          yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor, fmt="o", color=style.ICE,
+            axes.errorbar(a[which], mean[which] / factor, yerr=bars[:, which], fmt="o", color=style.ICE,
                           markerfacecolor=face, markersize=6, capsize=3, linewidth=1.4, zorder=5, label=label)
     for which, face, label in ((steady & ~alone, style.ICE, "simulated, a tow"),
                                (~steady & ~alone, style.PAPER, "a tow, not steady or too short")):
-        which = which & shown
         if which.any():
             axes.plot(a[which], mean[which] / factor, "o", color=style.ICE, markerfacecolor=face, markersize=4,
                       alpha=0.6, zorder=4, label=label)
-    least = [(p.concentration, p.mean / factor) for p in points
-             if isinstance(p.mean, at_least.AtLeast) and (p.mean > 0 or not log)]
+    least = [(p.concentration, p.mean / factor) for p in points if isinstance(p.mean, at_least.AtLeast)]
     if least:
         axes.plot(*zip(*least), linestyle="none", marker="^", color=style.JAM, markersize=7, zorder=7,
                   label="simulated, at least")
     if averaged:
         centre, low_end, high_end = (np.array([r[key] for r in averaged]) for key in ("mean", "low", "high"))
-        reach = np.minimum(centre - low_end, centre - low / 2) if log else centre - low_end
         axes.errorbar([r["concentration"] for r in averaged], centre / factor,
-                      yerr=np.array([np.maximum(reach, 0), high_end - centre]) / factor, fmt="s", color=style.INK,
+                      yerr=np.array([centre - low_end, high_end - centre]) / factor, fmt="s", color=style.INK,
                       markersize=5, capsize=5, linewidth=1.8, zorder=6, label="mean of the tows, 95 % (t)")
     measured = [p for p in points if np.isfinite(p.reference)]
     if measured:
         axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured], "D",
                   color=style.REFERENCE, markersize=6, zorder=6, label="measured")
-    return np.count_nonzero(~shown)
 
 
-def write_around(figure, points, lost, hidden):
-    """Write heading and notes. lost: legends of curves outside the axes; hidden: runs outside the axes."""
+def write_around(figure, points, lost):
+    """Write heading and notes. lost: legends of curves outside the axes."""
     e = points[0].conditions
     figure.text(
         0.02,
@@ -299,8 +279,6 @@ def write_around(figure, points, lost, hidden):
     notes += ["out of the picture:", *lost] if lost else []
     if e["length_scale"] != 1:
         notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")
-    if hidden:
-        notes.append(f"{hidden} run(s) without resistance not shown")
     some = [p.mean.share for p in points if isinstance(p.mean, at_least.AtLeast)]
     if some:
         notes.append(f"{len(some)} run(s) at least this: in up to\n{100 * max(some):.2g} % of the steps the load\n"
@@ -312,15 +290,16 @@ def write_around(figure, points, lost, hidden):
 
 
 def draw(points, log=True):
-    """The figure of resistance against concentration."""
+    """The figure of resistance against concentration. log: a logarithmic axis if all means are positive."""
     check_alike(points)
+    log = log and min(p.mean for p in points) > 0
     low, high = limits(points, log)
-    factor, unit = style.scale([high / 3 if log else high], "N")
+    factor, unit = style.scale([high / 3] if log else [low, high], "N")
     figure = style.Figure(figsize=(11, 7))
     axes = figure.add_axes((0.085, 0.1, 0.63, 0.755))
     draw_estimates(axes, points, factor)
     of_estimates = axes.get_legend_handles_labels()[0]
-    hidden = draw_runs(axes, points, factor, low, log)
+    draw_runs(axes, points, factor)
     if log:
         style.logarithmic(axes.yaxis)
     axes.set(ylim=(low / factor, high / factor), xlim=(0, 1), xlabel="ice concentration",
@@ -330,7 +309,7 @@ def draw(points, log=True):
     order = sorted(range(len(labels)), key=lambda i: handles[i] in of_estimates)
     axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left", bbox_to_anchor=(1.02, 1.0),
                 borderaxespad=0, handlelength=2.4, labelspacing=0.8)
-    write_around(figure, points, lost, hidden)
+    write_around(figure, points, lost)
     return figure
 
 
@@ -339,7 +318,8 @@ def options(p):
                    help="output folders of runs that differ in concentration and seed only")
     p.add_argument("-o", "--output", metavar="FILE", type=Path,
                    help="file to write (default: resistance.png beside the first RUN)")
-    p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
+    p.add_argument("--linear", action="store_true",
+                   help="linear force axis (default: logarithmic if all means are positive)")
     p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")
     p.add_argument("--words", action="store_true", help="also print the numbers as sentences")
     arguments.add_force(p)

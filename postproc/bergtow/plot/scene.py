@@ -211,11 +211,13 @@ class Scene:
         axes.yaxis.set_major_locator(MaxNLocator(9 if high > 2 * wide else 5, steps=(1, 2, 5, 10)))
         axes.set(xlabel=names[0], ylabel=names[1])
 
-        # Walls are endless along a periodic direction; a view that follows the body may extend across the seam.
-        px, py = run.period if follow else (0.0, 0.0)
+        # Walls are endless along a periodic direction. The towed body and its line extend across a seam, but not across
+        # the ends of a moving window.
+        px, py = run.period
         self._images = [
             np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))
         ]
+        self._towed = [a for a in self._images if not a[0] or run.case.get("domain.ends") != "moving"]
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         self._corners = corners
         kept = dict(animated=animated)
@@ -243,12 +245,11 @@ class Scene:
                             **kept)
         self._body = PolyCollection([], facecolors=style.BODY, edgecolors=style.BODY_EDGE, linewidths=1.2, zorder=6,
                                     visible=run.towed is not None, **kept)
-        self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.TRACK, edgecolor=style.BODY_EDGE,
-                              linewidth=1.0, zorder=7, visible=False, **kept)
+        self._arrow = PolyCollection([], facecolors=style.TRACK, edgecolors=style.BODY_EDGE, linewidths=1.0, zorder=7,
+                                     **kept)
         self._heading = tow_heading(run)
         if run.case.get("tow.mode") == "line":
             self._heading = None  # the line itself shows the direction
-        self._arrow.set_visible(self._heading is not None)
         self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
@@ -290,12 +291,16 @@ class Scene:
         self._water.set_xy(run.on_page(self._unbounded(self._corners) - origin))
         if run.towed is None:
             return
-        self._body.set_verts([run.on_page(bodies[run.towed] + shift - origin) for shift in self._images])
+        self._body.set_verts(self._everywhere(bodies[run.towed] - origin))
         self._show_track(frame, origin)
         self._show_line(frame, position - origin)
         if self._heading is not None:
             self._heading = tow_heading(run, run.frame_times[frame])
             self._show_arrow(position - origin, bodies[run.towed] - origin)
+
+    def _everywhere(self, points):
+        """[n, 2] m, of the towed body or its line: all images on the page."""
+        return [self.run.on_page(points + shift) for shift in self._towed]
 
     def _new_cracks(self, frame, centre):
         """[K, 2, 2] m, ends of the cracks that opened since the previous frame, at the positions where they opened.
@@ -350,8 +355,10 @@ class Scene:
         """Draw the line from the hull to its towing end, a square, where two branches meet; omit broken branches."""
         points = tow_line(self.run, frame, position)
         if points is not None:
-            self._line.set_markevery([min(1, len(points) - 1)])  # only the towing end if all branches have broken
-            self._line.set_data(*self.run.on_page(points).T)
+            apart = np.concatenate(self._everywhere(np.vstack([points, np.full(2, np.nan)])))[:-1]
+            # only the towing end if all branches have broken
+            self._line.set_markevery(list(range(min(1, len(points) - 1), len(apart), len(points) + 1)))
+            self._line.set_data(*apart.T)
 
     def _show_arrow(self, position, outline):
         """Draw an arrow ahead of the body, along the tow."""
@@ -361,4 +368,4 @@ class Scene:
         size = self._arrow_length
         shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]
                           ]) * size
-        self._arrow.set_xy(self.run.on_page(ahead + shape[:, :1] * u + shape[:, 1:] * n))
+        self._arrow.set_verts(self._everywhere(ahead + shape[:, :1] * u + shape[:, 1:] * n))

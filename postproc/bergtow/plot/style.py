@@ -9,7 +9,6 @@ import threading
 from contextlib import contextmanager
 
 from bergtow import table as text_table
-from bergtow.result.origins import source_of_ice
 from bergtow.result.run import SLOWER
 
 import matplotlib
@@ -110,12 +109,8 @@ def conditions(run):
     if run.n_floes and np.isfinite(concentration):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
-        words.append(f"{run.n_start} floes")
-        # floes may have individual thicknesses
-        if source_of_ice(run.case):
-            words.append(f"{np.mean(run.thickness[:run.n_start]):.3g} m thick")
-        elif np.isfinite(run.value("ice.thickness")):
-            words.append(f"{run.value('ice.thickness'):g} m thick")
+        words += [f"{run.n_start} floe{'s' if run.n_start > 1 else ''}",
+                  f"{np.mean(run.thickness[:run.n_start]):.3g} m thick"]
     mode, speed, made = run.case.get("tow.mode", ""), run.value("tow.speed"), run.speed_made_good
     if run.towed is not None and mode != "none" and np.isfinite(speed):
         words.append(f"towed{TOWED_BY.get(mode, '')}, {speed:.3g} m/s ordered" +
@@ -123,6 +118,12 @@ def conditions(run):
     if run.summary.get("stopped"):
         words.append("stopped early")
     return ", ".join(words)
+
+
+def fixed(value, span):
+    """A value out of a range, with decimals for a hundredth of that range or less."""
+    decimals = max(0, 2 - int(np.floor(np.log10(span))))
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"  # avoid minus zero
 
 
 def plain(text):
@@ -183,6 +184,18 @@ def logarithmic(*axis):
         one.set_minor_formatter(NullFormatter())
 
 
+def force_limits(means, around, log):
+    """Ends of a force axis: the means, all positive if it is logarithmic, and what is drawn around them, their
+    intervals and estimates; None and NaN do not count."""
+    seen = np.array([v for v in (*means, *around) if v is not None and np.isfinite(v)])
+    if log:
+        # an interval that nearly reaches zero must not stretch the axis
+        return max(seen[seen > 0].min(), 0.05 * min(means)) / 2.5, 2.5 * seen.max()
+    low, high = min(0.0, seen.min()), max(0.0, seen.max())
+    margin = 0.08 * (high - low) or 1.0
+    return low - margin * (low < 0), high + margin
+
+
 def level_of(axes):
     """The transform of a horizontal level across the picture (axhline), where only y is in data coordinates."""
     return axes.get_yaxis_transform(which="grid")
@@ -197,11 +210,10 @@ def in_sight(axes, line):
     known = np.isfinite(x) & np.isfinite(y) & ((y > 0) | (axes.get_yscale() != "log"))
     x, y = np.where(known, x, np.nan), np.where(known, y, np.nan)
     inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
-    if line.get_linestyle() == "None":
-        return bool(inside.any())
     def meets(v, least, most):
-        return (np.fmin(v[:-1], v[1:]) <= most) & (np.fmax(v[:-1], v[1:]) >= least)
-    return bool(inside.any() or np.any(meets(x, left, right) & meets(y, low, high)))
+        return (np.minimum(v[:-1], v[1:]) <= most) & (np.maximum(v[:-1], v[1:]) >= least)
+    marked = line.get_marker() != "None" and inside.any()
+    return bool(marked or line.get_linestyle() != "None" and np.any(meets(x, left, right) & meets(y, low, high)))
 
 
 def legend_of(axes):

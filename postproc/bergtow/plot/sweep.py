@@ -110,19 +110,14 @@ def fields_legend(e):
 
 def force_limits(e, some_groups, log):
     """Ends of the force axis, N: every field, the intervals, and the estimates meant for the conditions."""
-    seen = [v for _, some in some_groups for c in some for v in e.mean[c.finished]]
-    tops = [stat_mean.t_interval(e.mean[c.finished])[1] for _, some in some_groups for c in some]
-    seen += [v for v in tops if np.isfinite(v)]
-    low = min((v for v in seen if v > 0), default=1.0)
-    high = max(seen, default=1.0)
+    means = [e.mean[c.finished] for _, some in some_groups for c in some]
+    around = [end for fields in means for end in stat_mean.t_interval(fields)]
+    high = np.nanmax(np.abs([*np.concatenate(means), *around]))
     for name in (name for name, estimate in e.estimates.items() if not estimate["on_top"]):
         force, valid = (e.summary.get(f"estimates_{name}_{what}", np.zeros(e.n))[e.used]
                         for what in ("force_n", "valid"))
-        seen += [v for v in force[(valid == 1) & (force > low / 30) & (force < 30 * high)]]
-    seen = np.array([v for v in seen if np.isfinite(v)])
-    if log:
-        return seen[seen > 0].min() / 2, 2 * seen.max()
-    return min(0.0, seen.min()), 1.08 * max(seen.max(), 1e-12)
+        around += force[(valid == 1) & (np.abs(force) < 30 * high)].tolist()
+    return style.force_limits(np.concatenate(means), around, log)
 
 
 def power_law(x, means):
@@ -160,7 +155,7 @@ def draw_estimates(axes, e, some, key, factor):
     for name, estimate in e.estimates.items():
         force, valid = (np.array([e.summary.get(f"estimates_{name}_{what}", np.full(e.n, np.nan))[c.finished].mean()
                                   for c in some]) for what in ("force_n", "valid"))
-        force = np.where(force > 0, force, np.nan) / factor
+        force = force / factor
         if estimate["on_top"]:
             axes.plot(x, force, color=style.FAINT, linewidth=1, dashes=(6, 3),
                       label=f"{estimate['label']} (comes on top)")
@@ -183,7 +178,7 @@ def draw_sweep(e, key):
     forces = [v for _, some in shown for c in some for v in e.mean[c.finished]]
     log_y = wants_log(forces) or log_x and min(forces, default=0.0) > 0  # zero cannot be shown on a logarithmic axis
     low, high = force_limits(e, shown, log_y)
-    factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
+    factor, unit = style.scale([np.sqrt(low * high)] if log_y else [low, high], "N")
     figure, grid = style.subplots(rows, columns, figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2), squeeze=False,
                                   sharex=True, sharey=True)
     extra, lost = {}, {}

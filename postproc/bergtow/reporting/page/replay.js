@@ -155,7 +155,7 @@ function centre(p) {
     return C;
 }
 
-// Where the towed body is drawn: at the image nearest to the centre.
+// Where the towed body is: at the image nearest to the centre.
 function towedPose(p, C) {
     const pose = bodyPose(head.towed, p);
     return [C[0] + image(pose[0] - C[0], head.period[0]), C[1] + image(pose[1] - C[1], head.period[1]), pose[2]];
@@ -383,28 +383,32 @@ function drawTrack(g, p, C, o) {
 }
 
 function drawBodies(g, p, C, o) {
-    const shifts = (period, c, at) => period > 0 && (state.follow || moving)
-        ? [-1, 0, 1].map((k) => period * (Math.round((c - at) / period) + k)) : [0];
+    const shifts = (period, c, at, laps = [-1, 0, 1]) => period > 0
+        ? laps.map((k) => period * (Math.round((c - at) / period) + k)) : [0];
+    const images = (b, along) => {
+        const [x, y, yaw] = bodyPose(b, p);
+        return shifts(head.period[0], C[0], x, along).flatMap(
+            (ax) => shifts(head.period[1], C[1], y).map((ay) => [x + ax, y + ay, yaw]));
+    };
     head.bodies.forEach((body, b) => {
         if (body.towed) return;
-        const pose = bodyPose(b, p);
         g.fillStyle = body.wall ? head.style.wall : head.style.fixed;
-        for (const ax of shifts(head.period[0], C[0], pose[0]))
-            for (const ay of shifts(head.period[1], C[1], pose[1])) {
-                path(g, body.vertices, [pose[0] + ax, pose[1] + ay, pose[2]], o);
-                g.fill();
-            }
+        for (const pose of images(b)) {
+            path(g, body.vertices, pose, o);
+            g.fill();
+        }
     });
     if (head.towed === null) return;
-    const pose = towedPose(p, C);
-    drawLine(g, p, pose, o);
-    path(g, head.bodies[head.towed].vertices, pose, o);
-    g.fillStyle = head.style.body;
-    g.strokeStyle = head.style.body_edge;
-    g.lineWidth = 1.5;
-    g.fill();
-    g.stroke();
-    if (head.heading) drawArrow(g, p, pose, o);
+    for (const pose of images(head.towed, moving ? [0] : undefined)) {  // it goes with a moving window
+        drawLine(g, p, pose, o);
+        path(g, head.bodies[head.towed].vertices, pose, o);
+        g.fillStyle = head.style.body;
+        g.strokeStyle = head.style.body_edge;
+        g.lineWidth = 1.5;
+        g.fill();
+        g.stroke();
+        if (head.heading) drawArrow(g, p, pose, o);
+    }
 }
 
 // Line from the hull to its towing end: a square, or a small ship, whose size is not to scale.
@@ -487,15 +491,17 @@ function drawField() {
     g.fillStyle = getComputedStyle(root).getPropertyValue("--outside").trim() || "#ffffff";
     g.fillRect(0, 0, canvas.width, canvas.height);
     const rect = drawWater(g, C, o);
-    g.save();
-    const [across, up] = flat(...head.period);
-    g.beginPath();  // images end at the edges of a periodic domain
-    g.rect(across ? rect[0] : 0, up ? rect[1] : 0, across ? rect[2] : canvas.width, up ? rect[3] : canvas.height);
-    g.clip();
-    drawFloes(g, p, C, o);
-    drawTrack(g, p, C, o);
-    g.restore();
-    drawBodies(g, p, C, o);
+    const within = (px, py, parts) => {  // images end at the edges of a periodic domain
+        const [across, up] = flat(px, py);
+        g.save();
+        g.beginPath();
+        g.rect(across ? rect[0] : 0, up ? rect[1] : 0, across ? rect[2] : canvas.width, up ? rect[3] : canvas.height);
+        g.clip();
+        for (const part of parts) part(g, p, C, o);
+        g.restore();
+    };
+    within(PX, PY, [drawFloes, drawTrack]);
+    within(moving ? 0 : PX, PY, [drawBodies]);  // the line may end ahead of a moving window
     drawEdges(g, rect);
     drawScale(g);
 }

@@ -14,23 +14,31 @@ function ticks(low, high, n) {
     return out;
 }
 
-// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is above is named,
-// not drawn.
+// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is beyond is
+// named, not drawn. side: 1 for what lies above zero, -1 below.
 function forceRange() {
-    const largest = (values, from) =>
-        values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, v) : top, 0);
-    const steady = curve.window ? curve.window[0] : curve.start;
-    const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start)));
-    const lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
-    const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0),
-                          ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
-    const top = Math.min(wish, highest) || highest || 1;
-    const single = largest(curve.lines[0].high, curve.start);
-    return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: single > 1.05 * top ? single : null};
+    const [ice, ...others] = curve.lines, steady = curve.window ? curve.window[0] : curve.start;
+    const largest = (side, values, from = curve.start) =>
+        values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, side * v) : top, 0);
+    const most = (side, lines) => Math.max(...lines.flatMap((l) => [largest(side, l.low), largest(side, l.high)]));
+    const wish = (side) => Math.min(
+        most(side, curve.lines),
+        Math.max(2.5 * largest(side, ice.smooth), 1.5 * side * (curve.mean || 0),
+                 ...others.map((l) => 1.25 * largest(side, l.smooth, steady))));
+    const [above, below] = [1, -1].map((side) => {
+        const all = most(side, curve.lines);
+        return wish(1) || wish(-1) ? Math.max(wish(side), Math.min(all, 0.3 * wish(-side))) : all;
+    });
+    const beyond = [["up", 1, above], ["down", -1, below]].flatMap(([way, side, end]) => {
+        const single = most(side, [ice]);
+        return single > 1.05 * end ? [`${way} to ${quantity(side * single, ice.unit)}`] : [];
+    });
+    return {low: -1.04 * below, high: 1.04 * above || (below ? 0 : 1), beyond};
 }
 
 const range = curve ? forceRange() : null;
-const prefix = range && range.high >= 2e6 ? [1e6, "M"] : range && range.high >= 2e3 ? [1e3, "k"] : [1, ""];
+const widest = range && Math.max(range.high, -range.low);
+const prefix = widest >= 2e6 ? [1e6, "M"] : widest >= 2e3 ? [1e3, "k"] : [1, ""];
 
 const chartScale = (ratio) => {
     const left = margin.left * ratio, right = chart.width - margin.right * ratio;
@@ -128,12 +136,12 @@ function drawCurves(g, s, ratio, colour) {
         }
     }
     g.restore();
-    if (range.beyond !== null) {
+    if (range.beyond.length) {
         g.fillStyle = colour("--faint");
         g.textAlign = "right";
         g.textBaseline = "top";
-        const {label, unit} = curve.lines[0];
-        g.fillText(`${label}: single samples up to ${quantity(range.beyond, unit)}`, s.right, s.top - 11 * ratio);
+        const words = `${curve.lines[0].label}: single samples ${range.beyond.join(" and ")}`;
+        g.fillText(words, s.right, s.top - 11 * ratio);
     }
     for (const e of curve.events) {
         g.fillStyle = colour("--warn");
@@ -187,9 +195,12 @@ function quantity(v, unit) {
     return `${+(v / f).toPrecision(3)} ${p}${unit}`;
 }
 
+// A value out of a range, with decimals for a hundredth of that range or less.
+const fixed = (v, span) => v.toFixed(Math.max(0, 2 - Math.floor(Math.log10(span || 1)))).replace(/^-(?=[0.]*$)/, "");
+
 function say() {
-    const t = timeAt(state.p);
-    $("replay-now").textContent = `${t.toFixed(t < 100 ? 1 : 0)} s of ${+head.times[T - 1].toPrecision(6)} s`;
+    const t = timeAt(state.p), end = head.times[T - 1];
+    $("replay-now").textContent = `${fixed(t, end)} s of ${+end.toPrecision(6)} s`;
     $("replay-reading").textContent = reading(t);
     slider.value = state.p;
     slider.setAttribute("aria-valuetext", $("replay-now").textContent);
@@ -281,12 +292,13 @@ function floeAt(sx, sy) {
 const idOf = (i) => head.ids ? head.ids[i] : i;
 
 function describe(i) {
-    const k = nearest(), pose = floePose(i, k), where = head.period[0] || head.period[1] ? " (within the domain)" : "";
+    const k = nearest(), where = head.period[0] || head.period[1] ? " (within the domain)" : "";
+    const [x0, x1, y0, y1] = head.box, [x, y] = floePose(i, k).map((v) => fixed(v, Math.max(x1 - x0, y1 - y0)));
     return [`floe ${idOf(i)}`,
             `speed ${quantity(value("speed", k, i), "m/s")}`,
             `largest contact force ${quantity(value("force", k, i), "N")}`,
             `thickness ${quantity(data.thickness[i], "m")}, area ${quantity(data.area[i], "m²")}`,
-            `x ${pose[0].toFixed(1)} m, y ${pose[1].toFixed(1)} m${where}`,
+            `x ${x} m, y ${y} m${where}`,
             `values of the frame at ${+head.times[k].toPrecision(6)} s`];
 }
 
@@ -447,6 +459,7 @@ window.bergtow = {
         const p = playhead();
         return css(toScreen(...towedPose(p, centre(p)).slice(0, 2), origin(p)));
     },
+    get forces() { return [range.low, range.high]; },  // ends of the force axis
     get metre() { return css([state.scale, 0])[0]; },  // CSS pixels
 };
 
