@@ -15,6 +15,9 @@ extern "C" {
 
 typedef struct bt_run_options {
     const char *dir;          ///< output folder
+    /// a result in dir: NULL = replace it, otherwise refuse the run (BT_ERR_IO) with this advice, such as "give another
+    /// folder with -o"
+    const char *remedy;
     /// OpenMP threads of each rank, 0 = run.threads of the case, or all cores shared by the ranks
     int threads;
     int64_t max_steps;        ///< stop after this many steps of this call, 0 = run the whole duration
