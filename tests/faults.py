@@ -390,7 +390,7 @@ class Ensemble(Scenario):
                 assert state_hash(pathlib.Path(c.second).parent) in self.whole
 
     def recover(self):
-        result = plain(*self.command(), "--retry")
+        result = plain(*self.command())
         assert result.returncode == DONE, result.stderr
         self.check_done()
         return "again"

@@ -246,12 +246,19 @@ static bt_status work(bt_ensemble *ensemble)
     }
 }
 
-/// Forget failures, so that failed members are tried again.
-static void forget_failures(const bt_ensemble *ensemble)
+/// Forget failures, so that failed members are tried again: all, or only those of input and output, whose cause, such
+/// as a full disk, lies outside the member.
+static void forget_failures(const bt_study *study, const char *dir, bool all)
 {
-    for (int64_t i = 0; i < ensemble->n; i++) {
-        bt_member_forget_failure(ensemble->list[i].folder);
-        ensemble->list[i].settled = false;
+    for (int64_t i = 0; i < bt_study_n_members(study); i++) {
+        bt_member member;
+        bt_study_member(study, i, &member);
+        char *folder = bt_member_folder(dir, &member);
+        int code;
+        if (bt_ensemble_state(folder, &code, NULL, NULL) == BT_MEMBER_FAILED && (all || code == BT_ERR_IO))
+            bt_member_forget_failure(folder);
+        free(folder);
+        bt_member_free(&member);
     }
 }
 
@@ -348,13 +355,10 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                          .alone = -1};
     bt_member_records_begin(&ensemble.records, study, digest);
     if (group.rank == 0) bt_study_files_find(&ensemble.files, study);
+    // not in a helper: the call that started it has done so, and records new failures
+    if (comm->rank == 0 && !options->job) forget_failures(study, options->dir, options->retry);
+    bt_comm_rest(comm);
     bt_ensemble_list(&ensemble);
-    if (options->retry && comm->rank == 0) forget_failures(&ensemble);
-    if (options->retry) bt_comm_rest(comm);
-    if (options->retry)
-        for (int64_t i = 0; i < ensemble.n; i++)
-            ensemble.list[i].settled =
-                bt_ensemble_state(ensemble.list[i].folder, NULL, NULL, NULL) != BT_MEMBER_WAITING;
     bt_ensemble_count_settled(&ensemble);
     share_cores(&ensemble, open);
     if (comm->rank == 0 && !options->quiet && !options->job) {

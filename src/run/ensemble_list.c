@@ -254,7 +254,7 @@ void bt_ensemble_list(bt_ensemble *ensemble)
         bt_entry *entry = &ensemble->list[i];
         entry->index = i;
         bt_study_member(ensemble->s, i, &entry->m);
-        entry->folder = bt_text_of("%s/members/%s", ensemble->o->dir, entry->m.name);
+        entry->folder = bt_member_folder(ensemble->o->dir, &entry->m);
         // fields of one condition cost the same; an unreadable case fails when its turn comes
         if (entry->m.condition != priced) {
             bt_case input;
@@ -356,7 +356,8 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
         if (n->failed++ < BT_MOST_REPORTED)
-            bt_errors_add(err, "member %s failed (%d): %s", entry->m.name, code, why ? why : "no reason recorded");
+            bt_errors_add(err, "member %s failed (%d): %s%s", entry->m.name, code, why ? why : "no reason recorded",
+                          code == BT_ERR_IO ? "; the next call tries it again" : "");
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
     } else {
         n->left++;

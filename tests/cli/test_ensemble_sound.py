@@ -141,7 +141,7 @@ def test_a_pipe_in_the_place_of_a_result_stays(copy):
     assert result.returncode == IO and "c001-r002/result.h5: is a pipe (FIFO), not a regular file" in result.stderr
     assert pipe.is_fifo()
     pipe.unlink()
-    assert ensemble(copy, "--retry-failed").returncode == DONE and pipe.is_file()
+    assert ensemble(copy).returncode == DONE and pipe.is_file()
 
 
 def test_a_damaged_member_that_a_run_is_at_is_left_to_it(copy):
