@@ -139,7 +139,8 @@ static int64_t claim(bt_ensemble *ensemble)
 static bt_status run_or_resume(const bt_comm *group, const bt_case *input, const bt_run_options *options,
                                bt_errors *why)
 {
-    int kept = group->rank == 0 && bt_checkpoint_there(options->dir);
+    // a checkpoint alone is of no use: the run continues its result
+    int kept = group->rank == 0 && bt_checkpoint_there(options->dir) && bt_file_there(options->dir, "result.h5");
     bt_comm_bcast(group, &kept, sizeof kept);
     if (kept) {
         const bt_status status = bt_run_resume(group, options, why);

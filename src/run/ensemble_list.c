@@ -390,7 +390,7 @@ static void report_warnings(const bt_ensemble *ensemble)
 bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_errors *err)
 {
     counts n = {0};
-    bt_status worst = status;
+    bt_status worst = BT_OK;
     qsort(ensemble->list, (size_t)ensemble->n, sizeof *ensemble->list, by_index);
     for (int64_t i = 0; i < ensemble->n; i++) {
         const bt_status of = tell_member(ensemble, &ensemble->list[i], &n, err);
@@ -402,9 +402,10 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
     if (n.unsound > BT_MOST_REPORTED)
         bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MOST_REPORTED,
                       bt_plural(n.unsound - BT_MOST_REPORTED));
+    if (status == BT_ERR_SIGNAL && n.left == 0) status = BT_OK; // it came after the last member
+    if (status != BT_OK) worst = status;
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped by %s; the same call continues with the %" PRId64 " remaining member%s",
-                      bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left,
+        bt_errors_add(err, "stopped; the same call continues with the %" PRId64 " remaining member%s", n.left,
                       bt_plural(n.left));
     else if (n.at_work)
         bt_errors_add(err,

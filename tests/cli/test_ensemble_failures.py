@@ -171,6 +171,14 @@ def test_a_folder_that_cannot_be_made(quiet, tmp_path):
     assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
 
+def test_a_stopped_member_without_its_result(quiet, tmp_path):
+    """Its checkpoint alone cannot be continued: it begins again."""
+    assert ensemble(prepare(tmp_path), "--steps", 30).returncode == SIGNAL
+    (tmp_path / "all/members/c002-r001/result.h5").unlink()
+    assert ensemble(tmp_path).returncode == DONE
+    assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+
+
 LONG = {
     "base": "base.yml", "variants": {
         "short": {"run.duration": 6}, "long": {"run.duration": "200 s", "tow.speed": 0.04},
