@@ -17,6 +17,7 @@
 #include "bergtow/run.h"
 #include "run/ensemble_list.h"
 #include "run/halt.h"
+#include "run/run_parts.h"
 #include "run/study.h"
 #include "base/fileio.h"
 #include "base/process.h"
@@ -287,7 +288,8 @@ static bt_status choose_threads(const bt_comm *comm, const bt_study *study, cons
                                 int *threads, bool *open, bt_errors *err)
 {
     bt_case input;
-    const bt_status status = bt_comm_agree(comm, bt_study_base_case(study, &input, err));
+    bt_status status = bt_comm_agree(comm, bt_study_base_case(study, &input, err));
+    if (status == BT_OK) status = bt_running_same_case(comm, &input, err);
     if (status == BT_OK) {
         *threads = bt_run_threads(comm, &input, options->threads);
         *open = options->threads == 0 && input.run.threads == 0 && !getenv("OMP_NUM_THREADS");
@@ -328,7 +330,8 @@ static void warn_fixed(const bt_ensemble *ensemble)
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                           bt_errors *err)
 {
-    bt_status status = bt_study_fits(study, comm->size, err);
+    bt_status status = bt_comm_same(comm, study->path, study->text, err);
+    if (status == BT_OK) status = bt_study_fits(study, comm->size, err);
     char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;

@@ -260,7 +260,8 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
     clock_part(running, &running->totals.call.program);
     // before the field is made, which may take long: digests of the files as read
     if (running->halt.first && options->dir && !begin->kept) running->digests = bt_case_digests(input);
-    bt_status status = begin->held ? BT_OK : may_take(comm, options, err);
+    bt_status status = begin->kept ? BT_OK : bt_running_same_case(comm, input, err);
+    if (status == BT_OK && !begin->held) status = may_take(comm, options, err);
     if (status == BT_OK) status = set_up(running, begin->kept, err);
     // Only now: a rejected case leaves nothing behind.
     if (status == BT_OK && options->dir && !begin->held)
