@@ -5,7 +5,8 @@
 // (src/run/study.h). DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished if it has a file
 // `finished` (written last: a stopped run has a summary too) that matches its other files, failed if it has failed.txt
 // (first line: exit code, and the code of the reason if it has one; then the reasons; beside the folder, as
-// cCCC-rRRR.failed.txt, if no file can be written there), and otherwise waits. DIR/journal.jsonl has a line for each
+// cCCC-rRRR.failed.txt, if no file can be written there), and otherwise waits. The next call forgets failures of input
+// and output (BT_ERR_IO), so that it continues after a full disk. DIR/journal.jsonl has a line for each
 // start and end, with wall times (null if the process died before it wrote the line, which the next call adds).
 // DIR/ensemble.h5 (src/run/ensemble_file.c) is made anew from the members' files: nothing in it depends on order,
 // ranks, or interruptions.
@@ -66,7 +67,7 @@ typedef struct bt_ensemble_options {
     const bt_ensemble_helpers *helpers; ///< NULL = 1 job
     bool job;                           ///< this call was started by a helper: it reports only members
     bool quiet;
-    bool retry;               ///< try failed members again
+    bool retry;               ///< try all failed members again, not only those that failed with BT_ERR_IO
     /// end when nothing is left to begin, even if other processes still work on members
     bool leave;
     int64_t max_steps;        ///< most steps of each member in this call, 0 = all

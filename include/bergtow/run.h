@@ -15,6 +15,9 @@ extern "C" {
 
 typedef struct bt_run_options {
     const char *dir;          ///< output folder
+    /// a result in dir: NULL = replace it, otherwise refuse the run (BT_ERR_IO) with this advice, such as "give another
+    /// folder with -o"
+    const char *remedy;
     /// OpenMP threads of each rank, 0 = run.threads of the case, or all cores shared by the ranks
     int threads;
     int64_t max_steps;        ///< stop after this many steps of this call, 0 = run the whole duration
@@ -38,8 +41,8 @@ typedef struct bt_run_options {
 
 /// Collective. Run a case. Errors, the same status on all ranks: BT_ERR_USAGE (dump_step on several ranks),
 /// BT_ERR_CASE, BT_ERR_IO, BT_ERR_NUMERIC, BT_ERR_SIGNAL (a signal at any rank, the stop file, max_wall, see
-/// src/run/halt.h: all results so far are on disk, marked as stopped, and can be resumed). The case is the same on all
-/// ranks.
+/// src/run/halt.h: all results so far are on disk, marked as stopped, and can be resumed). Ranks that have
+/// different cases are refused (BT_ERR_CASE).
 bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err);
 
 /// Collective. Resume the run in options->dir from its last checkpoint (src/output/checkpoint.h), or from its case if

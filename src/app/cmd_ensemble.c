@@ -130,7 +130,8 @@ static const struct argp_option ensemble_options[] = {
      "processes on this machine that share the members; default: as many as fit on the cores, with one thread per "
      "15,000 floes of a member unless the number of threads is given; always 1 under mpirun or srun, and with --steps",
      0},
-    {"retry-failed", KEY_RETRY, NULL, 0, "try failed members again", 0},
+    {"retry-failed", KEY_RETRY, NULL, 0,
+     "try all failed members again; without it only those that failed for want of a file or of disk space", 0},
     {"no-wait", KEY_LEAVE, NULL, 0,
      "end when no member is left to start; exit code 6 if other calls are still running members of the folder", 0},
     {0},
@@ -160,7 +161,6 @@ int bt_cmd_ensemble(int argc, char **argv)
     bt_jobs jobs = {.argc = argc, .argv = argv};
     opt.run.helpers = &(bt_ensemble_helpers){.start = jobs_start, .end = jobs_end, .of = &jobs};
     opt.run.job = jobs_is_one();
-    if (opt.run.job) opt.run.retry = false; // its parent has cleared the failures, and records new ones
     bt_study study = {0};
     bt_errors err = {0};
     bt_status status = bt_cmd_each_may_read(comm, opt.file.path, &err);

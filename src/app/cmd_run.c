@@ -5,7 +5,6 @@
 #include "app/cmd.h"
 #include "base/fileio.h"
 #include "base/process.h"
-#include "output/folder.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -76,6 +75,7 @@ int bt_cmd_run(int argc, char **argv)
     char *command_line = bt_cmd_join(argc, argv);
     opt.run.command_line = command_line;
     bt_cmd_parse(&run_argp, argc, argv, &opt);
+    if (!opt.force) opt.run.remedy = "give another folder with -o, or --force to replace it";
     const bt_comm *comm = bt_comm_world();
     if (comm->rank != 0) opt.run.quiet = true;
     char *folder = opt.run.dir ? NULL : bt_cmd_default_folder(opt.file.path);
@@ -86,9 +86,6 @@ int bt_cmd_run(int argc, char **argv)
     bt_status status = bt_cmd_each_may_read(comm, opt.file.path, &err);
     if (status == BT_OK) status = bt_case_read(&input, opt.file.path, opt.file.set, opt.file.n_set, &err);
     if (status == BT_OK) status = check_dump(&opt.run, &input, &err);
-    if (status == BT_OK && comm->rank == 0)
-        status = bt_folder_may_take(opt.run.dir, opt.force, "give another folder with -o, or --force to replace it",
-                                    &err);
     if (status == BT_OK && comm->rank == 0 && opt.run.dump_path)
         status = bt_cmd_may_write(opt.run.dump_path, opt.file.path, false, opt.force, &err);
     status = bt_comm_agree(comm, status);

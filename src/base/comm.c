@@ -14,6 +14,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "base/checksum.h"
 #include "base/process.h"
 
 #define ALONE {.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1}
@@ -297,6 +298,19 @@ void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes)
     const size_t most = (size_t)1 << 30; // MPI counts have 31 bits
     for (size_t at = 0; at < bytes; at += most)
         MPI_Bcast((char *)data + at, (int)(bytes - at < most ? bytes - at : most), MPI_BYTE, 0, comm->mpi);
+}
+
+bt_status bt_comm_same(const bt_comm *comm, const char *path, const char *text, bt_errors *err)
+{
+    char mine[BT_CHECKSUM_DIGEST], first[BT_CHECKSUM_DIGEST];
+    bt_checksum_digest_text(text, strlen(text), mine);
+    memcpy(first, mine, sizeof first);
+    bt_comm_bcast(comm, first, sizeof first);
+    if (!bt_comm_any(comm, strcmp(mine, first) != 0)) return BT_OK;
+    return bt_fail(err, BT_ERR_CASE,
+                   "%s: this file, or one that it names, is not the same on all %d ranks; give all of them the same "
+                   "files",
+                   path, comm->size);
 }
 
 bool bt_comm_any(const bt_comm *comm, bool value)

@@ -194,13 +194,13 @@ void bt_folder_settle(const char *dir)
     rmdir(aside);
 }
 
-bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err)
+bt_status bt_folder_may_take(const char *dir, const char *remedy, bt_errors *err)
 {
     if (bt_file_there(dir, BT_FOLDER_STUDY))
         return bt_fail(err, BT_ERR_IO, "%s: holds an ensemble; give the run another folder", dir);
     const bool finished = bt_file_there(dir, "summary.json"), begun = has_begun(dir);
     const bt_status foreign = bt_folder_check(dir, err);
-    if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
+    if (foreign != BT_OK || !remedy || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
     if (finished || !begun) return bt_fail(err, BT_ERR_IO, "%s: holds a result; %s", dir, remedy);
     return bt_fail(err, BT_ERR_IO, "%s: holds an unfinished run; continue it with `bergtow resume %s`, %s", dir, dir,
                    remedy);

@@ -26,9 +26,8 @@
 /// is not empty: a request to stop is an empty file. The other calls leave such files alone. Errors: BT_ERR_IO.
 bt_status bt_folder_check(const char *dir, bt_errors *err);
 
-/// May a run write its result here? A run must not replace another by mistake: only with `force`. remedy: advice for
-/// the user, such as "give another folder with -o". Errors: BT_ERR_IO.
-bt_status bt_folder_may_take(const char *dir, bool force, const char *remedy, bt_errors *err);
+/// May a run write its result here? remedy: as in bt_run_options (bergtow/run.h). Errors: BT_ERR_IO.
+bt_status bt_folder_may_take(const char *dir, const char *remedy, bt_errors *err);
 
 /// Move the present result aside and write the resolved case. After an error the folder is as before.
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err);

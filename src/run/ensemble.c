@@ -17,6 +17,7 @@
 #include "bergtow/run.h"
 #include "run/ensemble_list.h"
 #include "run/halt.h"
+#include "run/run_parts.h"
 #include "run/study.h"
 #include "base/fileio.h"
 #include "base/process.h"
@@ -139,7 +140,8 @@ static int64_t claim(bt_ensemble *ensemble)
 static bt_status run_or_resume(const bt_comm *group, const bt_case *input, const bt_run_options *options,
                                bt_errors *why)
 {
-    int kept = group->rank == 0 && bt_checkpoint_there(options->dir);
+    // a checkpoint alone is of no use: the run continues its result
+    int kept = group->rank == 0 && bt_checkpoint_there(options->dir) && bt_file_there(options->dir, "result.h5");
     bt_comm_bcast(group, &kept, sizeof kept);
     if (kept) {
         const bt_status status = bt_run_resume(group, options, why);
@@ -246,12 +248,19 @@ static bt_status work(bt_ensemble *ensemble)
     }
 }
 
-/// Forget failures, so that failed members are tried again.
-static void forget_failures(const bt_ensemble *ensemble)
+/// Forget failures, so that failed members are tried again: all, or only those of input and output, whose cause, such
+/// as a full disk, lies outside the member.
+static void forget_failures(const bt_study *study, const char *dir, bool all)
 {
-    for (int64_t i = 0; i < ensemble->n; i++) {
-        bt_member_forget_failure(ensemble->list[i].folder);
-        ensemble->list[i].settled = false;
+    for (int64_t i = 0; i < bt_study_n_members(study); i++) {
+        bt_member member;
+        bt_study_member(study, i, &member);
+        char *folder = bt_member_folder(dir, &member);
+        int code;
+        if (bt_ensemble_state(folder, &code, NULL, NULL) == BT_MEMBER_FAILED && (all || code == BT_ERR_IO))
+            bt_member_forget_failure(folder);
+        free(folder);
+        bt_member_free(&member);
     }
 }
 
@@ -279,7 +288,8 @@ static bt_status choose_threads(const bt_comm *comm, const bt_study *study, cons
                                 int *threads, bool *open, bt_errors *err)
 {
     bt_case input;
-    const bt_status status = bt_comm_agree(comm, bt_study_base_case(study, &input, err));
+    bt_status status = bt_comm_agree(comm, bt_study_base_case(study, &input, err));
+    if (status == BT_OK) status = bt_running_same_case(comm, &input, err);
     if (status == BT_OK) {
         *threads = bt_run_threads(comm, &input, options->threads);
         *open = options->threads == 0 && input.run.threads == 0 && !getenv("OMP_NUM_THREADS");
@@ -320,7 +330,8 @@ static void warn_fixed(const bt_ensemble *ensemble)
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                           bt_errors *err)
 {
-    bt_status status = bt_study_fits(study, comm->size, err);
+    bt_status status = bt_comm_same(comm, study->path, study->text, err);
+    if (status == BT_OK) status = bt_study_fits(study, comm->size, err);
     char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;
@@ -348,13 +359,10 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                          .alone = -1};
     bt_member_records_begin(&ensemble.records, study, digest);
     if (group.rank == 0) bt_study_files_find(&ensemble.files, study);
+    // not in a helper: the call that started it has done so, and records new failures
+    if (comm->rank == 0 && !options->job) forget_failures(study, options->dir, options->retry);
+    bt_comm_rest(comm);
     bt_ensemble_list(&ensemble);
-    if (options->retry && comm->rank == 0) forget_failures(&ensemble);
-    if (options->retry) bt_comm_rest(comm);
-    if (options->retry)
-        for (int64_t i = 0; i < ensemble.n; i++)
-            ensemble.list[i].settled =
-                bt_ensemble_state(ensemble.list[i].folder, NULL, NULL, NULL) != BT_MEMBER_WAITING;
     bt_ensemble_count_settled(&ensemble);
     share_cores(&ensemble, open);
     if (comm->rank == 0 && !options->quiet && !options->job) {

@@ -254,7 +254,7 @@ void bt_ensemble_list(bt_ensemble *ensemble)
         bt_entry *entry = &ensemble->list[i];
         entry->index = i;
         bt_study_member(ensemble->s, i, &entry->m);
-        entry->folder = bt_text_of("%s/members/%s", ensemble->o->dir, entry->m.name);
+        entry->folder = bt_member_folder(ensemble->o->dir, &entry->m);
         // fields of one condition cost the same; an unreadable case fails when its turn comes
         if (entry->m.condition != priced) {
             bt_case input;
@@ -356,7 +356,8 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
         if (n->failed++ < BT_MOST_REPORTED)
-            bt_errors_add(err, "member %s failed (%d): %s", entry->m.name, code, why ? why : "no reason recorded");
+            bt_errors_add(err, "member %s failed (%d): %s%s", entry->m.name, code, why ? why : "no reason recorded",
+                          code == BT_ERR_IO ? "; the next call tries it again" : "");
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
     } else {
         n->left++;
@@ -389,7 +390,7 @@ static void report_warnings(const bt_ensemble *ensemble)
 bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_errors *err)
 {
     counts n = {0};
-    bt_status worst = status;
+    bt_status worst = BT_OK;
     qsort(ensemble->list, (size_t)ensemble->n, sizeof *ensemble->list, by_index);
     for (int64_t i = 0; i < ensemble->n; i++) {
         const bt_status of = tell_member(ensemble, &ensemble->list[i], &n, err);
@@ -401,9 +402,10 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
     if (n.unsound > BT_MOST_REPORTED)
         bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MOST_REPORTED,
                       bt_plural(n.unsound - BT_MOST_REPORTED));
+    if (status == BT_ERR_SIGNAL && n.left == 0) status = BT_OK; // it came after the last member
+    if (status != BT_OK) worst = status;
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped by %s; the same call continues with the %" PRId64 " remaining member%s",
-                      bt_ensemble_wall_left(ensemble) <= 0 ? "the limit of wall time" : "a signal", n.left,
+        bt_errors_add(err, "stopped; the same call continues with the %" PRId64 " remaining member%s", n.left,
                       bt_plural(n.left));
     else if (n.at_work)
         bt_errors_add(err,

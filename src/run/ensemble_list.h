@@ -12,6 +12,9 @@
 
 // The files that record the state of a member: lock, attempts, reasons of a failure; see bergtow/ensemble.h.
 
+/// Result folder of a member of the ensemble in dir; the caller frees it.
+char *bt_member_folder(const char *dir, const bt_member *member);
+
 /// Open folder/name; −1 and errno.
 int bt_member_open(const char *folder, const char *name, int flags);
 

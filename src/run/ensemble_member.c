@@ -14,6 +14,11 @@
 #include "bergtow/ensemble.h"
 #include "base/fileio.h"
 
+char *bt_member_folder(const char *dir, const bt_member *member)
+{
+    return bt_text_of("%s/members/%s", dir, member->name);
+}
+
 int bt_member_open(const char *folder, const char *name, int flags)
 {
     return bt_file_descriptor(BT_PATH(folder, name), flags);

@@ -83,6 +83,10 @@ bt_status bt_running_save(bt_running *running, bt_snapshot *snap, const char *na
 /// Collective. Publish the record and write a checkpoint of this name.
 bt_status bt_running_checkpoint(bt_running *running, const char *name, bt_errors *err);
 
+/// Collective. Have all ranks read the same case, with the tables that it names? Each rank reads them itself. Errors:
+/// BT_ERR_CASE.
+bt_status bt_running_same_case(const bt_comm *comm, const bt_case *input, bt_errors *err);
+
 /// Identity of a run: a digest of its start, the resolved case, the tables of current and wind and the ice as made.
 /// Runs of the same case have the same identity, and are interchangeable. kept: a checkpoint, which contains it, or
 /// NULL. The caller frees it.

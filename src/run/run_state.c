@@ -56,22 +56,40 @@ static void add_digest(bt_text *text, const void *numbers, int64_t n)
     fprintf(text->out, "%s\n", digest);
 }
 
+/// Begin a text with the resolved case and digests of its tables.
+static void begin_identity(bt_text *text, const bt_case *input)
+{
+    char *resolved = bt_case_resolved(input);
+    bt_text_begin(text);
+    fputs(resolved, text->out);
+    add_digest(text, input->water.table.row, 3 * input->water.table.n);
+    add_digest(text, input->air.table.row, 3 * input->air.table.n);
+    free(resolved);
+}
+
+bt_status bt_running_same_case(const bt_comm *comm, const bt_case *input, bt_errors *err)
+{
+    if (comm->size == 1) return BT_OK;
+    bt_text t;
+    begin_identity(&t, input);
+    char *text = bt_text_end(&t);
+    const bt_status status = bt_comm_same(comm, bt_case_name(input), text, err);
+    free(text);
+    return status;
+}
+
 char *bt_running_identity(const bt_case *input, const bt_field *field, bt_snapshot *kept)
 {
     if (kept) return bt_text_copy(bt_snapshot_text(kept, "about/run"));
-    char *resolved = bt_case_resolved(input), digest[BT_CHECKSUM_DIGEST];
+    char digest[BT_CHECKSUM_DIGEST];
     bt_text t;
-    bt_text_begin(&t);
-    fputs(resolved, t.out);
-    add_digest(&t, input->water.table.row, 3 * input->water.table.n);
-    add_digest(&t, input->air.table.row, 3 * input->air.table.n);
+    begin_identity(&t, input);
     add_digest(&t, field->vertices, field->n > 0 ? 2 * field->offsets[field->n] : 0);
     add_digest(&t, field->pose, 3 * (int64_t)field->n);
     add_digest(&t, field->thickness, field->n);
     char *text = bt_text_end(&t);
     bt_checksum_digest_text(text, strlen(text), digest);
     free(text);
-    free(resolved);
     return bt_text_copy(digest);
 }
 

@@ -136,17 +136,27 @@ static void keep_field(run *running, bt_field *field, const bt_lead_stats *lead,
     *field = (bt_field){0};
 }
 
-/// Collective. Lock the folder for this call, unless the caller holds it. *lock: on rank 0.
-static bt_status take_folder(const bt_comm *comm, const char *dir, bool held, int *lock, bt_errors *err)
+/// Collective. May the run write into its folder, if the caller does not hold it?
+static bt_status may_take(const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
+    const bool asks = comm->rank == 0 && options->dir && !options->held;
+    return bt_comm_agree(comm, asks ? bt_folder_may_take(options->dir, options->remedy, err) : BT_OK);
+}
+
+/// Collective. Lock the folder for this call, unless the caller holds it. *lock: on rank 0.
+static bt_status take_folder(const bt_comm *comm, const bt_run_options *options, int *lock, bt_errors *err)
+{
+    const char *dir = options->dir;
     bt_status status = BT_OK;
     *lock = -1;
     if (comm->rank == 0) {
         status = bt_file_make_dir(dir, err);
-        if (status == BT_OK && !held && (*lock = bt_lock_take(dir, NULL, err)) < 0) status = BT_ERR_IO;
+        if (status == BT_OK && !options->held && (*lock = bt_lock_take(dir, NULL, err)) < 0) status = BT_ERR_IO;
         if (status == BT_OK) bt_folder_recover(dir);
     }
-    return bt_comm_agree(comm, status);
+    status = bt_comm_agree(comm, status);
+    // again: another call may have ended here while this one made its ice
+    return status == BT_OK ? may_take(comm, options, err) : status;
 }
 
 int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked)
@@ -250,10 +260,12 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
     clock_part(running, &running->totals.call.program);
     // before the field is made, which may take long: digests of the files as read
     if (running->halt.first && options->dir && !begin->kept) running->digests = bt_case_digests(input);
-    bt_status status = set_up(running, begin->kept, err);
+    bt_status status = begin->kept ? BT_OK : bt_running_same_case(comm, input, err);
+    if (status == BT_OK && !begin->held) status = may_take(comm, options, err);
+    if (status == BT_OK) status = set_up(running, begin->kept, err);
     // Only now: a rejected case leaves nothing behind.
     if (status == BT_OK && options->dir && !begin->held)
-        status = take_folder(comm, options->dir, options->held, &begin->lock, err);
+        status = take_folder(comm, options, &begin->lock, err);
     if (status != BT_OK) return status;
     bt_halt_begin(&running->halt); // before the record, which shows that the run has begun
     if (options->dir) status = open_record(running, begin->kept, err);

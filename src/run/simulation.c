@@ -125,6 +125,7 @@ static bt_simulation *simulation_of(const bt_simulation_options *options)
     sim->from = place_of(options->from);
     sim->command_line = copy_of(options->command_line);
     sim->o = (bt_run_options){.dir = sim->dir,
+                              .remedy = options->replace ? NULL : "give another folder, or set `replace`",
                               .from = sim->from,
                               .threads = options->threads,
                               .quiet = !options->progress || bt_comm_world()->rank != 0,
@@ -164,14 +165,11 @@ static bt_status finish_create(bt_simulation **out, bt_simulation *sim, bt_statu
 
 bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *options)
 {
-    const bt_comm *comm = bt_comm_world();
     bt_errors err = {0};
     bt_simulation *sim = simulation_of(options);
     bt_status status = check_numbers(options, &err);
     if (status == BT_OK) status = read_case(&sim->c, options, &err);
-    if (status == BT_OK && sim->dir && comm->rank == 0)
-        status = bt_folder_may_take(sim->dir, options->replace, "give another folder, or set `replace`", &err);
-    status = bt_comm_agree(comm, status);
+    status = bt_comm_agree(bt_comm_world(), status);
     if (status == BT_OK) status = begin(sim, &err);
     return finish_create(out, sim, status, &err);
 }

@@ -273,7 +273,7 @@ def test_a_full_disk_is_named_and_made_good(quiet, tmp_path):
                              cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True,
                              timeout=120)
     assert limited.returncode == IO and "failed (4)" in limited.stderr and "ulimit -f" in limited.stderr
-    assert ensemble(tmp_path, "all", "--retry-failed").returncode == DONE
+    assert ensemble(tmp_path, "all").returncode == DONE
     with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(tmp_path / "all/ensemble.h5") as b:
         assert np.array_equal(a["members/state_hash"][()][::3],
                               b["members/state_hash"][()]) and b.attrs["n_failed"] == 0

@@ -93,8 +93,7 @@ def test_a_limit_of_wall_time(tmp_path):
     """The member at hand stops with a checkpoint, and goes on from there."""
     prepare(tmp_path, STUDY | {"repeats": 1}, LONG)
     result = ensemble(tmp_path, "all", "--max-wall", "1")
-    assert result.returncode == SIGNAL and "stopped by the limit of wall time; the same call continues with the 4" in \
-        result.stderr
+    assert result.returncode == SIGNAL and "the same call continues with the 4" in result.stderr
     steps = {p.parent.name: json.loads(p.read_text())["n_steps"] for p in tmp_path.glob("all/members/*/summary.json")}
     assert len(steps) == 1 and 0 < min(steps.values()) < 30000
     assert (tmp_path / "all/members" / next(iter(steps)) / "checkpoint.h5").exists()
@@ -103,6 +102,19 @@ def test_a_limit_of_wall_time(tmp_path):
     assert again > steps[next(iter(steps))]
     for bad in ("--max-wall=0", "--max-wall=soon", "--steps=0"):
         assert ensemble(tmp_path, "all", bad).returncode == USAGE
+
+
+def test_a_stop_of_an_ensemble(tmp_path):
+    """Whatever stops it, no signal is named that was none; and nothing is stopped once all members are finished."""
+    prepare(tmp_path, STUDY | {"repeats": 1})
+    assert ensemble(tmp_path, "all", "--steps", 3).returncode == SIGNAL
+    next(tmp_path.glob("all/members/*/")).joinpath("stop").touch()
+    stopped = ensemble(tmp_path, "all")
+    assert stopped.returncode == SIGNAL and "the same call continues" in stopped.stderr
+    assert "signal" not in stopped.stderr
+    assert ensemble(tmp_path, "all").returncode == DONE
+    late = ensemble(tmp_path, "all", "--max-wall", 0.001)
+    assert late.returncode == DONE and late.stderr == ""
 
 
 @pytest.mark.slow

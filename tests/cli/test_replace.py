@@ -3,11 +3,12 @@
 the start and of the end, kills between them, files of the user's under names of the program."""
 import os
 import shutil
+import signal
 import subprocess
 
 import pytest
 
-from faults import CALLS
+from faults import CALLS, shim
 from harness import (BERGTOW, CLOSING, DONE, IO, NUMERIC, TOW, Run, call, changed, environment, faulty, run,
                      write_case)
 from resuming import assert_same_result
@@ -35,6 +36,19 @@ def old(tmp_path, both):
 
 
 # ---- the old result stays ----
+
+def test_a_result_made_meanwhile_stays(tmp_path):
+    """A run stops at its first call in the folder, after its ice is made, until another has finished there."""
+    words = [BERGTOW, "run", write_case(tmp_path, OTHER, "late.yml"), "-o", tmp_path / "out", "--quiet"]
+    late = subprocess.Popen(words, env=shim(tmp_path, BT_CALLS="mkdir,mkdirat", BT_CALLS_AT=1,
+                                            BT_CALLS_SIGNAL=signal.SIGSTOP.value), stderr=subprocess.PIPE, text=True)
+    assert os.WIFSTOPPED(os.waitpid(late.pid, os.WUNTRACED)[1])
+    first = run(tmp_path, SHORT)
+    before = contents(first.dir)
+    late.send_signal(signal.SIGCONT)
+    assert "holds a result" in late.communicate(timeout=60)[1] and late.returncode == IO
+    assert contents(first.dir) == before
+
 
 @pytest.mark.parametrize("name", FIRST)
 def test_a_failed_start_changes_nothing(tmp_path, old, name):

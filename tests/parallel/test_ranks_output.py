@@ -55,6 +55,22 @@ def one(tmp_path_factory):
     return folder, run(folder, SHORT, "--threads", 1)
 
 
+@pytest.mark.parametrize("differs", ["case.yml", "current.csv", "study.yml", "base of the study"])
+def test_ranks_that_read_different_files_are_refused(tmp_path, differs):
+    """Rank 1 works in a folder with other files of the same names."""
+    for folder in (tmp_path, tmp_path / "alt"):
+        other = differs if folder.name == "alt" else ""
+        friction = 0.1 if other in ("case.yml", "base of the study") else 0.3
+        write_case(folder, changed(SHORT, ice__friction=friction, water__current_table="/proc/self/cwd/current.csv"))
+        (folder / "current.csv").write_text(f"t,u,v\n0,0,0\n100,{0.2 if other == 'current.csv' else 0.1},0\n")
+        (folder / "study.yml").write_text(f"{{base: case.yml, repeats: {3 if other == 'study.yml' else 2}}}")
+    words = ("ensemble", "study.yml") if "study" in differs else ("run", "case.yml")
+    rank = ("sh", "-c", f'[ "{RANK}" != 1 ] || cd alt; exec "$0" "$@"', BERGTOW)
+    result = mpirun(3, *words, "-o", tmp_path / "out", program=rank, cwd=tmp_path)
+    assert result.returncode == CASE and len(ours(result)) == 1 and "ranks" in ours(result)[0], result.stderr
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("ranks", quick([1, 2, 3, 4], 1, 3))
 def test_values_do_not_depend_on_ranks(one, ranks):
     folder, alone = one
