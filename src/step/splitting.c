@@ -514,6 +514,7 @@ bool bt_splitting_step(bt_world *world, int round)
         const found_row *row = &found.row[k];
         if (2 * splitting->n + 2 > splitting->reserve) {
             no_id++;
+            all.most = bt_max(all.most, row->record.ratio);
             continue;
         }
         bt_splitting_append(splitting, &row->record, found.vertex + 2 * row->first_vertex);

@@ -235,6 +235,10 @@ def test_floes_that_bear_the_same_split_in_the_same_step(tmp_path):
     two = made(run(tmp_path / "two", changed(case, floes=floes[::-1])))
     assert two["parent"].tolist() == [1, 3, 5]
     np.testing.assert_allclose(two["crack"][::-1], one["crack"], atol=1e-6)
+    few = run(tmp_path / "few", changed(case, floes=floes, ice__splitting__reserve=1, run__duration=1.0))
+    s = few.summary["splitting"]
+    assert s["splits"] == 1 and s["refused_reserve"] == 2
+    assert s["largest_refused_ratio"] == pytest.approx(made(few)["ratio"][0], rel=1e-6)
 
 
 # --- loads of one step -----------------------------------------------------------------------------------------------
