@@ -10,8 +10,8 @@
 #include "space/shore.h"
 
 /// Interior angle of the outline of body i, rad, at vertex v of a part; NaN if there is no such vertex. Every corner of
-/// a part is a corner of the outline: a cut leads from one corner of the outline to another. The outline of a fixed body
-/// that lies against others is that of all of them: the corner turns as far as its normal cone is wide.
+/// a part is a corner of the outline: a cut leads from one corner of the outline to another. Fixed bodies that lie
+/// against each other have one outline: the corner turns as far as its normal cone is wide.
 static double interior_angle(const bt_world *world, bt_idx i, int part, uint32_t v)
 {
     const bt_bodies *bodies = &world->bodies;

@@ -21,8 +21,8 @@
 //
 // Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step stops the
 // rest. So a collision continues in the next step if the last one left an approach above the solver's tolerance and
-// this rest is now stopped; impulses add up. Who has to know the force at once (step/splitting.h) takes the sum from the
-// first step: the velocity that a contact changes goes with its impulse, so that of both is
+// this rest is now stopped; impulses add up. Where the force must be known at once (step/splitting.h), the sum follows
+// from the first step: the velocity that a contact changes is in proportion to its impulse, so that of both is
 //     Λ = λ_c v1 / (v1 − v2)   for v2 < 0, otherwise λ_c
 // however the gap divides it.
 //
@@ -119,8 +119,8 @@ typedef struct bt_impacts {
 } bt_impacts;
 
 bt_impact_rule bt_impact_rule_of(const bt_case *input);
-/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner, and from bounds of the
-/// peak, N.
+/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner, and from bounds of
+/// the peak, N.
 void bt_impact_convert(const bt_impact_rule *rule, double least, double most, bt_impact *impact);
 
 /// Create it for the towed body of the world; NULL if the case does not ask for collisions, or there is no body.

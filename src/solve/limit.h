@@ -40,8 +40,8 @@ static inline double bt_limit_bound(const bt_limit *limit, const bt_contact *con
     return bt_min(limit->most[i], bt_max(limit->flat[i], rising));
 }
 
-/// Impulse by which the force that point i bears at the end of the step would act in it: of a hit that of the ice at the
-/// depth it has reached, else the impulse's bound.
+/// The force on point i at the end of the step, times Δt: of a hit that of the ice at the depth it has reached, else
+/// the bound of the impulse.
 static inline double bt_limit_end(const bt_limit *limit, const bt_contact *contact, int i, const bt_vel *v)
 {
     const bt_hit *hit = &bt_rise_of(limit)->hit[i];

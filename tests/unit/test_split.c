@@ -657,7 +657,7 @@ TEST(test_refused)
     law.aspect = 13;
     assert_true(splits(&t, load, 2, 1, &law, &best));
     assert_near(best.length, 30, 1e-12);
-    // A section shorter than the least width: of a strip that is narrower itself, and through a neck of two wide blocks.
+    // Sections shorter than the least width: of a strip that is narrower itself, and of a neck between two blocks.
     const floe narrow = rectangle(2.9, 20);
     const bt_split_floe u = seen(&narrow, 1);
     const bt_floe_load bend[3] = {push(-1.45, 0, 2e5, 0), push(1.45, -8, -1e5, 0), push(1.45, 8, -1e5, 0)};
