@@ -6,14 +6,24 @@
 
 #include "base/elementary.h"
 #include "contact/row.h"
+#include "solve/limit.h"
+#include "space/shore.h"
 
 /// Interior angle of the outline of body i, rad, at vertex v of a part; NaN if there is no such vertex. Every corner of
-/// a part is a corner of the outline: a cut leads from one corner of the outline to another.
-static double interior_angle(const bt_bodies *bodies, bt_idx i, int part, uint32_t v)
+/// a part is a corner of the outline: a cut leads from one corner of the outline to another. Fixed bodies that lie
+/// against each other have one outline: the corner turns as far as its normal cone is wide.
+static double interior_angle(const bt_world *world, bt_idx i, int part, uint32_t v)
 {
+    const bt_bodies *bodies = &world->bodies;
     const bt_mark *mark = bodies->mark + bodies->offset[i] + part;
     const uint32_t count = mark->count;
     if (v > count) return NAN;
+    if (bt_shore_holds(world, i)) {
+        const bt_face *face = bt_shore_faces(world->shore, bodies->gid[i], part) + (v < count ? v : 0);
+        const double *u = face->u, *w = face->w;
+        if (u[0] == 0 && u[1] == 0) return NAN;
+        return BT_PI - bt_atan2(u[0] * w[1] - u[1] * w[0], u[0] * w[0] + u[1] * w[1]);
+    }
     const int n = bt_body_corners(bodies, i), k = mark[v < count ? v : 0].corner; // v = count: the end of the last edge
     const double *o = bodies->outline + 2 * bodies->offset[i], *at = o + 2 * k, *before = o + 2 * (k ? k - 1 : n - 1),
                  *after = o + 2 * (k + 1 < n ? k + 1 : 0);
@@ -21,14 +31,14 @@ static double interior_angle(const bt_bodies *bodies, bt_idx i, int part, uint32
     return BT_PI - bt_atan2(px * qy - py * qx, px * qx + py * qy);
 }
 
-bt_contact_corner bt_contact_corner_of(const bt_bodies *bodies, const bt_contact *contact, const uint16_t part[2],
+bt_contact_corner bt_contact_corner_of(const bt_world *world, const bt_contact *contact, const uint16_t part[2],
                                        uint32_t feature)
 {
     if ((feature >> 20) == 0x7ffu)
-        return (bt_contact_corner){bt_min(interior_angle(bodies, contact->a, part[0], (feature >> 10) & 0x3ffu),
-                                          interior_angle(bodies, contact->b, part[1], feature & 0x3ffu)), -1};
+        return (bt_contact_corner){bt_min(interior_angle(world, contact->a, part[0], (feature >> 10) & 0x3ffu),
+                                          interior_angle(world, contact->b, part[1], feature & 0x3ffu)), -1};
     const bool reference_b = feature >> 31, of_reference = feature & 1u, of_b = reference_b == of_reference;
-    return (bt_contact_corner){interior_angle(bodies, of_b ? contact->b : contact->a, part[of_b],
+    return (bt_contact_corner){interior_angle(world, of_b ? contact->b : contact->a, part[of_b],
                                               (feature & 0xfffffu) >> 1), of_b};
 }
 
@@ -58,5 +68,26 @@ bt_collision bt_contact_collision(const bt_world *world, const bt_contact *conta
     collision.approach = bt_max(0, -v1);
     collision.rest = bt_max(0, -v2);
     collision.mass = 1 / effect;
+    collision.whole = collision.impulse;
+    if (collision.impulse > 0 && collision.rest > 0)
+        collision.whole *= collision.approach / (collision.approach - collision.rest);
     return collision;
+}
+
+bt_peak_bounds bt_contact_peak(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision)
+{
+    const bt_contact *contact = &cell->contacts[j];
+    bt_peak_bounds peak = {.most = INFINITY};
+    if (!bt_laws_on(&world->par)) return peak;
+    const bt_limit *limit = &cell->laws->limits[j];
+    const double total = contact->ln[0] + contact->ln[1], lasting = total - collision->impulse;
+    double most = 0;
+    bool gives_way = false;
+    for (int i = 0; i < contact->n; i++) {
+        most += bt_max(contact->ln[i], bt_limit_end(limit, contact, i, world->bodies.vel));
+        gives_way = gives_way || (contact->ln[i] > 0 && contact->ln[i] >= limit->flat[i]);
+    }
+    peak.most = (most - lasting) / world->par.dt;
+    if (gives_way) peak.least = collision->impulse / world->par.dt;
+    return peak;
 }

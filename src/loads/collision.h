@@ -8,6 +8,7 @@
 
 typedef struct bt_collision {
     double impulse;   ///< λ_c, N s
+    double whole;     ///< of a collision that goes on in the next step: Λ, that of both, N s
     double approach;  ///< −v1 if the contact closes, otherwise 0, m/s
     double rest;      ///< −v2 if it still closes, otherwise 0, m/s
     double mass;      ///< m_e, kg
@@ -17,13 +18,22 @@ typedef struct bt_collision {
 /// The collision part of a contact with a normal impulse above 0, after the solve and before poses move.
 bt_collision bt_contact_collision(const bt_world *world, const bt_contact *contact);
 
+/// What a step knows of the normal force at the peak of a collision (loads/impact.h), N.
+typedef struct bt_peak_bounds {
+    double least; ///< 0 = nothing
+    double most;  ///< INFINITY = nothing
+} bt_peak_bounds;
+
+/// The same of contact j of a cell; collision: its own.
+bt_peak_bounds bt_contact_peak(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision);
+
 typedef struct bt_contact_corner {
     double angle;     ///< interior, rad; NaN if there is none
     int of;           ///< 0 = corner of a, 1 = of b; −1 = the sharper of two corners that meet
 } bt_contact_corner;
 
 /// The corner that makes a contact point of a pair of parts, from its feature as numbered by manifold.c.
-bt_contact_corner bt_contact_corner_of(const bt_bodies *bodies, const bt_contact *contact, const uint16_t part[2],
+bt_contact_corner bt_contact_corner_of(const bt_world *world, const bt_contact *contact, const uint16_t part[2],
                                        uint32_t feature);
 
 #endif

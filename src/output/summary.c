@@ -239,11 +239,12 @@ static void warn_of_splits(bt_summary *summary, const bt_run_totals *totals)
     const bt_split_totals *p = &totals->splitting->total;
     if (p->deferred > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_DEFERRED,
-                "%lld floes were left to split in the next step after %d rounds: loads of their steps may be too high",
+                "%lld times a floe was left to split in the next step, after %d rounds: loads of these steps may be "
+                "too high",
                 (long long)p->deferred, BT_SPLIT_ROUNDS);
     if (p->no_id > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_RESERVE,
-                "%lld floes could not split after %lld splits, which used up all ids; raise ice.splitting.reserve",
+                "%lld times a floe could not split, after %lld splits had used up all ids; raise ice.splitting.reserve",
                 (long long)p->no_id, (long long)totals->splitting->reserve / 2);
     if (p->unconverged > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_UNCONVERGED,

@@ -159,7 +159,7 @@ static void print_splits(const bt_splitting *splitting, int64_t n_steps)
                "%.2g %% of the steps\n",
                bt_splitting_size(splitting, true, 0.5), bt_splitting_size(splitting, false, 0.5),
                bt_splitting_size(splitting, false, 0), 100.0 * (double)totals->steps / (double)n_steps);
-    printf("    could not split   %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",
+    printf("    times kept whole  %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",
            (long long)totals->too_small, (long long)totals->too_old, (long long)totals->rafted,
            (long long)totals->no_id, (long long)totals->deferred);
 }

@@ -19,9 +19,15 @@
 // Sections that are tested: from each of the largest contacts (up to 8, of a tenth of the largest load on) along its
 // force, through the centroid, and to each other of them; through the centroid across the most tensile axis of Σ sym(x
 // f); and across the long axis of the floe at its centroid and at a third and two thirds of its length: a strip struck
-// at its end breaks at a third. No section is shorter than the least width. In a convex floe a shorter section cannot
-// leave two pieces that are nowhere narrower: one of them has no longer chord parallel to the section, and the width of
-// a convex body is at most its longest chord in any direction.
+// at its end breaks at a third.
+//
+// Shortest section. In a convex floe a section shorter than the least width w cannot leave two pieces that are nowhere
+// narrower: one of them has no longer chord parallel to the section, and the width of a convex body is at most its
+// longest chord in any direction. So it cuts off a corner, which is left to crushing, unless the floe itself is
+// narrower: then sections from its width on are judged, to tell that its size keeps it whole. A floe that is not convex
+// may have a neck: there sections count from the shortest distance of a vertex from an edge that it is no end of, which
+// no section between edges without a common vertex is below, and again a section shorter than w that cuts off less than
+// w²/√3, the least area of a convex body of that width, is that of a corner.
 //
 // Quick reject. With G = Σ |f_k|, P the sum of opening forces, R the largest distance of a vertex from the centroid,
 // and loads on the outline; the middle of a section is at most √(R² − l²/4) from the centroid, which is e here. N and M
@@ -83,6 +89,50 @@ static form form_of(const bt_split_floe *floe)
 static const double STEP = 1.1;  // ratio of the ends of a length range with one bound, for bt_split_borne
 static const double COARSE = 2;  // the same, for the loads of a step
 
+/// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
+static double width_of(int n, const double *v, double *aspect)
+{
+    double width = INFINITY;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0);
+        const double l = bt_hypot(q[0] - p[0], q[1] - p[1]);
+        if (!(l > 0)) continue;
+        const double ex = (q[0] - p[0]) / l, ey = (q[1] - p[1]) / l;
+        double across = 0, low = 0, high = l;
+        for (int k = 0; k < n; k++) {
+            const double x = v[2 * k] - p[0], y = v[2 * k + 1] - p[1], along = x * ex + y * ey;
+            across = bt_max(across, ex * y - ey * x);
+            low = bt_min(low, along), high = bt_max(high, along);
+        }
+        if (across < width) width = across, *aspect = (high - low) / across;
+    }
+    return width;
+}
+
+/// Shortest distance of a vertex from an edge that it is no end of, m.
+static double neck_of(int n, const double *v)
+{
+    double least = INFINITY;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
+        const double x = q[0] - p[0], y = q[1] - p[1], l2 = x * x + y * y;
+        for (int k = i + 2; k < i + n; k++) {
+            const double *o = v + 2 * (k % n), ox = o[0] - p[0], oy = o[1] - p[1];
+            const double t = l2 > 0 ? bt_max(0, bt_min(1, (ox * x + oy * y) / l2)) : 0;
+            least = bt_min(least, bt_hypot(ox - t * x, oy - t * y));
+        }
+    }
+    return least;
+}
+
+/// Length of the shortest section that is judged, m. Either end of a section may have moved to a vertex.
+static double least_length(const bt_split_floe *floe, const bt_split_law *law)
+{
+    double aspect;
+    const double own = floe->convex ? width_of(floe->n, floe->outline, &aspect) : neck_of(floe->n, floe->outline);
+    return bt_max(law->slop, bt_min(law->least_width, own - 2 * law->slop));
+}
+
 /// Sums over the loads: G, |F|, |T| and P.
 typedef struct sums { double size, net, torque, opening; } sums;
 
@@ -129,13 +179,14 @@ static double bound(const bt_split_floe *floe, const form *outline, const sums *
 }
 
 /// A length above which no section splits, m.
-static double safe_length(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law)
+static double safe_length(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law,
+                          double least)
 {
-    double high = INFINITY, low = bt_max(2 * outline->inradius, law->least_width);
+    double high = INFINITY, low = bt_max(2 * outline->inradius, least);
     while (!(bound_between(floe, outline, s, law, low, high) > 1)) {
         high = low;
-        if (!(low > law->least_width)) break;
-        low = bt_max(low / COARSE, law->least_width);
+        if (!(low > least)) break;
+        low = bt_max(low / COARSE, least);
     }
     return high;
 }
@@ -151,29 +202,9 @@ double bt_split_borne(const bt_split_floe *floe, const bt_split_law *law)
 {
     const form outline = form_of(floe);
     if (!(2 * outline.radius >= law->least_width)) return INFINITY;
-    const double l = law->least_width; // the bound is linear in sizes and opening forces
+    const double l = least_length(floe, law); // the bound is linear in sizes and opening forces
     const sums load = {.size = 1, .net = 1, .torque = outline.radius}, pair = {.opening = 1};
     return 1 / bt_max(bound(floe, &outline, &load, law, l), bound_between(floe, &outline, &pair, law, l, INFINITY));
-}
-
-/// Least width of a convex polygon, and its length / width, the length along the edge across which it is narrowest.
-static double width_of(int n, const double *v, double *aspect)
-{
-    double width = INFINITY;
-    for (int i = 0; i < n; i++) {
-        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0);
-        const double l = bt_hypot(q[0] - p[0], q[1] - p[1]);
-        if (!(l > 0)) continue;
-        const double ex = (q[0] - p[0]) / l, ey = (q[1] - p[1]) / l;
-        double across = 0, low = 0, high = l;
-        for (int k = 0; k < n; k++) {
-            const double x = v[2 * k] - p[0], y = v[2 * k + 1] - p[1], along = x * ex + y * ey;
-            across = bt_max(across, ex * y - ey * x);
-            low = bt_min(low, along), high = bt_max(high, along);
-        }
-        if (across < width) width = across, *aspect = (high - low) / across;
-    }
-    return width;
 }
 
 static double hull_width(int n, const double *v, bool convex, double *aspect)
@@ -212,7 +243,7 @@ typedef struct search {
     const form *form;
     const bt_load_case *loads;
     sums sums;
-    double safe;                     ///< m: no section of this length or longer splits
+    double least, safe;              ///< m: sections from one length up to the other may split
     const bt_split_law *law;
     bt_split *best;
 } search;
@@ -240,6 +271,15 @@ static double demand(const search *s, const bt_section *section, bt_split_mode *
     return worst;
 }
 
+/// Does a section cut off less than any convex piece of the least width has?
+static bool is_corner(const search *s, const bt_chord *chord)
+{
+    double piece[2 * (BT_MAX_VERTICES + 2)], area = 0;
+    const int n = bt_chord_piece(s->floe->n, s->floe->outline, chord, piece);
+    if (n >= 3) area = bt_shape_centroid(n, piece).area;
+    return bt_min(area, s->form->area - area) * sqrt(3) < s->law->least_width * s->law->least_width;
+}
+
 /// Take a section if it is the best so far. A section from a contact keeps its direction, others are turned so that
 /// bending opens b: if the pieces are equal, the direction decides which is the first.
 static void consider(const search *s, bt_chord chord, bool from_contact)
@@ -249,7 +289,7 @@ static void consider(const search *s, bt_chord chord, bool from_contact)
     bt_chord_place(s->floe->n, s->floe->outline, chord.b, b);
     const double l = bt_hypot(b[0] - a[0], b[1] - a[1]);
     const bt_load_case *loads = s->loads;
-    if (!(l >= s->law->least_width) || !(l > s->law->slop) || l >= s->safe) return;
+    if (!(l >= s->least) || !(l > s->law->slop) || l >= s->safe) return;
     if (!(bound_between(s->floe, s->form, &s->sums, s->law, l, l) > 1)) return;
     const bt_section section = bt_section_of(s->floe, s->form->area, s->form->polar, loads, &chord, s->law->slop);
     bt_split_mode mode;
@@ -259,6 +299,7 @@ static void consider(const search *s, bt_chord chord, bool from_contact)
     if (!(ratio > 1) || !(ratio > best->ratio * (1 + EQUAL))) return;
     const bt_split_refusal refused = refusal_of(s->floe, &chord, s->law);
     if (refused) {
+        if (l < s->law->least_width && is_corner(s, &chord)) return;
         if (ratio > best->refused_ratio) best->refused_ratio = ratio, best->refused = refused;
         return;
     }
@@ -374,12 +415,13 @@ bool bt_split_find(const bt_split_floe *floe, bt_floe_load *load, int n_loads, c
     qsort(load, (size_t)n_loads, sizeof *load, by_contact);
     bt_edge_load few[16], *on_edge = n_loads <= 16 ? few : bt_alloc((size_t)n_loads, sizeof *on_edge);
     for (int k = 0; k < n_loads; k++) on_edge[k] = bt_edge_load_of(floe, &load[k], law->slop);
+    const double least = least_length(floe, law);
     for (int k = -1; k < n_loads; k++) {
         if (k >= 0 && !load[k].collision) continue;
         const bt_load_case loads = bt_load_case_of(on_edge, n_loads, k);
         const sums s = sums_of(&loads);
-        const double safe = safe_length(floe, &outline, &s, law);
-        if (safe > law->least_width) search_sections(&(search){floe, &outline, &loads, s, safe, law, best});
+        const double safe = safe_length(floe, &outline, &s, law, least);
+        if (safe > least) search_sections(&(search){floe, &outline, &loads, s, least, safe, law, best});
     }
     if (on_edge != few) free(on_edge);
     return best->ratio > 0;

@@ -27,7 +27,7 @@ typedef struct bt_floe_load {
 typedef struct bt_split_law {
     double toughness;   ///< K, Pa √m
     double strength;    ///< σ_t of ice without a crack, Pa
-    double least_width; ///< least width of a piece anywhere, and least length of a section, m
+    double least_width; ///< least width of a piece anywhere, m
     double aspect;      ///< largest length / width of a piece, unless its parent had more
     double slop;        ///< shorter lengths count as 0: an end of a section this near a vertex moves to it, m
 } bt_split_law;

@@ -110,13 +110,16 @@ static bool is_collision(const bt_world *world, const bt_collision *collision)
     return rule->conversion != BT_IMPACT_NONE && collision->impulse > 0 && collision->approach >= rule->least_speed;
 }
 
-/// Peak force of a collision, N.
-static double peak_of(const bt_world *world, const bt_contact *contact, const bt_collision *collision, double corner)
+/// Peak force of a collision of contact j, N, as if none of it were left to the next step.
+static double peak_of(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision,
+                      double corner)
 {
-    bt_impact impact = {.impulse = collision->impulse, .approach = collision->approach, .mass = collision->mass,
+    const bt_contact *contact = &cell->contacts[j];
+    bt_impact impact = {.impulse = collision->whole, .approach = collision->approach, .mass = collision->mass,
                         .corner = corner,
                         .thickness = bt_crush_thickness(&world->bodies, contact->a, contact->b)};
-    bt_impact_convert(&world->splitting->rule, &impact);
+    const bt_peak_bounds peak = bt_contact_peak(world, cell, j, collision);
+    bt_impact_convert(&world->splitting->rule, peak.least, peak.most, &impact);
     return impact.peak;
 }
 
@@ -142,10 +145,10 @@ static pressing pressing_of(const bt_world *world, const bt_cell *cell, bt_idx j
                                                                 gives_way(world, BT_LAW_RAFTING, contact));
     if (sharp || hit) {
         const bt_contact_corner corner = bt_contact_corner_of(
-            &world->bodies, contact, cell->search.pairs[contact->pair].part, cell->gaps[j].feature[p.at]);
+            world, contact, cell->search.pairs[contact->pair].part, cell->gaps[j].feature[p.at]);
         const double half = 0.5 * corner.angle, wedge = half < WEDGE ? bt_split_wedge(half, contact->mu) : 0;
         if (sharp && corner.of >= 0 && wedge > 0) p.opening[1 - corner.of] = 1 / wedge;
-        if (hit) p.peak = peak_of(world, contact, &collision, corner.angle);
+        if (hit) p.peak = peak_of(world, cell, j, &collision, corner.angle);
     }
     p.force = bt_max(0, (hit ? total - collision.impulse : total) / world->par.dt);
     return p;
@@ -514,6 +517,7 @@ bool bt_splitting_step(bt_world *world, int round)
         const found_row *row = &found.row[k];
         if (2 * splitting->n + 2 > splitting->reserve) {
             no_id++;
+            all.most = bt_max(all.most, row->record.ratio);
             continue;
         }
         bt_splitting_append(splitting, &row->record, found.vertex + 2 * row->first_vertex);

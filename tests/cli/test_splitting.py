@@ -201,6 +201,8 @@ def test_generations_and_reserve_are_limits_that_are_told(tmp_path):
     warned = {w["code"]: w for w in few.summary["warnings"]}
     assert warned["split_reserve"]["values"]["reserve"] == 3  # as the key has it, and not ids of pieces
     assert "after 3 splits" in warned["split_reserve"]["text"]
+    assert s["refused_reserve"] > few.dataset("frames/pose").shape[1]  # steps of floes, and not told as floes
+    assert f"{s['refused_reserve']} floes" not in warned["split_reserve"]["text"]
     small = run(tmp_path / "small", weak(least_size=0.6)).summary["splitting"]
     assert small["refused_size"] > 0 and small["largest_refused_ratio"] > 1
 

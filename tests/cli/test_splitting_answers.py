@@ -148,19 +148,77 @@ def wedge_force(half, h):
     return strength * h * SIDE / (4 / r - 0.75)
 
 
+BY_CRUSHING = {"conversion": "crushing", "pressure": 1.5e6, "corner_angle": "60 deg"}
+
+
 @pytest.mark.parametrize("h, thicker", [(0.5, 1), (2.0, 1), (1.0, 3)])
 def test_the_speed_at_which_a_crushed_corner_splits_a_floe(tmp_path, h, thicker):
     """Peak force of a corner that is crushed at pressure p: v √(2 p h tan φ m), m that of both floes together. The
     thickness cancels, but for a wedge of thicker ice, which weighs more. So does the step."""
     half, pressure = np.radians(30), 1.5e6
-    impact = {"conversion": "crushing", "pressure": pressure, "corner_angle": "60 deg"}
     speed = wedge_force(half, 1.0) / np.sqrt(2 * pressure * np.tan(half) * DENSITY * SIDE**2 * thicker / (1 + thicker))
     for share, splits in ((0.99, 0), (1.01, 1)):
-        case = collision(half, share * speed, h=h, impact=impact)
+        case = collision(half, share * speed, h=h, impact=BY_CRUSHING)
         case["floes"][1]["thickness"] = thicker * h
         case["run"] = {"dt": 200.0, "duration": 200.0}  # what lasts so long would split nothing
         r = run(tmp_path / str(share), case)
         assert r.summary["splitting"]["near"] == splits
+
+
+@pytest.mark.parametrize("impact", [{"conversion": "duration", "duration": 1.0}, BY_CRUSHING])
+def test_the_gap_at_the_start_of_the_step_makes_no_difference(tmp_path, impact):
+    """It divides the impulse of a collision between two steps."""
+    half, mass = np.radians(30), DENSITY * SIDE**2 / 2
+    per_speed = np.pi / 2 * mass if impact["conversion"] == "duration" else np.sqrt(2 * 1.5e6 * np.tan(half) * mass)
+    speed = 1.5 * wedge_force(half, 1.0) / per_speed
+    for share in (0, 0.25, 0.5, 0.75):
+        case = collision(half, speed, impact=impact)
+        case["floes"][1]["x"] -= share * speed  # the step is 1 s
+        assert made(run(tmp_path / str(share), case))["ratio"] == pytest.approx([1.5], rel=1e-6)
+
+
+@pytest.mark.parametrize("impact", [{"conversion": "duration"}, BY_CRUSHING])
+def test_ice_that_crushes_over_many_steps_splits_a_floe_at_the_force_that_acts(tmp_path, impact):
+    """The force of a crushed corner is that of a spring, F sin ωt. Whatever the conversion, the floe splits within a
+    step of when it reaches its strength."""
+    half, mass, k = np.radians(30), DENSITY * SIDE**2 / 2, 2 * 1.5e6 * np.tan(np.radians(30))
+    case = changed(collision(half, 1.5 * wedge_force(half, 1.0) / np.sqrt(k * mass), impact=impact),
+                   ice__crushing={"pressure": 1.5e6, "least_length": 0.0})
+    for dt in (0.1, 0.02):
+        t = made(run(tmp_path / str(dt), changed(case, run__dt=dt)))["time"]
+        rise = 1.5 * np.sqrt(k / mass) * dt
+        assert 1.5 * np.sin(np.sqrt(k / mass) * t) == pytest.approx([1], abs=rise)
+
+
+@pytest.mark.parametrize("dt, pressure, share", [(1.0, 1e9, 0.0), (1.0, 1e9, 0.5), (0.02, 1.5e6, 0.0)])
+def test_a_peak_that_is_told_is_the_load_by_which_a_floe_is_judged(tmp_path, dt, pressure, share):
+    """Of a towed wedge, on a floe that its size keeps whole; with the pressure of ice, v √(k m)."""
+    half, speed = np.radians(30), 0.3
+    case = collision(half, speed, impact={"conversion": "duration", "duration": dt})
+    p = np.array(case["floes"].pop()["vertices"])
+    x = 600 - p[:, 0].max() - share * speed * dt
+    case = changed(case, run={"dt": dt, "duration": 4.0}, ice__crushing={"pressure": pressure, "least_length": 0.0},
+                   ice__splitting__least_size=20.0, tow={"mode": "speed", "speed": speed, "ramp": 0.0},
+                   body={"shape": "polygon", "vertices": p.tolist(), "x": x, "y": 0.0, "draft": 30.0})
+    r = run(tmp_path, case)
+    peak, mass = r.dataset("impacts/peak"), DENSITY * SIDE**2
+    by_law = speed * (np.pi / 2 * mass if pressure == 1e9 else np.sqrt(2 * pressure * np.tan(half) * mass))
+    assert peak == pytest.approx([by_law], rel=0.03)
+    assert r.summary["splitting"]["largest_refused_ratio"] == pytest.approx(peak[0] / wedge_force(half, 1.0), rel=5e-3)
+
+
+def test_flush_fixed_floes_open_a_floe_as_their_outline_does(tmp_path):
+    """A corner of 130° does not; as two triangles it has 65° on either side. One of 60° does, in two as in one."""
+    for half, ratio in ((np.radians(65), []), (np.radians(30), [1.5])):
+        tip, back, y = [600, 0], 580, 20 * np.tan(half)
+        low, high = [back, -y], [back, y]
+        case = collision(half, 0.0)
+        square = case["floes"][0]
+        square["vx"] = -1.5 * wedge_force(half, 1.0) / (np.pi / 2 * DENSITY * SIDE**2) if ratio else -1.0
+        for name, shore in ("one", [[tip, high, low]]), ("two", [[tip, high, [back, 0]], [tip, [back, 0], low]]):
+            floes = [square, *(floe(p, fixed=True) for p in shore)]
+            one = made(run(tmp_path / f"{name}{len(ratio)}", changed(case, floes=floes)))
+            assert one["ratio"] == pytest.approx(ratio, rel=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -235,6 +293,10 @@ def test_floes_that_bear_the_same_split_in_the_same_step(tmp_path):
     two = made(run(tmp_path / "two", changed(case, floes=floes[::-1])))
     assert two["parent"].tolist() == [1, 3, 5]
     np.testing.assert_allclose(two["crack"][::-1], one["crack"], atol=1e-6)
+    few = run(tmp_path / "few", changed(case, floes=floes, ice__splitting__reserve=1, run__duration=1.0))
+    s = few.summary["splitting"]
+    assert s["splits"] == 1 and s["refused_reserve"] == 2
+    assert s["largest_refused_ratio"] == pytest.approx(made(few)["ratio"][0], rel=1e-6)
 
 
 # --- loads of one step -----------------------------------------------------------------------------------------------

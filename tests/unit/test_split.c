@@ -657,8 +657,24 @@ TEST(test_refused)
     law.aspect = 13;
     assert_true(splits(&t, load, 2, 1, &law, &best));
     assert_near(best.length, 30, 1e-12);
-    bt_split_floe weak = s;
+    // Sections shorter than the least width: of a strip that is narrower itself, and of a neck between two blocks.
+    const floe narrow = rectangle(2.9, 20);
+    const bt_split_floe u = seen(&narrow, 1);
+    const bt_floe_load bend[3] = {push(-1.45, 0, 2e5, 0), push(1.45, -8, -1e5, 0), push(1.45, 8, -1e5, 0)};
+    law = law_of(2.8);
+    const double ratio = splits(&u, bend, 3, 1, &law, &best) ? best.ratio : 0;
     law = law_of(3);
+    assert_false(splits(&u, bend, 3, 1, &law, &best));
+    assert_int_equal(best.refused, BT_SPLIT_SIZE);
+    assert_near(best.refused_ratio, ratio, 1e-9);
+    floe joined = {8, {0, -22, 20, -22, 20, -2, 2.9, -2, 2.9, 2, 20, 2, 20, 22, 0, 22}, false};
+    bt_shape_centre(joined.n, joined.v);
+    const double left = joined.v[0];
+    const bt_split_floe v = seen(&joined, 1);
+    const bt_floe_load neck[3] = {push(left, 0, 4e4, 0), push(left + 20, -18, -2e4, 0), push(left + 20, 18, -2e4, 0)};
+    assert_true(splits(&v, neck, 3, 1, &law, &best));
+    assert_near(best.length, 2.9, 1e-9);
+    bt_split_floe weak = s;
     const double whole = critical(&s, load, 2, &law, &best);
     weak.factor = 0.5;
     assert_near(critical(&weak, load, 2, &law, &best), whole / 2, 1e-8);

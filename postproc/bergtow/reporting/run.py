@@ -271,7 +271,7 @@ def quality(run):
         rows.append((
             "splits", f"{n('splitting.splits'):.0f}",
             f"{at:.0f} at a load, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks of "
-            f"{style.short(n('splitting.crack_length_m'))} m; {sizes}kept whole by their size {small:.0f}, by their "
+            f"{style.short(n('splitting.crack_length_m'))} m; {sizes}times kept whole by size {small:.0f}, by "
             f"generation {old:.0f}"
         ))
     if n("stalled_s", 0):
