@@ -68,8 +68,8 @@ void bt_comm_errors(const bt_comm *comm, bt_errors *err);
 /// Collective. Copy bytes from rank 0 to all; any size.
 void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes);
 
-/// Collective. Do all ranks have the same text, read from `path` and the files that it names? On a cluster each node may
-/// have a copy of its own. Errors: BT_ERR_CASE.
+/// Collective. Do all ranks have the same text, read from `path` and the files that it names? On a cluster each node
+/// may have a copy of its own. Errors: BT_ERR_CASE.
 bt_status bt_comm_same(const bt_comm *comm, const char *path, const char *text, bt_errors *err);
 
 /// Collective. Is `value` true on any rank?
