@@ -63,6 +63,8 @@ static inline bt_sample sample(int step)
         values[k] = 100.0 * (double)k + sin(step + 0.1 * (double)k);
     memcpy(&s, values, sizeof s);
     s.time = 0.1 * (step + 1);
+    s.body_in_ice_x = 0.01 * step; // slow enough for the time step
+    s.body_in_ice_y = 0.001 * step;
     s.ice_resistance = 1000 + 10 * sin(1.7 * step * step);
     s.ice_resistance_budget = s.ice_resistance;
     s.drag_force = 20;
