@@ -211,13 +211,13 @@ class Scene:
         axes.yaxis.set_major_locator(MaxNLocator(9 if high > 2 * wide else 5, steps=(1, 2, 5, 10)))
         axes.set(xlabel=names[0], ylabel=names[1])
 
-        # Walls are endless along a periodic direction. The towed body and its line extend across a seam, but not across
-        # the ends of a moving window.
+        # Walls are endless along a periodic direction. The towed body and its line extend across a seam, but in a view
+        # that follows the body not across the ends of a moving window.
         px, py = run.period
         self._images = [
             np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))
         ]
-        self._towed = [a for a in self._images if not a[0] or run.case.get("domain.ends") != "moving"]
+        self._towed = [a for a in self._images if not (follow and a[0] and run.case.get("domain.ends") == "moving")]
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         self._corners = corners
         kept = dict(animated=animated)

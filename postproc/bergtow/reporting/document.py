@@ -20,11 +20,11 @@ NO_FORCE = ("No measured mean force of a tow with complete conditions is public.
             "compared with a measured one; the cases compare where and how ice jams with reports from laboratories.")
 SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"),
            ("d", "draft of the body, m"),
-           ("h", "thickness of the ice, m"), ("V", "speed of the body through water and ice, m/s"),
+           ("h", "thickness of the ice, m"), ("V, V_a", "speed of the body through water and ice, and its part along the tow, m/s"),
            ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("s", "height of the body above the water, m"),
-           ("U", "wind from ahead, relative to the body, m/s"),
+           ("U, U_a", "wind relative to the body, and its part from ahead, m/s"),
            ("ρ", "density, kg/m³; of ice with i, of water with w, of air with a"),
            ("kN, t", "1 t of force is 9.80665 kN"))
 STANDARDS = ("No rule of a standard or of a class society is applied, and none was available: not ISO 19906, not ISO "
@@ -118,11 +118,13 @@ def _row(what, by_hand, n, simulated):
             number(simulated / n, 2) if n and np.isfinite(simulated) else "–"]
 
 
-def wind_ahead(run):
-    """Mean wind from ahead that the body meets in the window, m/s, along the first leg of the tow; 0 in still air."""
+def met(run, what):
+    """(speed, part from ahead) of the mean wind or current that the body meets in the window, m/s, on the first leg of
+    the tow; 0 in still air."""
     there = within(run["time"], *run.window)
-    wind = np.array([run[f"wind_{k}"][there].mean() for k in "xy"])
-    return float(run.speed_made_good - run.headings[0] @ wind) if wind.any() else 0.0
+    flow = np.array([run[f"{what}_{k}"][there].mean() for k in "xy"])
+    relative = run.speed_made_good * run.headings[0] - flow if flow.any() or what == "current" else np.zeros(2)
+    return float(np.hypot(*relative)), float(run.headings[0] @ relative)
 
 
 def by_hand(run):
@@ -134,15 +136,16 @@ def by_hand(run):
     thick, concentration, ice = e.get("thickness_m", np.nan), e.get("concentration", np.nan), run.value("ice.density")
     if not np.isfinite([width, speed, draft, form, water]).all():
         return []
-    drag, simulated = 0.5 * water * form * width * draft * speed ** 2, run.number("mean_drag_force_n")
-    wind = wind_ahead(run)
-    out = [_row("drag of the water", f"½ ρw C W d V² = ½ × {number(water, 4)} kg/m³ × {number(form)} × "
-                f"{number(width)} m × {number(draft)} m × ({number(speed)} m/s)²", drag, np.nan if wind else simulated)]
+    along, (wind, ahead) = met(run, "current")[1], met(run, "wind")
+    drag, simulated = 0.5 * water * form * width * draft * speed * along, run.number("mean_drag_force_n")
+    out = [_row("drag of the water", f"½ ρw C W d V V_a = ½ × {number(water, 4)} kg/m³ × {number(form)} × "
+                f"{number(width)} m × {number(draft)} m × {number(speed)} m/s × {number(along)} m/s", drag,
+                np.nan if wind else simulated)]
     if wind:
         air, form, sail = (run.value(k) for k in ("air.density", "body.drag.air_form", "body.sail"))
-        blown = 0.5 * air * form * width * sail * wind * abs(wind)
-        out += [_row("drag of the wind", f"½ ρa C W s U² = ½ × {number(air)} kg/m³ × {number(form)} × "
-                     f"{number(width)} m × {number(sail)} m × ({number(wind)} m/s)²", blown, np.nan),
+        blown = 0.5 * air * form * width * sail * wind * ahead
+        out += [_row("drag of the wind", f"½ ρa C W s U U_a = ½ × {number(air)} kg/m³ × {number(form)} × "
+                     f"{number(width)} m × {number(sail)} m × {number(wind)} m/s × {number(ahead)} m/s", blown, np.nan),
                 _row("drag of water and wind", "sum", drag + blown, simulated)]
         drag += blown
     if np.isfinite([thick, concentration, ice]).all():

@@ -107,8 +107,8 @@ def answer(e, s, cases, results, told=None):
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
     if any(c["design"]["tow"] and design_value.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
-        notes.append("In the start: of the same moving mean, the largest that begins before the window, which enters "
-                     "no other number.")
+        notes.append("In the start: of the same moving mean, the largest that begins before the window, which no "
+                     "other column includes.")
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), loads_text.holds_for(s)
@@ -146,7 +146,7 @@ def governing(s):
              f"{both(d['value'], d['largest'])}; upper end of its interval {both(high)}")
     if np.isinf(high):
         said += ": these fields do not determine the length of the tail, so do not use the value for a design"
-    return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
+    return said + (f"; its start, which that value leaves out, {both(d['start_up']['largest'])}."
                    if design_value.start_exceeds(d) else ".")
 
 

@@ -213,21 +213,21 @@ def start_exceeds(d):
 
 
 def _of_the_start(case, load):
-    """Warnings about the start-up, which no number of the load includes. While the ramp accelerates the body, its
+    """Warnings about the start-up, which no level of the windows includes. While the ramp accelerates the body, its
     inertia adds to ice and drag, and a longer ramp reduces the load; a peak at another time may have any cause."""
     found, d = load["start_up"], load["design"]
     if not start_exceeds(d | {"start_up": found, "largest": load["largest"]}):
         return []
-    than = "the design value" if "value" in d else "the largest value of the window"
+    than = "their design value" if "value" in d else "the largest value of the window"
     words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
     ramp = case.ramp if case else 0.0
     if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
         # no share: the other forces may have the other sign
         inertia = f", with {quantity(found['inertia'], load['units'])} of inertia" if np.isfinite(
             found.get("inertia", np.nan)) else ""
-        return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
+        return [(f"the start, which the windows leave out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
                  "accelerates the body; a longer ramp takes less", force + inertia)]
-    return [(f"the start, which is left out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
+    return [(f"the start, which the windows leave out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
 
 
 def steps(e, rows):

@@ -363,9 +363,10 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     thickness = case_value(t.case, "ice.thickness", 0.0) if t else 0.0
     if np.isfinite(v.beam) and thickness > 0:  # of the vessel itself: an order of magnitude
         own = towing.ice_resistance(v.beam, thickness, worst["concentration"], asked["speed_m_s"])
-        vessel |= {"own_resistance": {"low_n": own.low, "high_n": own.high, "source": own.source},
-                   "needed_with_ice_n": [gear.needed_pull(v, n, asked["speed_m_s"], efficiency, x)
-                                         for x in (own.low, own.high)]}
+        if own.high > 0 and np.isfinite(needed[0]):
+            vessel |= {"own_resistance": {"low_n": own.low, "high_n": own.high, "source": own.source},
+                       "needed_with_ice_n": [gear.needed_pull(v, n, asked["speed_m_s"], efficiency, x)
+                                             for x in (own.low, own.high)]}
     l, load = asked["line_found"], hold["n"] if hold else np.nan
     line = {"id": "line", "name": l.name or None, "row": hold and hold["id"], "design_tension_n": load,
             "factor": factor, "needed_breaking_load_n": load * (factor or 1.0), "given_n": l.breaking,

@@ -181,7 +181,7 @@ def signals(s):
         return [[nothing(s), *left_out(s)]]
     note = ("Moving mean, over the time given, of the signal in the window from its first time scale on; means "
             "therefore differ a little from those of the whole window. In the start: the largest of the means that "
-            "begin before the window, which enters no other number. 95 %: interval over fields.")
+            "begin before the window, which no other column includes. 95 %: interval over fields.")
     return [Table(head, rows, 1), [note, *left_out(s), *conversions(s), *panel_lines(s)]]
 
 
