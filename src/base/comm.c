@@ -308,8 +308,8 @@ bt_status bt_comm_same(const bt_comm *comm, const char *path, const char *text, 
     bt_comm_bcast(comm, first, sizeof first);
     if (!bt_comm_any(comm, strcmp(mine, first) != 0)) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,
-                   "%s: this file, or one that it names, is not the same on all %d ranks; give all of them the same "
-                   "files",
+                   "%s: this file, or one that it names, has other contents or another path on some of the %d ranks; "
+                   "give all of them the same files at the same place",
                    path, comm->size);
 }
 

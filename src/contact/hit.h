@@ -26,12 +26,6 @@ static inline double bt_hit_work(const bt_hit *hit, double s)
                           : hit->work + s * (hit->force + 0.5 * hit->slope * s);
 }
 
-/// E'(s), the force of the ice times Δt, N s.
-static inline double bt_hit_force(const bt_hit *hit, double s)
-{
-    return s <= hit->kink ? hit->touch + hit->ramp * s : hit->force + hit->slope * s;
-}
-
 /// L at u = place + s, N s.
 static inline double bt_hit_bound(const bt_hit *hit, double place, double s)
 {

@@ -6,7 +6,6 @@
 
 #include "base/elementary.h"
 #include "contact/row.h"
-#include "solve/limit.h"
 #include "space/shore.h"
 
 /// Interior angle of the outline of body i, rad, at vertex v of a part; NaN if there is no such vertex. Every corner of
@@ -72,22 +71,4 @@ bt_collision bt_contact_collision(const bt_world *world, const bt_contact *conta
     if (collision.impulse > 0 && collision.rest > 0)
         collision.whole *= collision.approach / (collision.approach - collision.rest);
     return collision;
-}
-
-bt_peak_bounds bt_contact_peak(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision)
-{
-    const bt_contact *contact = &cell->contacts[j];
-    bt_peak_bounds peak = {.most = INFINITY};
-    if (!bt_laws_on(&world->par)) return peak;
-    const bt_limit *limit = &cell->laws->limits[j];
-    const double total = contact->ln[0] + contact->ln[1], lasting = total - collision->impulse;
-    double most = 0;
-    bool gives_way = false;
-    for (int i = 0; i < contact->n; i++) {
-        most += bt_max(contact->ln[i], bt_limit_end(limit, contact, i, world->bodies.vel));
-        gives_way = gives_way || (contact->ln[i] > 0 && contact->ln[i] >= limit->flat[i]);
-    }
-    peak.most = (most - lasting) / world->par.dt;
-    if (gives_way) peak.least = collision->impulse / world->par.dt;
-    return peak;
 }

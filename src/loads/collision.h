@@ -18,15 +18,6 @@ typedef struct bt_collision {
 /// The collision part of a contact with a normal impulse above 0, after the solve and before poses move.
 bt_collision bt_contact_collision(const bt_world *world, const bt_contact *contact);
 
-/// What a step knows of the normal force at the peak of a collision (loads/impact.h), N.
-typedef struct bt_peak_bounds {
-    double least; ///< 0 = nothing
-    double most;  ///< INFINITY = nothing
-} bt_peak_bounds;
-
-/// The same of contact j of a cell; collision: its own.
-bt_peak_bounds bt_contact_peak(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision);
-
 typedef struct bt_contact_corner {
     double angle;     ///< interior, rad; NaN if there is none
     int of;           ///< 0 = corner of a, 1 = of b; −1 = the sharper of two corners that meet

@@ -36,7 +36,6 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
     const bt_idx other = is_b ? contact->a : contact->b;
     const double sign = is_b ? 1 : -1;
     const bt_collision collision = bt_contact_collision(world, contact);
-    const bt_peak_bounds peak = bt_contact_peak(world, cell, j, &collision);
 
     // Arms in world axes from their products with n and t, rotated into the body's frame at X1.
     const double along = is_b ? contact->rbt : contact->rat, arm = is_b ? collision.rbn : collision.ran;
@@ -52,8 +51,6 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
         .collision = collision.impulse,
         .approach = collision.approach,
         .rest = collision.rest,
-        .least = peak.least,
-        .most = peak.most,
         .mass = collision.mass,
         .thickness = bodies->mass[other] > 0 ? bodies->mass[other] / (impacts->sheet * bodies->area[other])
                                              : impacts->body_height,
@@ -175,9 +172,11 @@ void bt_impacts_free(bt_impacts *impacts)
 
 // --- force of a collision --------------------------------------------------------------------------------------------
 
-void bt_impact_convert(const bt_impact_rule *rule, double least, double most, bt_impact *impact)
+void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact)
 {
-    if (!rule->real_corner || !(impact->corner > 0 && impact->corner < BT_PI)) impact->corner = rule->corner_angle;
+    // as the limit of impact.corner_angle: where two flush edges meet, the angle is half a turn but for rounding
+    if (!rule->real_corner || !(impact->corner > 0 && impact->corner < 179 * BT_PI / 180))
+        impact->corner = rule->corner_angle;
     if (rule->conversion == BT_IMPACT_CRUSHING) {
         const double k = 2 * rule->pressure * impact->thickness * bt_tan(0.5 * impact->corner);
         impact->peak = bt_min(impact->approach, impact->impulse / impact->mass) * sqrt(k * impact->mass);
@@ -188,11 +187,6 @@ void bt_impact_convert(const bt_impact_rule *rule, double least, double most, bt
         impact->mean = impact->impulse / rule->duration;
         impact->peak = 0.5 * BT_PI * impact->mean;
     }
-    const double peak = bt_max(least, bt_min(impact->peak, most));
-    if (peak == impact->peak) return;
-    impact->peak = peak;
-    impact->mean = 2 / BT_PI * peak;
-    impact->duration = impact->impulse / impact->mean;
 }
 
 void bt_impact_describe(const bt_impact_rule *rule, char out[160])
@@ -212,7 +206,7 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
     bt_impact *impact = &impacts->closed[impacts->n_closed++];
     *impact = o->so_far;
     impact->panel = bt_panels_at(&impacts->panels, impact->x, impact->y);
-    bt_impact_convert(&impacts->rule, impact->mean, impact->peak > 0 ? impact->peak : INFINITY, impact);
+    bt_impact_convert(&impacts->rule, impact);
 }
 
 /// Add contacts `contact[n]` of one floe in this step to its event; o: its open event, or empty. True if there is an
@@ -220,14 +214,11 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
 static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t n, double time, bt_impact_open *o,
                    bool *begun)
 {
-    double sum = 0, approach = 0, rest = 0, least = 0, peak = 0;
+    double sum = 0, approach = 0, rest = 0;
     int64_t most = 0;
     for (int64_t i = 0; i < n; i++) {
         sum += contact[i].collision;
-        if (contact[i].collision > 0) {
-            approach = bt_max(approach, contact[i].approach);
-            least += contact[i].least, peak += contact[i].most;
-        }
+        if (contact[i].collision > 0) approach = bt_max(approach, contact[i].approach);
         rest = bt_max(rest, contact[i].rest);
         if (contact[i].collision > contact[most].collision) most = i;
     }
@@ -240,8 +231,6 @@ static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t 
     *begun = true;
     bt_impact *impact = &o->so_far;
     impact->impulse += sum;
-    impact->mean = bt_max(impact->mean, least);
-    if (isfinite(peak)) impact->peak = bt_max(impact->peak, peak);
     o->rest = rest;
     if (contact[most].collision > o->largest) {
         o->largest = contact[most].collision;

@@ -32,15 +32,6 @@
 //               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then, without the rebound
 // In the second v_n is the approach that the contact itself removes, min(approach, λ / m_e): neighbours may share it.
 //
-// Where a contact law bounds the force, the step knows more than an assumed duration. The force of ice that crushes
-// rises with the depth, so in a step at the bound its largest value is at least its mean and at most that of the law at
-// the depth reached, F(y):
-//     λ_c / Δt <= peak <= F(y) − (λ − λ_c)/Δt
-// The conversion counts within these bounds, of which an event has the largest of its steps. As Δt → 0 both tend to the
-// force that acts, whatever the conversion; in a step longer than the collision they leave it free, and F(y) is the
-// force at which the crushed ice stops the body. Below the bound (flush faces) the lower one does not hold. Mean and
-// duration of a peak that was bounded are those of a half-sine of the same impulse.
-//
 // Counts, and their start: src/output/impact_count.h, src/loads/panel.h.
 //
 // On several ranks every rank finds the contacts that it owns; rank 0 gathers them, by id, and does the rest.
@@ -60,7 +51,6 @@ typedef struct bt_body_contact {
     double collision;     ///< λ_c, N s
     double approach;      ///< −v1 if the contact closes, otherwise 0, m/s
     double rest;          ///< −v2 if it still closes, otherwise 0, m/s
-    double least, most;   ///< bounds of the peak (bt_peak_bounds), N
     double mass;          ///< m_e, kg
     double thickness;     ///< of the ice that is crushed, m
     double corner;        ///< interior angle of the corner in contact, rad; NaN if it has none
@@ -78,7 +68,7 @@ typedef struct bt_impact {
     double mass;          ///< m_e, kg
     double thickness;     ///< m
     double corner;        ///< φ used by the conversion `crushing`, rad
-    double mean, peak;    ///< N, by the conversion; of an open collision the bounds of the peak, 0 = none
+    double mean, peak;    ///< N, by the conversion
     double duration;      ///< T_c or t_p, s
 } bt_impact;
 
@@ -119,9 +109,8 @@ typedef struct bt_impacts {
 } bt_impacts;
 
 bt_impact_rule bt_impact_rule_of(const bt_case *input);
-/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner, and from bounds of
-/// the peak, N.
-void bt_impact_convert(const bt_impact_rule *rule, double least, double most, bt_impact *impact);
+/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
+void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact);
 
 /// Create it for the towed body of the world; NULL if the case does not ask for collisions, or there is no body.
 bt_impacts *bt_impacts_create(const bt_case *input, const bt_world *world);

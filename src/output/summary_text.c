@@ -188,8 +188,9 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
         const bt_estimate_input *in = &summary->estimate;
         printf("  estimates           at %.4g m/s through the ice", in->along);
         if (fabs(in->along - in->ordered) > 0.01 * fabs(in->ordered)) printf(" (%.4g ordered)", in->ordered);
-        printf(": estimate; simulated / estimate (where valid and dependent on concentration%s); validity\n",
-               in->channel ? "; none accounts for the channel" : "");
+        printf(": estimate; simulated / estimate (where valid and dependent on concentration%s%s); validity\n",
+               in->channel ? "; none accounts for the channel" : "",
+               in->changes_speed ? "; none accounts for a speed that changes in the window" : "");
         bt_estimates_print(in, bt_summary_held_against(summary), "    ", false);
     }
     if (history->n)

@@ -40,16 +40,6 @@ static inline double bt_limit_bound(const bt_limit *limit, const bt_contact *con
     return bt_min(limit->most[i], bt_max(limit->flat[i], rising));
 }
 
-/// The force on point i at the end of the step, times Δt: of a hit that of the ice at the depth it has reached, else
-/// the bound of the impulse.
-static inline double bt_limit_end(const bt_limit *limit, const bt_contact *contact, int i, const bt_vel *v)
-{
-    const bt_hit *hit = &bt_rise_of(limit)->hit[i];
-    if (!(hit->before > 0)) return bt_limit_bound(limit, contact, i, v);
-    const double s = -(bt_normal_velocity(contact, i, &v[contact->a], &v[contact->b]) + limit->place[i]);
-    return bt_min(limit->cap[i], bt_hit_force(hit, bt_max(0, s)));
-}
-
 /// Minimum of ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is if not inside: on the side whose
 /// multiplier has the right sign; if rounding leaves that in doubt, on the side of least value.
 static inline void bt_limit_rim(const bt_mass *m, const double b[2], const double c[2], double l[2])

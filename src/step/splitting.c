@@ -110,16 +110,13 @@ static bool is_collision(const bt_world *world, const bt_collision *collision)
     return rule->conversion != BT_IMPACT_NONE && collision->impulse > 0 && collision->approach >= rule->least_speed;
 }
 
-/// Peak force of a collision of contact j, N, as if none of it were left to the next step.
-static double peak_of(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision,
-                      double corner)
+/// Peak force of a collision, N, as if none of it were left to the next step.
+static double peak_of(const bt_world *world, const bt_contact *contact, const bt_collision *collision, double corner)
 {
-    const bt_contact *contact = &cell->contacts[j];
     bt_impact impact = {.impulse = collision->whole, .approach = collision->approach, .mass = collision->mass,
                         .corner = corner,
                         .thickness = bt_crush_thickness(&world->bodies, contact->a, contact->b)};
-    const bt_peak_bounds peak = bt_contact_peak(world, cell, j, collision);
-    bt_impact_convert(&world->splitting->rule, peak.least, peak.most, &impact);
+    bt_impact_convert(&world->splitting->rule, &impact);
     return impact.peak;
 }
 
@@ -148,7 +145,7 @@ static pressing pressing_of(const bt_world *world, const bt_cell *cell, bt_idx j
             world, contact, cell->search.pairs[contact->pair].part, cell->gaps[j].feature[p.at]);
         const double half = 0.5 * corner.angle, wedge = half < WEDGE ? bt_split_wedge(half, contact->mu) : 0;
         if (sharp && corner.of >= 0 && wedge > 0) p.opening[1 - corner.of] = 1 / wedge;
-        if (hit) p.peak = peak_of(world, cell, j, &collision, corner.angle);
+        if (hit) p.peak = peak_of(world, contact, &collision, corner.angle);
     }
     p.force = bt_max(0, (hit ? total - collision.impulse : total) / world->par.dt);
     return p;

@@ -531,8 +531,8 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
         assert start == {"largest": pytest.approx(1e9), "time_s": 30, "inertia": None}  # none in these files
         assert c["loads"]["line_tension_1"]["start_up"]["largest"] == pytest.approx(1.01e9)
         assert c["design"]["warnings"][0]["what"].startswith("the start, which the windows leave out,")
-    assert "WARNING: The start, which the windows leave out, takes more than their design value, as the largest mean over 30 s " \
-        "(1.00 GN at 30 s)." in text.replace("1000 MN", "1.00 GN")
+    assert "WARNING: The start, which the windows leave out, takes more than their design value, as the largest " \
+        "mean over 30 s (1.00 GN at 30 s)." in text.replace("1000 MN", "1.00 GN")
     assert float(next(csv.DictReader(open(folder / "statistics.csv")))["tow_force_start_up_n"]) == pytest.approx(1e9)
     ramp = CASE.format(pressure=0, load=0).replace("speed:", "ramp: {} s\n  speed:")
     for ramp_s, jerk, words in ((20, 2e6, "while the ramp of 20 s accelerates the body; a longer ramp takes less: "

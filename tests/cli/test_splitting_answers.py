@@ -177,33 +177,19 @@ def test_the_gap_at_the_start_of_the_step_makes_no_difference(tmp_path, impact):
         assert made(run(tmp_path / str(share), case))["ratio"] == pytest.approx([1.5], rel=1e-6)
 
 
-@pytest.mark.parametrize("impact", [{"conversion": "duration"}, BY_CRUSHING])
-def test_ice_that_crushes_over_many_steps_splits_a_floe_at_the_force_that_acts(tmp_path, impact):
-    """The force of a crushed corner is that of a spring, F sin ωt. Whatever the conversion, the floe splits within a
-    step of when it reaches its strength."""
-    half, mass, k = np.radians(30), DENSITY * SIDE**2 / 2, 2 * 1.5e6 * np.tan(np.radians(30))
-    case = changed(collision(half, 1.5 * wedge_force(half, 1.0) / np.sqrt(k * mass), impact=impact),
-                   ice__crushing={"pressure": 1.5e6, "least_length": 0.0})
-    for dt in (0.1, 0.02):
-        t = made(run(tmp_path / str(dt), changed(case, run__dt=dt)))["time"]
-        rise = 1.5 * np.sqrt(k / mass) * dt
-        assert 1.5 * np.sin(np.sqrt(k / mass) * t) == pytest.approx([1], abs=rise)
-
-
-@pytest.mark.parametrize("dt, pressure, share", [(1.0, 1e9, 0.0), (1.0, 1e9, 0.5), (0.02, 1.5e6, 0.0)])
-def test_a_peak_that_is_told_is_the_load_by_which_a_floe_is_judged(tmp_path, dt, pressure, share):
-    """Of a towed wedge, on a floe that its size keeps whole; with the pressure of ice, v √(k m)."""
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_peak_that_is_told_is_the_load_by_which_a_floe_is_judged(tmp_path, share):
+    """Of a towed wedge, on a floe that its size keeps whole."""
     half, speed = np.radians(30), 0.3
-    case = collision(half, speed, impact={"conversion": "duration", "duration": dt})
+    case = collision(half, speed, impact={"conversion": "duration", "duration": 1.0})
     p = np.array(case["floes"].pop()["vertices"])
-    x = 600 - p[:, 0].max() - share * speed * dt
-    case = changed(case, run={"dt": dt, "duration": 4.0}, ice__crushing={"pressure": pressure, "least_length": 0.0},
+    x = 600 - p[:, 0].max() - share * speed
+    case = changed(case, run={"dt": 1.0, "duration": 4.0},
                    ice__splitting__least_size=20.0, tow={"mode": "speed", "speed": speed, "ramp": 0.0},
                    body={"shape": "polygon", "vertices": p.tolist(), "x": x, "y": 0.0, "draft": 30.0})
     r = run(tmp_path, case)
     peak, mass = r.dataset("impacts/peak"), DENSITY * SIDE**2
-    by_law = speed * (np.pi / 2 * mass if pressure == 1e9 else np.sqrt(2 * pressure * np.tan(half) * mass))
-    assert peak == pytest.approx([by_law], rel=0.03)
+    assert peak == pytest.approx([speed * np.pi / 2 * mass], rel=0.03)
     assert r.summary["splitting"]["largest_refused_ratio"] == pytest.approx(peak[0] / wedge_force(half, 1.0), rel=5e-3)
 
 

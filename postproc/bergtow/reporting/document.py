@@ -20,7 +20,8 @@ NO_FORCE = ("No measured mean force of a tow with complete conditions is public.
             "compared with a measured one; the cases compare where and how ice jams with reports from laboratories.")
 SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coefficient"),
            ("d", "draft of the body, m"),
-           ("h", "thickness of the ice, m"), ("V, V_a", "speed of the body through water and ice, and its part along the tow, m/s"),
+           ("h", "thickness of the ice, m"),
+           ("V, V_a", "speed of the body through water and ice, and its part along the tow, m/s"),
            ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("s", "height of the body above the water, m"),

@@ -44,8 +44,9 @@ DOUBTS = {
     "other": "a warning of another kind",
 }
 
-#: codes of warnings already covered by these; the grounds of a verdict are reasons, not separate warnings
-TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped"}
+#: codes of warnings already covered by these, or that say nothing against the numbers (keys without effect, which other
+#: conditions of a study need); the grounds of a verdict are reasons, not separate warnings
+TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped", "idle"}
 
 #: doubts that may be used to exclude members: not "met little ice", which would exclude the small means
 EXCLUDABLE = sorted(set(DOUBTS) - {"few"})

@@ -259,7 +259,8 @@ def outcome(run, c, goal, situation, force_limit=np.inf):
     xy = np.column_stack([run["body_x"], run["body_y"]])
     end = arrival(xy, goal, ARRIVED * s.hull.width)
     n = len(time) if end is None else end + 1
-    step = np.diff(np.vstack([s.start, xy[:n]]), axis=0)
+    # length and work are those of the way through the ice, as in the plan
+    step = np.diff(np.vstack([s.start, np.column_stack([run["body_in_ice_x"], run["body_in_ice_y"]])[:n]]), axis=0)
     dt = np.diff(np.append(0.0, time[:n]))
     force = least(run["tow_force" if s.mode == "speed" else "line_tension"])[:n]
     along = np.hypot(*step.T)

@@ -225,9 +225,10 @@ def _of_the_start(case, load):
         # no share: the other forces may have the other sign
         inertia = f", with {quantity(found['inertia'], load['units'])} of inertia" if np.isfinite(
             found.get("inertia", np.nan)) else ""
-        return [(f"the start, which the windows leave out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
-                 "accelerates the body; a longer ramp takes less", force + inertia)]
-    return [(f"the start, which the windows leave out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
+        return [(f"the start, which the windows leave out, takes more than {than}, {words}, while the ramp of "
+                 f"{ramp:.3g} s accelerates the body; a longer ramp takes less", force + inertia)]
+    return [(f"the start, which the windows leave out, takes more than {than}, {words}",
+             f"{force} at {found['time_s']:.3g} s")]
 
 
 def steps(e, rows):
