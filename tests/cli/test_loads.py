@@ -453,7 +453,7 @@ def test_what_speaks_against_a_design_tension_is_named_as_of_the_tow_force(state
     second |= {"alike_p": 1e-6, "start_up": {"largest": 9e9, "time_s": 600.0}}
     more = [w["what"] for w in said(c)["warnings"] if w not in before["warnings"]]
     assert any(what.startswith(f"{label}: the fields differ") for what in more)
-    assert any(what.startswith(f"{label}: the start, which is left out") for what in more)
+    assert any(what.startswith(f"{label}: the start, which the windows leave out") for what in more)
     second["design"] = {"refused": "too few clusters", "probability": 0.05, "tow_hours": 24, "return_hours": 468}
     assert said(c)["tension"] is None
     assert {"what": f"{label}: no value", "detail": "too few clusters"} in said(c)["warnings"]
@@ -539,7 +539,7 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
                                  "concentration 50 % (2.00 MN)."), (20, 1e6, None)):
         some = towed(tmp_path / f"{jerk:g}", fields=5, text=ramp.format(ramp_s), jerk=jerk)
         said = script("statistics", some, "--resamples", 1).stdout
-        assert words in said if words else "the start, which is left out" not in said
+        assert words in said if words else "the start, which the windows leave out" not in said
         assert "in the start" in said  # the column
 
 
