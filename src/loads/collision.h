@@ -8,7 +8,7 @@
 
 typedef struct bt_collision {
     double impulse;   ///< λ_c, N s
-    double whole;     ///< of a collision that goes on in the next step: Λ, that of both, N s
+    double whole;     ///< Λ: of this step and the next, if the collision continues there, N s
     double approach;  ///< −v1 if the contact closes, otherwise 0, m/s
     double rest;      ///< −v2 if it still closes, otherwise 0, m/s
     double mass;      ///< m_e, kg
