@@ -67,8 +67,8 @@ const bt_json_key bt_estimate_keys[] = {
                 "mean ice resistance of the run / force; it tells something where `compares`"),
     OF_ESTIMATE("valid", e.valid, "1", "the formula is meant for these conditions"),
     OF_ESTIMATE("compares", e.compares, "1",
-                "valid, and it depends on the concentration, and not on an ordered speed that changes in the window: a "
-                "run is compared with it"),
+                "a run is compared with it: it is valid, depends on the concentration, and does not depend on a speed "
+                "that changes in the window"),
     OF_ESTIMATE("note", e.note, "", "regime, or why it is not valid"),
     OF_ESTIMATE("formula", formula, "", "the formula"),
     OF_ESTIMATE("source", source, "", "where it is from"),

@@ -122,7 +122,7 @@ def conditions(run):
 
 def fixed(value, span):
     """A value out of a range, with decimals for a hundredth of that range or less."""
-    decimals = max(0, 2 - int(np.floor(np.log10(span))))
+    decimals = max(0, 2 - int(np.floor(np.log10(span or 1))))
     return f"{round(value, decimals) + 0.0:.{decimals}f}"  # avoid minus zero
 
 
@@ -185,8 +185,8 @@ def logarithmic(*axis):
 
 
 def force_limits(means, around, log):
-    """Ends of a force axis: the means, all positive if it is logarithmic, and what is drawn around them, their
-    intervals and estimates; None and NaN do not count."""
+    """Ends of a force axis that shows the means and, around them, intervals and estimates. log: the means are positive.
+    None and NaN do not count."""
     seen = np.array([v for v in (*means, *around) if v is not None and np.isfinite(v)])
     if log:
         # an interval that nearly reaches zero must not stretch the axis

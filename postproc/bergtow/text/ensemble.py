@@ -80,10 +80,10 @@ def estimates(s):
         rows.append(cells)
     on_top = [f"{label}: no ice resistance; add it to the others." for name, label in labels.items()
               if s["conditions"][0]["estimates"][name]["on_top"]]
-    note = ("In brackets: simulated / estimate, where the estimate is meant for the conditions, depends on the "
-            "concentration, and not on an ordered speed that changes in the window. * outside the range the estimate "
-            "is meant for. –: no value there. The estimates were not made for each other's conditions and can differ "
-            "tenfold; none has been checked against a measured tow here.")
+    note = ("In brackets: simulated / estimate, where the estimate is meant for the conditions and depends on the "
+            "concentration; none where it depends on a speed that changes in the window. * outside the range the "
+            "estimate is meant for. –: no value there. The estimates were not made for each other's conditions and can "
+            "differ tenfold; none has been checked against a measured tow here.")
     return [Table(head, rows), [" ".join([note, *on_top])]]
 
 

@@ -14,8 +14,8 @@ function ticks(low, high, n) {
     return out;
 }
 
-// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is beyond is
-// named, not drawn. side: 1 for what lies above zero, -1 below.
+// Limits of the force axis: they hold the running mean of the ice force and the other forces of the steady window.
+// Samples beyond them are named, not drawn. side: 1 above zero, -1 below.
 function forceRange() {
     const [ice, ...others] = curve.lines, steady = curve.window ? curve.window[0] : curve.start;
     const largest = (side, values, from = curve.start) =>
