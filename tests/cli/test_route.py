@@ -325,11 +325,14 @@ def test_drifting_ice_is_passed_at_the_planned_times(tmp_path, mode, drift):
         c = tows.candidate("c", "c", r, s)
         assert c.track[-1] == pytest.approx(goal, abs=1e-3)
         assert (c.swath[:len(c.track)] + c.swath[:len(c.track) - 1:-1]) / 2 == pytest.approx(c.track)
-        sets = [w for k, v in c.keys.items() for w in ("--set", f"{k}={v}")]
+        current = {f"water.current_{k}": v for k, v in zip("xy", drift)} if mode == "speed" else {}
+        sets = [w for k, v in (c.keys | current).items() for w in ("--set", f"{k}={v}")]
         assert call("run", s.case, "-o", tmp_path / c.name, "--quiet", "--force", *sets).returncode == DONE
         with Run(tmp_path / c.name) as run_:
             lag = s.ramp / 2 if mode == "speed" else 0.75 * s.ramp
             body = [np.interp(r.time[20:] + lag, run_["time"], run_[name]) for name in ("body_x", "body_y")]
+            if mode == "speed":
+                assert tows.outcome(run_, c, goal, s)["length"] == pytest.approx(r.length, rel=0.03)  # through the ice
         off = np.hypot(*(np.transpose(body) - c.track[20:]).T)
         assert off.max() < (0.05 if mode == "speed" else 1.0)
 
