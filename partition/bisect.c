@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Recursive coordinate bisection: split across the longer side, with the weight in proportion to the parts, and repeat.
-// (Berger & Bokhari 1987, IEEE Trans. Comput. C-36.) Needs no graph and cannot fail: the fallback behind METIS.
+// (Berger & Bokhari 1987, IEEE Trans. Comput. C-36.) Needs no graph and cannot fail: the fallback behind METIS. With
+// several kinds of work a split across the longer side may divide one and not the other: ahead of a towed body lies
+// most of the contacts, behind it most of the moving floes. Then the split is across the shorter side.
 #include "partition/cut.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "base/inside.h"
 #include "bergtow/base.h"
+
+#define TURNS 1.03 // cost across the longer side / across the shorter one, above which the shorter one is taken
 
 typedef struct key {
     double x;
@@ -28,34 +33,52 @@ static int longer_side(const bt_graph *graph, int n, const key *k)
     return high[1] - low[1] > high[0] - low[0];
 }
 
-// Vertices left of the split: prefix weight nearest to sum × left_parts / n_parts, and enough vertices on either side.
-static int split(const bt_graph *graph, int n, const key *k, int n_parts, int left_parts)
+typedef struct division {
+    int left;    // vertices on the left
+    double cost; // Σ over the kinds of the heavier side, per part, / that of an even split
+} division;
+
+static bt_cut_work weight_of(const bt_graph *graph, int vertex, bool count)
 {
-    int64_t sum = 0;
-    for (int i = 0; i < n; i++) sum += graph->weight[k[i].vertex];
-    bool count = sum == 0; // weightless vertices are split by number
-    if (count) sum = n;
-    long double aim = (long double)sum * left_parts / n_parts;
-    int right_parts = n_parts - left_parts, at = 0;
-    int64_t left = 0;
-    while (at < n - right_parts) {
-        int64_t w = count ? 1 : graph->weight[k[at].vertex];
-        if (at >= left_parts && left + 0.5L * w >= aim) break;
-        left += w;
-        at++;
+    return count ? (bt_cut_work){{1}} : graph->weight[vertex];
+}
+
+// The cheapest split with enough vertices on either side.
+static division split(const bt_graph *graph, int n, const key *k, int n_parts, int left_parts)
+{
+    const int right_parts = n_parts - left_parts;
+    bt_cut_work sum = {{0}}, left = {{0}};
+    for (int i = 0; i < n; i++) bt_cut_add(&sum, graph->weight[k[i].vertex], 1);
+    const bool count = bt_cut_sum(sum) == 0; // weightless vertices are split by number
+    if (count) sum.of[0] = n;
+    division best = {.cost = INFINITY};
+    for (int at = 0; at <= n - right_parts; at++) {
+        double cost = 0;
+        for (int c = 0; c < BT_CUT_KINDS; c++)
+            cost += bt_max((double)left.of[c] / left_parts, (double)(sum.of[c] - left.of[c]) / right_parts);
+        if (at >= left_parts && cost < best.cost) best = (division){at, cost};
+        if (at < n) bt_cut_add(&left, weight_of(graph, k[at].vertex, count), 1);
     }
-    return at;
+    best.cost *= n_parts / (double)bt_cut_sum(sum);
+    return best;
+}
+
+static division split_across(const bt_graph *graph, int n, key *k, int side, int n_parts, int left_parts)
+{
+    for (int i = 0; i < n; i++) k[i].x = graph->at[k[i].vertex][side];
+    qsort(k, (size_t)n, sizeof *k, by_position);
+    return split(graph, n, k, n_parts, left_parts);
 }
 
 static void bisect(const bt_graph *graph, int n, key *k, int n_parts, int first, int *part)
 {
     while (n_parts > 1) {
-        int c = longer_side(graph, n, k);
-        for (int i = 0; i < n; i++) k[i].x = graph->at[k[i].vertex][c];
-        qsort(k, (size_t)n, sizeof *k, by_position);
-        int left_parts = n_parts / 2, left = split(graph, n, k, n_parts, left_parts);
-        bisect(graph, left, k, left_parts, first, part);
-        k += left, n -= left;
+        const int longer = longer_side(graph, n, k), left_parts = n_parts / 2;
+        const division other = split_across(graph, n, k, !longer, n_parts, left_parts);
+        division best = split_across(graph, n, k, longer, n_parts, left_parts);
+        if (best.cost > TURNS * other.cost) best = split_across(graph, n, k, !longer, n_parts, left_parts);
+        bisect(graph, best.left, k, left_parts, first, part);
+        k += best.left, n -= best.left;
         n_parts -= left_parts, first += left_parts;
     }
     for (int i = 0; i < n; i++) part[k[i].vertex] = first;

@@ -2,8 +2,8 @@
 // The cut of a cell graph: groups contracted, heavy vertices set apart, cuts compared, labels kept close to the old.
 //
 //   1. Every group becomes one vertex; parallel edges are summed.
-//   2. While the heaviest vertex weighs a share (weight left / parts left) or more, it gets its own part. The rest
-//      is divided into the other parts, and balance is judged on those: the vertex cannot be divided, and
+//   2. While the heaviest vertex weighs a share (weight left / parts left) or more of every kind, it gets its own part.
+//      The rest is divided into the other parts, and balance is judged on those: the vertex cannot be divided, and
 //      METIS, given one, misses the balance of all others.
 //   3. Three cuts: the labels before, METIS, and coordinate bisection, which costs a tenth of METIS, cannot fail and
 //      has the smaller cut where the field is even; each refined (refine.c). Of those in balance the smallest edge cut
@@ -29,7 +29,8 @@ static const double CLOSE = 1.1;
 typedef struct owned {
     bt_graph g;
     int *start, *to, *of;
-    int64_t *edge, *weight;
+    int64_t *edge;
+    bt_cut_work *weight;
     double (*at)[2];
 } owned;
 
@@ -66,7 +67,7 @@ static owned mapped(const bt_graph *graph, int n, int *of)
         o.start[c] = n_to;
         for (int m = first[c]; m < first[c + 1]; m++) {
             int v = member[m];
-            o.weight[c] += graph->weight[v];
+            bt_cut_add(&o.weight[c], graph->weight[v], 1);
             for (int k = 0; k < 2; k++) o.at[c][k] += graph->at[v][k];
             for (int e = graph->start[v]; e < graph->start[v + 1]; e++) {
                 int d = of[graph->to[e]];
@@ -118,41 +119,57 @@ static int heaviest_first(const void *a, const void *b)
     return (p->vertex > q->vertex) - (p->vertex < q->vertex);
 }
 
-// Number of heavy vertices, which are the first of `order`; rest: weight of the others.
-static int set_apart(const bt_graph *graph, int n_parts, heavy *order, int64_t *rest)
+// Does a vertex weigh a share of every kind of the rest, or more?
+static bool fills_a_part(bt_cut_work weight, bt_cut_work rest, int n_parts)
 {
-    *rest = 0;
+    bool fills = bt_cut_sum(rest) > 0;
+    for (int k = 0; k < BT_CUT_KINDS; k++)
+        fills = fills && weight.of[k] >= rest.of[k] / n_parts + (rest.of[k] % n_parts != 0);
+    return fills;
+}
+
+// Number of heavy vertices, which are the first of `order`; rest: weight of the others.
+static int set_apart(const bt_graph *graph, int n_parts, heavy *order, bt_cut_work *rest)
+{
+    *rest = (bt_cut_work){{0}};
     for (int v = 0; v < graph->n; v++) {
-        order[v] = (heavy){graph->weight[v], v};
-        *rest += graph->weight[v];
+        order[v] = (heavy){bt_cut_sum(graph->weight[v]), v};
+        bt_cut_add(rest, graph->weight[v], 1);
     }
     qsort(order, (size_t)graph->n, sizeof *order, heaviest_first);
     int n = 0;
-    while (n < graph->n && n_parts - n > 1 && *rest > 0 &&
-           order[n].weight >= *rest / (n_parts - n) + (*rest % (n_parts - n) != 0))
-        *rest -= order[n++].weight;
+    while (n < graph->n && n_parts - n > 1 && fills_a_part(graph->weight[order[n].vertex], *rest, n_parts - n))
+        bt_cut_add(rest, graph->weight[order[n++].vertex], -1);
     return n;
 }
 
 typedef struct trial {
     int *part;
     bt_cut_method method;
-    double excess; // heaviest part of more than one vertex / share − 1
+    double excess; // as the imbalance, but of the parts of more than one vertex, and against their share
     int64_t cut;
     int n_empty;
 } trial;
 
+// The heaviest part of each kind; count [n_parts]: parts of one vertex are left out, NULL = none is.
+static bt_cut_work heaviest_of(const bt_cut_work *load, const int *count, int n_parts)
+{
+    bt_cut_work most = {{0}};
+    for (int p = 0; p < n_parts; p++)
+        for (int k = 0; k < BT_CUT_KINDS; k++)
+            if ((!count || count[p] > 1) && load[p].of[k] > most.of[k]) most.of[k] = load[p].of[k];
+    return most;
+}
+
 static void judge(const bt_graph *graph, int n_parts, double share, trial *attempt)
 {
-    int64_t *load = bt_alloc((size_t)n_parts, sizeof *load);
+    bt_cut_work *load = bt_alloc((size_t)n_parts, sizeof *load);
     int *count = bt_alloc((size_t)n_parts, sizeof *count);
     for (int v = 0; v < graph->n; v++) {
-        load[attempt->part[v]] += graph->weight[v];
+        bt_cut_add(&load[attempt->part[v]], graph->weight[v], 1);
         count[attempt->part[v]]++;
     }
-    attempt->excess = 0;
-    for (int p = 0; p < n_parts; p++)
-        if (count[p] > 1) attempt->excess = bt_max(attempt->excess, (double)load[p] / share - 1);
+    attempt->excess = bt_max(0, (double)bt_cut_sum(heaviest_of(load, count, n_parts)) / share - 1);
     free(load);
     free(count);
     bt_cut_quality quality = bt_cut_measure(graph, n_parts, attempt->part, NULL);
@@ -187,8 +204,9 @@ static bool labels_before(const bt_graph *graph, const bt_graph *whole, const in
     int *count = bt_alloc((size_t)n_parts, sizeof *count);
     for (int c = 0; c < graph->n; c++) part[c] = most[c] = -1;
     for (int v = 0; v < whole->n; v++) { // the heaviest member stands for its group
+        const int64_t weight = bt_cut_sum(whole->weight[v]);
         bool labelled = before[v] >= 0 && before[v] < n_parts;
-        if (labelled && whole->weight[v] > most[of[v]]) most[of[v]] = whole->weight[v], part[of[v]] = before[v];
+        if (labelled && weight > most[of[v]]) most[of[v]] = weight, part[of[v]] = before[v];
     }
     for (bool changed = true; changed;) {
         changed = false;
@@ -254,7 +272,8 @@ static void relabel(const bt_graph *graph, int n_parts, const int *before, int *
     int n = 0, n_pairs = 0, *name = bt_alloc((size_t)n_parts, sizeof *name);
     bool *taken = bt_alloc((size_t)n_parts, sizeof *taken);
     for (int v = 0; v < graph->n; v++)
-        if (before[v] >= 0 && before[v] < n_parts) o[n++] = (overlap){graph->weight[v], part[v], before[v]};
+        if (before[v] >= 0 && before[v] < n_parts)
+            o[n++] = (overlap){bt_cut_sum(graph->weight[v]), part[v], before[v]};
     qsort(o, (size_t)n, sizeof *o, by_parts);
     for (int i = 0; i < n; i++) {
         if (n_pairs && by_parts(&o[n_pairs - 1], &o[i]) == 0) o[n_pairs - 1].weight += o[i].weight;
@@ -280,7 +299,7 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
                                     const int *before, int *part)
 {
     const bt_graph *graph = &c->g;
-    int64_t rest;
+    bt_cut_work rest;
     heavy *order = bt_alloc((size_t)graph->n, sizeof *order);
     int n_heavy = set_apart(graph, n_parts, order, &rest), n_light = 0;
     int *of = bt_alloc((size_t)graph->n, sizeof *of);
@@ -288,10 +307,10 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
     for (int v = 0; v < graph->n; v++)
         if (of[v] >= 0) of[v] = n_light++;
     owned light = mapped(graph, n_light, of);
-    bool weightless = rest == 0; // such vertices are divided by number
+    bool weightless = bt_cut_sum(rest) == 0; // such vertices are divided by number
     for (int v = 0; weightless && v < graph->n; v++)
-        if (of[v] >= 0) c->weight[v] = light.weight[of[v]] = 1;
-    if (weightless) rest = n_light;
+        if (of[v] >= 0) c->weight[v] = light.weight[of[v]] = (bt_cut_work){{1}};
+    if (weightless) rest.of[0] = n_light;
 
     int rest_parts = n_parts - n_heavy, n = 0;
     trial attempt[3];
@@ -301,8 +320,10 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
         for (int v = 0; v < graph->n; v++) attempt[0].part[v] = v;
         attempt[0].method = BT_CUT_NONE;
     } else {
-        double share = (double)rest / rest_parts;
-        int64_t limit = (int64_t)bt_max((double)(rest / rest_parts), share * (1 + tolerance));
+        const double all = (double)bt_cut_sum(rest) / rest_parts;
+        bt_cut_work share;
+        int kinds = 0; // that there are
+        for (int k = 0; k < BT_CUT_KINDS; k++) share.of[k] = rest.of[k] / rest_parts, kinds += rest.of[k] > 0;
         for (int method = BT_CUT_KEPT; method <= BT_CUT_BISECT; method++) {
             trial *now = &attempt[n];
             now->method = method;
@@ -310,8 +331,8 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
             if (method == BT_CUT_KEPT) good = labels_before(graph, whole, c->of, before, n_parts, now->part);
             else good = cut_anew(graph, &light, n_heavy, order, n_parts, tolerance, now);
             if (!good) continue;
-            bt_cut_refine(graph, n_parts, (int64_t)share, limit, now->part);
-            judge(graph, n_parts, share, now);
+            bt_cut_refine(graph, n_parts, share, (int64_t)(tolerance * all / kinds), now->part);
+            judge(graph, n_parts, all, now);
             n++;
         }
         best = better_of(attempt, n, tolerance);
@@ -353,21 +374,19 @@ void bt_cut(const bt_graph *graph, int n_parts, double tolerance, int *part, bt_
 bt_cut_quality bt_cut_measure(const bt_graph *graph, int n_parts, const int *part, const int *before)
 {
     bt_cut_quality quality = {.method = BT_CUT_NONE};
-    int64_t *load = bt_alloc((size_t)n_parts, sizeof *load), sum = 0, most = 0;
+    bt_cut_work *load = bt_alloc((size_t)n_parts, sizeof *load), sum = {{0}};
     bool *used = bt_alloc((size_t)n_parts, sizeof *used);
     for (int v = 0; v < graph->n; v++) {
-        load[part[v]] += graph->weight[v];
-        sum += graph->weight[v];
+        bt_cut_add(&load[part[v]], graph->weight[v], 1);
+        bt_cut_add(&sum, graph->weight[v], 1);
         used[part[v]] = true;
-        if (before && before[v] >= 0 && before[v] != part[v]) quality.moved += graph->weight[v];
+        if (before && before[v] >= 0 && before[v] != part[v]) quality.moved += bt_cut_sum(graph->weight[v]);
         for (int e = graph->start[v]; e < graph->start[v + 1]; e++)
             if (graph->to[e] > v && part[graph->to[e]] != part[v]) quality.cut += graph->edge[e];
     }
-    for (int p = 0; p < n_parts; p++) {
-        if (load[p] > most) most = load[p];
-        quality.n_empty += !used[p];
-    }
-    if (sum > 0) quality.imbalance = (double)most * n_parts / (double)sum - 1;
+    for (int p = 0; p < n_parts; p++) quality.n_empty += !used[p];
+    const int64_t all = bt_cut_sum(sum);
+    if (all > 0) quality.imbalance = (double)bt_cut_sum(heaviest_of(load, NULL, n_parts)) * n_parts / (double)all - 1;
     free(load);
     free(used);
     return quality;

@@ -6,6 +6,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/// Kinds of work. Ranks wait for each other in each kind, so its heaviest part decides how long it takes, and the time
+/// of all work is the sum of these: Σ over the kinds of the heaviest part.
+enum { BT_CUT_KINDS = 2 };
+
+/// Work of each kind.
+typedef struct bt_cut_work {
+    int64_t of[BT_CUT_KINDS];
+} bt_cut_work;
+
 /// Undirected graph in compressed rows: every edge is in the rows of both its ends, with the same weight. Sums of all
 /// weights and of all edges must fit into int64_t; loops (an edge from a vertex to itself) are ignored.
 typedef struct bt_graph {
@@ -13,7 +22,7 @@ typedef struct bt_graph {
     const int *start;      ///< [n+1] first neighbour of each vertex
     const int *to;         ///< [start[n]] neighbours
     const int64_t *edge;   ///< [start[n]] >= 0: amount exchanged if the two ends are in different parts (floes)
-    const int64_t *weight; ///< [n] >= 0: work
+    const bt_cut_work *weight; ///< [n] >= 0
     const double (*at)[2]; ///< [n] m, position of the vertex
     /// [n] vertices of the same group >= 0 stay together (cells under a large body), −1 = free; NULL = none
     const int *group;
@@ -27,19 +36,33 @@ typedef enum {
 } bt_cut_method;
 
 typedef struct bt_cut_quality {
-    double imbalance;     ///< heaviest part / mean − 1; 0 if all weights are 0
+    /// Σ over the kinds of the heaviest part / Σ over the kinds of the mean − 1; 0 if all weights are 0
+    double imbalance;
     int64_t cut;          ///< weight of the edges between parts
     int n_empty;          ///< parts without a vertex
     int64_t moved;        ///< weight of the vertices whose label changed (without those that had no label)
     bt_cut_method method; ///< method that made it
 } bt_cut_quality;
 
-/// Cut the graph into n_parts >= 1 parts of equal weight, with little weight on the edges between them and few labels
-/// changed.
+static inline int64_t bt_cut_sum(bt_cut_work load)
+{
+    int64_t sum = 0;
+    for (int k = 0; k < BT_CUT_KINDS; k++) sum += load.of[k];
+    return sum;
+}
+
+/// Add times × load, times 1 or −1.
+static inline void bt_cut_add(bt_cut_work *sum, bt_cut_work load, int times)
+{
+    for (int k = 0; k < BT_CUT_KINDS; k++) sum->of[k] += times * load.of[k];
+}
+
+/// Cut the graph into n_parts >= 1 parts of equal weight of each kind, with little weight on the edges between them and
+/// few labels changed.
 /// part: in, the previous labels (outside 0 ... n_parts − 1: none); out, the labels. tolerance: acceptable imbalance,
-/// e.g. 0.04 (previous labels are kept up to 1.25 times that). A vertex or group heavier than a part's share gets its
-/// own part, and the rest is balanced without it. A part is empty only if there are fewer vertices (a group counts as
-/// one) than parts. `quality` may be NULL.
+/// e.g. 0.04 (previous labels are kept up to 1.25 times that). A vertex or group heavier than a part's share of every
+/// kind gets its own part, and the rest is balanced without it. A part is empty only if there are fewer vertices (a
+/// group counts as one) than parts. `quality` may be NULL.
 /// Deterministic: the same graph and previous labels give the same labels. Must not be called by two threads at once
 /// (METIS). SIGTERM is blocked in the calling thread while METIS runs, and its handler is as before on return. All
 /// other threads of the process must block SIGTERM: METIS's handler would crash in them. (Block it before MPI_Init and
@@ -57,15 +80,16 @@ bool bt_cut_is_valid(const bt_graph *graph, int n_parts, const int *part);
 
 // The methods used by bt_cut. Their graph has no groups: bt_cut has contracted each to one vertex.
 
-/// Cut by METIS. false if it failed, left a part empty or wrote a label out of range; part is then invalid. n_parts >=
-/// 2, graph->n > n_parts, weights not all zero.
+/// Cut by METIS, each kind within its part of the tolerance. false if it failed, left a part empty or wrote a label out
+/// of range; part is then invalid. n_parts >= 2, graph->n > n_parts, weights not all zero.
 bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *part);
 
 /// Cut by recursive coordinate bisection. graph->n >= n_parts >= 1: no part is empty.
 void bt_cut_by_bisection(const bt_graph *graph, int n_parts, int *part);
 
-/// Shift vertices between neighbour parts until no part of more than one vertex weighs more than limit, as far as
-/// possible (to parts lighter than share); then shift vertices that lower the cut within it. No part becomes empty.
-void bt_cut_refine(const bt_graph *graph, int n_parts, int64_t share, int64_t limit, int *part);
+/// Shift vertices between neighbour parts until no part of more than one vertex weighs more than its share and `slack`
+/// in any kind, as far as possible (to parts lighter than their share of that kind); then shift vertices that lower the
+/// cut within it. No part becomes empty.
+void bt_cut_refine(const bt_graph *graph, int n_parts, bt_cut_work share, int64_t slack, int *part);
 
 #endif

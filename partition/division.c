@@ -6,14 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "partition/cut.h"
-
 #define TOLERANCE 0.01 // imbalance accepted from the cut
 /// Extra cost of a sweep with two ranks, s: exchanges of four phases, and a sum; the rest of a step costs as much as
 /// REST sweeps.
-#define EXCHANGES 40e-6
+#define EXCHANGES 20e-6
 #define REST 5
-#define STAYS 1.25 // factor by which another division must be better: each change moves the bodies
 /// Largest number of bodies for a single rank: some gigabytes.
 enum { MOST_UNDIVIDED = 2000000 };
 
@@ -22,8 +19,8 @@ int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y)
     const bt_cells *cells = world->cells;
     const bt_domain *domain = world->domain;
     if ((cells->wrap_x == 1 && x != 0) || (cells->wrap_y == 1 && y != 0)) return -1;
-    if (cells->wrap_x) x = ((x % cells->wrap_x) + cells->wrap_x) % cells->wrap_x;
-    if (cells->wrap_y) y = ((y % cells->wrap_y) + cells->wrap_y) % cells->wrap_y;
+    if (cells->wrap_x) x = bt_cells_wrapped(x, cells->wrap_x);
+    if (cells->wrap_y) y = bt_cells_wrapped(y, cells->wrap_y);
     x -= domain->low_x, y -= domain->low_y;
     return x < 0 || y < 0 || x >= domain->n_x || y >= domain->n_y ? -1 : (int64_t)y * domain->n_x + x;
 }
@@ -109,47 +106,50 @@ static int *carry_over(const bt_world *world, const bt_domain *before)
 }
 
 /// Work counted since the last check, on the places of the new box, for a cut that is due now.
-static double *carry_work(const bt_world *world, const bt_domain *before)
+static double (*carry_work(const bt_world *world, const bt_domain *before))[BT_CUT_KINDS]
 {
     const bt_cells *cells = world->cells;
-    double *work = bt_alloc((size_t)cells->n_x * (size_t)cells->n_y, sizeof *work);
+    double (*work)[BT_CUT_KINDS] = bt_alloc((size_t)cells->n_x * (size_t)cells->n_y, sizeof *work);
     for (int64_t p = 0; before->work && p < (int64_t)before->n_x * before->n_y; p++) {
         const double px = (before->low_x + p % before->n_x + 0.5) * before->side_x / cells->side_x,
                      py = (before->low_y + p / before->n_x + 0.5) * before->side_y / cells->side_y;
         const int32_t x = (int32_t)bt_max(0, bt_min(cells->n_x - 1, floor(px) - cells->low_x)),
                       y = (int32_t)bt_max(0, bt_min(cells->n_y - 1, floor(py) - cells->low_y));
-        work[(int64_t)y * cells->n_x + x] += before->work[p];
+        for (int k = 0; k < BT_CUT_KINDS; k++) work[(int64_t)y * cells->n_x + x][k] += before->work[p][k];
     }
     return work;
 }
 
-/// Work of every cell of the box, over the ranks: as counted, or from the number of bodies.
-static int64_t *gather_work(bt_world *world)
+/// Work of every cell of the box, over the ranks, ns a step: as counted, or from the number of bodies.
+static bt_cut_work *gather_work(bt_world *world)
 {
     const bt_domain *domain = world->domain;
     const bt_bodies *bodies = &world->bodies;
     const size_t n = (size_t)domain->n_x * (size_t)domain->n_y;
-    int64_t *work = bt_alloc(n, sizeof *work);
+    bt_cut_work *work = bt_alloc(n, sizeof *work);
     for (bt_idx i = 0; i < bodies->n; i++) {
         if (bodies->large[i] || (domain->distributed && !domain->owned[i])) continue;
         const int64_t p = bt_division_place(world, bodies->cell[i][0], bodies->cell[i][1]);
-        if (p >= 0) work[p] += domain->distributed ? (int64_t)(BT_WORK_AT_REST * 1e9) : 1;
+        if (p >= 0) work[p].of[BT_WORK_REST] += domain->distributed ? (int64_t)(BT_WORK_AT_REST * 1e9) : 1;
     }
     if (!domain->distributed) return work; // every rank has counted all bodies
     for (size_t p = 0; p < n; p++)
-        work[p] += (int64_t)(1e9 * domain->work[p] / (double)(domain->steps > 0 ? domain->steps : 1));
-    MPI_Allreduce(MPI_IN_PLACE, work, (int)n, MPI_INT64_T, MPI_SUM, domain->comm->mpi);
+        for (int k = 0; k < BT_CUT_KINDS; k++)
+            work[p].of[k] += (int64_t)(1e9 * domain->work[p][k] / (double)(domain->steps > 0 ? domain->steps : 1));
+    MPI_Allreduce(MPI_IN_PLACE, work, (int)n * BT_CUT_KINDS, MPI_INT64_T, MPI_SUM, domain->comm->mpi);
     return work;
 }
 
-bool bt_division_is_for_one(const bt_world *world, double work)
+bool bt_division_is_forced(const bt_world *world)
+{
+    return world->domain->comm->divides || world->bodies.n_global > MOST_UNDIVIDED;
+}
+
+double bt_division_gain(const bt_world *world, double work)
 {
     const bt_domain *domain = world->domain;
-    if (domain->comm->divides || world->bodies.n_global > MOST_UNDIVIDED) return false;
-    if (domain->steps == 0) return !domain->distributed; // unknown before the first step
-    const double saved = work * (1 - 1.0 / domain->comm->size);
-    const double lost = EXCHANGES * (REST + (double)domain->sweeps / (double)domain->steps);
-    return saved * (domain->undivided ? 1 / STAYS : STAYS) < lost;
+    const double sweeps = (double)domain->sweeps / (double)domain->steps;
+    return work * (1 - 1.0 / domain->comm->size) - EXCHANGES * (REST + sweeps);
 }
 
 /// Cut the graph of the cells: edges to the eight neighbours, weighted with the bodies held twice if cut there.
@@ -158,10 +158,9 @@ static void cut_map(bt_world *world)
     const bt_cells *cells = world->cells;
     bt_domain *domain = world->domain;
     const int n = domain->n_x * domain->n_y;
-    int64_t *work = gather_work(world), all_work = 0;
-    double fresh = 0;
-    for (int p = 0; p < n; p++) all_work += work[p];
-    domain->undivided = bt_division_is_for_one(world, 1e-9 * (double)all_work);
+    bt_cut_work *work = gather_work(world);
+    domain->fresh = domain->lost = domain->spared = 0;
+    domain->undivided = domain->distributed ? domain->for_one : !bt_division_is_forced(world);
     if (domain->undivided) {
         memset(domain->owner, 0, (size_t)n * sizeof *domain->owner);
         domain->stats.cut = 0;
@@ -196,7 +195,7 @@ static void cut_map(bt_world *world)
                                 .group = group};
         bt_cut_quality quality;
         bt_cut(&graph, domain->comm->size, TOLERANCE, domain->owner, &quality);
-        fresh = quality.imbalance;
+        domain->fresh = quality.imbalance;
         for (int p = 0; p < n; p++)
             for (int i = start[p]; i < start[p + 1]; i++) {
                 all += edge[i];
@@ -209,10 +208,12 @@ static void cut_map(bt_world *world)
     free(work);
     MPI_Bcast(domain->owner, n, MPI_INT, 0, domain->comm->mpi);
     MPI_Bcast(&domain->stats.cut, 1, MPI_DOUBLE, 0, domain->comm->mpi);
-    MPI_Bcast(&fresh, 1, MPI_DOUBLE, 0, domain->comm->mpi);
-    if (domain->distributed && !domain->undivided) { // the first division did not know the work
-        domain->stats.repartition_imbalance += fresh;
-        domain->stats.worst_repartition_imbalance = bt_max(domain->stats.worst_repartition_imbalance, fresh);
+    MPI_Bcast(&domain->fresh, 1, MPI_DOUBLE, 0, domain->comm->mpi);
+    if (!domain->distributed && !domain->undivided) {
+        domain->lost = INFINITY; // the first division does not know the work
+    } else if (!domain->undivided) {
+        domain->stats.repartition_imbalance += domain->fresh;
+        domain->stats.worst_repartition_imbalance = bt_max(domain->stats.worst_repartition_imbalance, domain->fresh);
         domain->stats.divisions++;
     }
 }
@@ -222,7 +223,7 @@ void bt_division_map(bt_world *world, bool cut)
     const bt_cells *cells = world->cells;
     bt_domain *domain = world->domain;
     int *owner = carry_over(world, domain);
-    double *work = carry_work(world, domain);
+    double (*work)[BT_CUT_KINDS] = carry_work(world, domain);
     free(domain->owner);
     free(domain->work);
     domain->owner = owner;
@@ -238,9 +239,8 @@ void bt_division_map(bt_world *world, bool cut)
         domain->steps = domain->sweeps = 0;
     }
     domain->due = false;
-    for (int64_t p = 0; p < (int64_t)domain->n_x * domain->n_y; p++)
-        if (domain->under[p]) {
-            domain->large_owner = domain->owner[p];
-            break;
-        }
+    int64_t at = 0; // with no cell under a large body, the last
+    while (at < (int64_t)domain->n_x * domain->n_y - 1 && !domain->under[at]) at++;
+    domain->large_place = at;
+    if (domain->under[at]) domain->large_owner = domain->owner[at];
 }

@@ -4,6 +4,7 @@
 #define BERGTOW_DIVISION_H
 
 #include "bergtow/comm.h"
+#include "partition/cut.h"
 #include "partition/domain.h"
 #include "space/pairs.h"
 
@@ -32,12 +33,14 @@ struct bt_domain {
     bool distributed;        ///< bodies are distributed by the map; before that every rank holds all
     bool due;                ///< a new division is due
     bool undivided;          ///< rank 0 has all cells
+    bool for_one;            ///< it is to have them from the next division on
     // the map: owner of every cell of the box
     int *owner;              ///< [n_y][n_x] rank
     uint8_t *under;          ///< [n_y][n_x] 1 = near a large movable body: its rank holds the cell too
     int32_t low_x, low_y, n_x, n_y;
     double side_x, side_y;   ///< of the cells for which it was made, m
     int large_owner;         ///< rank that owns the large movable bodies
+    int64_t large_place;     ///< of a cell under them, or any
     double large_path;       ///< path of the large movable bodies when the division was made, m
     /// displacement of the water through cells that do not move with it (periodic directions), since then, m
     double drift;
@@ -50,12 +53,21 @@ struct bt_domain {
     int n_requests;
     uint8_t *touched;        ///< [n bodies] bit p: a contact of phase p touches it
     // work since the last check
-    double *work;            ///< [n_y][n_x] of this rank's cells, s, modelled
+    double (*work)[BT_CUT_KINDS]; ///< [n_y][n_x] of this rank's cells, s, modelled: sweeps, and the rest of a step
     int64_t steps;           ///< since then
+    int64_t wait;            ///< steps from that check to the next
     int64_t sweeps;          ///< in these steps
+    double fresh;            ///< imbalance that the last cut left
+    /// time lost since then by imbalance beyond that, or by one rank with all cells, s, modelled; INFINITY: that cut
+    /// did not know the work
+    double lost;
+    double spared;           ///< time that one rank with all cells would have saved since then, s, modelled
     double exchange_s;       ///< wall time in exchanges since the last query
     bt_domain_stats stats;
 };
+
+/// Kinds of work between which ranks wait for each other: sweeps, and the rest of a step.
+enum { BT_WORK_SWEEPS, BT_WORK_REST };
 
 /// Work of a body at rest, s: the weight of cells before anything has been counted (partition/README.md).
 #define BT_WORK_AT_REST 2e-9
@@ -63,8 +75,12 @@ struct bt_domain {
 /// Place of cell (x, y) in the map, −1 outside.
 int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y);
 
-/// Would one rank alone be faster? work: modelled work of a step on all ranks, s.
-bool bt_division_is_for_one(const bt_world *world, double work);
+/// Must the field be divided, even where one rank alone would be faster?
+bool bt_division_is_forced(const bt_world *world);
+
+/// Time by which a divided field is faster than one rank with all cells, s a step, modelled; work: of a step on all
+/// ranks, s.
+double bt_division_gain(const bt_world *world, double work);
 
 /// Longest path of a large movable body, m; −1 if there is none.
 double bt_division_large_path(const bt_world *world);

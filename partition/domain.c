@@ -11,13 +11,16 @@
 
 #include "partition/division.h"
 
-#define IMBALANCE 0.05 // of the work; above it cells are divided anew
+#define LASTS 4         // a gain that has lasted for some steps is expected to last for so many times these steps
+#define IMBALANCE 0.05  // of the work; a division that was made without knowing the work, and has more, is made anew
 enum { CHECK_STEPS = 10 };
 // Seconds, measured on one core (see partition/README.md): only their ratios matter.
 #define CONTACT_SWEEP 30e-9
 #define CONTACT_STEP 300e-9
 #define PAIR 60e-9
 #define BODY 120e-9
+#define DIVISION 0.5e-6 // a new division, per body of a rank: the cut and the migration
+#define NEW_LISTS 4     // and, in the work of a step besides its sweeps: new lists of pairs
 
 static bool owns_cell(const bt_world *world, int32_t x, int32_t y)
 {
@@ -48,6 +51,7 @@ void bt_domain_create(bt_world *world, const bt_comm *comm)
     bt_domain *domain = world->domain = bt_alloc(1, sizeof *domain);
     domain->comm = comm;
     domain->due = true;
+    domain->wait = 1;
     world->exchange = &exchange;
 }
 
@@ -161,20 +165,62 @@ void bt_domain_solve(bt_world *world, void (*solve)(bt_world *world), bt_vel *sh
 
 // --- balance ---------------------------------------------------------------------------------------------------------
 
+/// Collective. Is a new division due? Adds the work counted since the last check to what the present division has cost;
+/// once a change would have paid for itself, it is due.
+static void check_balance(bt_world *world)
+{
+    bt_domain *domain = world->domain;
+    bt_sum total = {0};
+    double most[BT_CUT_KINDS] = {0}, mine = 0, heaviest = 0;
+    for (int64_t p = 0; p < (int64_t)domain->n_x * domain->n_y; p++)
+        for (int k = 0; k < BT_CUT_KINDS; k++) most[k] += domain->work[p][k];
+    for (int k = 0; k < BT_CUT_KINDS; k++) mine += most[k];
+    bt_sum_add(&total, mine * 0x1p40);
+    bt_comm_reduce(domain->comm, &total, 1, most, BT_CUT_KINDS, NULL, 0);
+    for (int k = 0; k < BT_CUT_KINDS; k++) heaviest += most[k];
+    const double steps = (double)domain->steps, work = bt_sum_value(&total) * 0x1p-40,
+                 mean = work / domain->comm->size, imbalance = mean > 0 ? heaviest / mean - 1 : 0,
+                 gain = steps * bt_division_gain(world, work / steps), bodies = (double)world->bodies.n_global,
+                 lists = NEW_LISTS * most[BT_WORK_REST] / steps / (domain->undivided ? domain->comm->size : 1);
+    const bool pays = DIVISION * bodies + lists <
+                      LASTS * (domain->undivided ? domain->lost + gain : domain->spared - gain);
+    if (domain->undivided) {
+        domain->lost = bt_max(0, domain->lost + gain);
+        domain->for_one = !pays;
+        domain->due = pays;
+    } else {
+        if (isinf(domain->lost) && imbalance <= IMBALANCE) domain->lost = 0;
+        if (!isinf(domain->lost)) {
+            domain->stats.checks++;
+            domain->stats.imbalance += imbalance;
+            domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
+            domain->lost += (imbalance - domain->fresh) * mean;
+        }
+        domain->spared = bt_max(0, domain->spared - gain);
+        domain->for_one = pays && !bt_division_is_forced(world);
+        domain->due = domain->for_one || domain->lost > DIVISION * bodies / domain->comm->size + lists;
+    }
+    domain->wait = domain->wait < CHECK_STEPS / 2 ? 2 * domain->wait : CHECK_STEPS;
+    if (domain->due) return;
+    domain->steps = domain->sweeps = 0;
+    memset(domain->work, 0, (size_t)domain->n_x * (size_t)domain->n_y * sizeof *domain->work);
+}
+
 void bt_domain_note(bt_world *world)
 {
     bt_domain *domain = world->domain;
     if (!domain) return;
     const bt_cells *cells = world->cells;
-    int64_t large = 0; // the work of large bodies is done by their owner
-    while (large < (int64_t)domain->n_x * domain->n_y - 1 && !domain->under[large]) large++;
-    for (bt_idx k = 0; k < cells->n; k++) {
+    for (bt_idx j = 0; j < cells->n_busy; j++) { // the others rest
+        const bt_idx k = cells->busy[j];
         bt_cell *cell = &cells->cell[k];
+        const bool last = k == cells->n - 1; // the work of large bodies is done by their owner
         if (!cell->own) continue;
-        const bool last = k == cells->n - 1;
-        domain->work[last ? large : bt_division_place(world, cell->x, cell->y)] +=
-            cell->n_contacts * CONTACT_STEP + (double)cell->updates * CONTACT_SWEEP + cell->search.n_pairs * PAIR +
-            (cell->end - cell->first) * (last || bt_cells_moves(cells, k) ? BODY : BT_WORK_AT_REST);
+        double *work = domain->work[last ? domain->large_place : bt_division_place(world, cell->x, cell->y)];
+        work[BT_WORK_SWEEPS] += (double)cell->updates * CONTACT_SWEEP;
+        work[BT_WORK_REST] += cell->n_contacts * CONTACT_STEP + cell->search.n_pairs * PAIR +
+                              (cell->end - cell->first) *
+                                  (last || bt_cells_moves(cells, k) ? BODY : BT_WORK_AT_REST);
         cell->updates = 0;
     }
     domain->drift += world->par.dt *
@@ -184,26 +230,6 @@ void bt_domain_note(bt_world *world)
     const bool far = path >= 0 && path - domain->large_path + domain->drift > 2 * world->par.size;
     domain->sweeps += world->stats.sweeps + world->stats.position_sweeps;
     domain->stats.undivided += domain->undivided;
-    const bool first = domain->undivided && domain->stats.undivided == 1;
-    if (++domain->steps >= CHECK_STEPS || first) {
-        bt_sum total = {0};
-        double mine = 0;
-        for (int64_t p = 0; p < (int64_t)domain->n_x * domain->n_y; p++) mine += domain->work[p];
-        bt_sum_add(&total, mine * 0x1p40);
-        bt_comm_reduce(domain->comm, &total, 1, &mine, 1, NULL, 0);
-        const double mean = bt_sum_value(&total) * 0x1p-40 / domain->comm->size,
-                     imbalance = mean > 0 ? mine / mean - 1 : 0;
-        const bool for_one = bt_division_is_for_one(world, mean * domain->comm->size / (double)domain->steps);
-        if (!domain->undivided && (domain->stats.divisions > 0 || imbalance <= IMBALANCE)) {
-            domain->stats.checks++;
-            domain->stats.imbalance += imbalance;
-            domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
-        }
-        domain->due = for_one ? !domain->undivided : domain->undivided || imbalance > IMBALANCE;
-        if (!domain->due) {
-            domain->steps = domain->sweeps = 0;
-            memset(domain->work, 0, (size_t)domain->n_x * (size_t)domain->n_y * sizeof *domain->work);
-        }
-    }
+    if (++domain->steps >= domain->wait) check_balance(world);
     if (far) domain->due = true;
 }

@@ -14,7 +14,8 @@ typedef struct bt_domain bt_domain;
 /// Costs of the division.
 typedef struct bt_domain_stats {
     int64_t divisions;       ///< after the first
-    /// work of the busiest rank / mean − 1 over the checks, mean of those after the first division; NaN without one
+    /// work of the busiest rank in each kind (cut.h) / mean − 1 over the checks, mean of those after the first division
+    /// that knew the work; NaN without one
     double imbalance;
     double worst_imbalance;  ///< largest of them
     int64_t checks;
@@ -99,8 +100,9 @@ void *bt_domain_gather_all(const bt_world *world, const void *mine, size_t n, si
 void bt_domain_largest(const bt_world *world, double *x);
 
 /// Collective. Copies of the floes that this rank does not hold, but that lie within this many cells along x and y of
-/// its own, or within `reach`, m, of a large movable floe that it owns; empty on one rank. Release with bt_bodies_free.
-void bt_domain_around(const bt_world *world, const int rings[2], double reach, bt_bodies *copies);
+/// one that it needs, or within `reach`, m, of a large movable floe that it owns; empty on one rank. needs: [cells].
+/// Release with bt_bodies_free.
+void bt_domain_around(const bt_world *world, const bool *needs, const int rings[2], double reach, bt_bodies *copies);
 /// Collective. Send the values of every body, x [n bodies][width], from its owner to all ranks that hold it.
 void bt_domain_share(const bt_world *world, double *x, int width);
 

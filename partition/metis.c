@@ -20,6 +20,7 @@
 #include <signal.h>
 #include <stdlib.h>
 
+#include "base/inside.h"
 #include "bergtow/base.h"
 
 enum { SUM_MAX = 1 << 30 };
@@ -36,16 +37,14 @@ static idx_t scaled(int64_t weight, int64_t divisor)
     return (idx_t)(weight / divisor + (weight % divisor != 0));
 }
 
-static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t *weight, idx_t *edge, idx_t n_parts, double tolerance,
-                      idx_t *part)
+static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t kinds, idx_t *weight, idx_t *edge, idx_t n_parts,
+                      real_t *balance, idx_t *part)
 {
-    idx_t options[METIS_NOPTIONS], one = 1, cut;
+    idx_t options[METIS_NOPTIONS], cut;
     METIS_SetDefaultOptions(options);
     options[METIS_OPTION_SEED] = 1;
     options[METIS_OPTION_NUMBERING] = 0;
     options[METIS_OPTION_CONTIG] = 0;
-    double permille = 1000 * tolerance;
-    options[METIS_OPTION_UFACTOR] = permille < 1 ? 1 : permille > 1000 ? 1000 : (idx_t)permille;
 
     struct sigaction term, abrt;
     sigset_t set, mask;
@@ -55,7 +54,7 @@ static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t *weight, idx_t *ed
     sigaction(SIGTERM, NULL, &term);
     sigaction(SIGABRT, NULL, &abrt);
     int status =
-        METIS_PartGraphKway(&n, &one, start, to, weight, NULL, edge, &n_parts, NULL, NULL, options, &cut, part);
+        METIS_PartGraphKway(&n, &kinds, start, to, weight, NULL, edge, &n_parts, NULL, balance, options, &cut, part);
     sigaction(SIGTERM, &term, NULL);
     sigaction(SIGABRT, &abrt, NULL);
     pthread_sigmask(SIG_SETMASK, &mask, NULL);
@@ -67,20 +66,30 @@ bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *
     _Static_assert(sizeof(idx_t) == sizeof(int), "METIS with 64-bit indices: copy start, to and part");
     int n = graph->n, n_edges = graph->start[n];
     if (n > SUM_MAX / 4 || n_edges > SUM_MAX / 4) return false;
-    int64_t sum_weight = 0, sum_edge = 0;
-    for (int i = 0; i < n; i++) sum_weight += graph->weight[i];
+    bt_cut_work sum = {{0}};
+    int64_t sum_edge = 0;
+    int kinds = 0, kind[BT_CUT_KINDS]; // that there are: METIS takes none that is zero everywhere
+    for (int i = 0; i < n; i++) bt_cut_add(&sum, graph->weight[i], 1);
     for (int e = 0; e < n_edges; e++) sum_edge += graph->edge[e];
+    for (int k = 0; k < BT_CUT_KINDS; k++)
+        if (sum.of[k] > 0) kind[kinds++] = k;
 
     idx_t *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc((size_t)n_edges, sizeof *to);
-    idx_t *weight = bt_alloc((size_t)n, sizeof *weight), *edge = bt_alloc((size_t)n_edges, sizeof *edge);
-    int64_t divisor = divisor_of(sum_weight, n), edge_divisor = divisor_of(sum_edge, n_edges);
+    idx_t *weight = bt_alloc((size_t)n * (size_t)kinds, sizeof *weight),
+          *edge = bt_alloc((size_t)n_edges, sizeof *edge);
+    const int64_t edge_divisor = divisor_of(sum_edge, n_edges);
+    real_t balance[BT_CUT_KINDS]; // heaviest part / mean
     for (int i = 0; i <= n; i++) start[i] = graph->start[i];
-    for (int i = 0; i < n; i++) weight[i] = scaled(graph->weight[i], divisor);
+    for (int k = 0; k < kinds; k++) {
+        const int64_t own = sum.of[kind[k]], divisor = divisor_of(own, n);
+        for (int i = 0; i < n; i++) weight[i * kinds + k] = scaled(graph->weight[i].of[kind[k]], divisor);
+        balance[k] = (real_t)(1 + bt_max(0.001, tolerance * (double)bt_cut_sum(sum) / kinds / (double)own));
+    }
     for (int e = 0; e < n_edges; e++) {
         to[e] = graph->to[e];
         edge[e] = graph->edge[e] ? scaled(graph->edge[e], edge_divisor) : 1; // METIS wants edges > 0
     }
-    int status = call_metis(n, start, to, weight, edge, n_parts, tolerance, part);
+    int status = call_metis(n, start, to, kinds, weight, edge, n_parts, balance, part);
     free(start);
     free(to);
     free(weight);

@@ -153,20 +153,22 @@ static void move_bodies(bt_world *world)
     const int me = domain->comm->rank;
     parcels outgoing = new_parcels(domain->comm->size);
     uint8_t *keep = bt_alloc((size_t)bodies->n, 1);
+    const int32_t *of = NULL; // cell of the ranks below
+    int rank[BT_MAX_SHARERS], n = 0;
     for (bt_idx i = 0; i < bodies->n; i++) {
+        const int32_t *cell = bodies->cell[i];
         if (bodies->large[i]) {
             keep[i] = 1; // on every rank
             continue;
         }
         if (domain->distributed && !domain->owned[i]) continue;
-        int rank[BT_MAX_SHARERS];
-        const int n = bt_division_sharers(world, bodies->cell[i][0], bodies->cell[i][1], rank);
+        if (!of || of[0] != cell[0] || of[1] != cell[1]) n = bt_division_sharers(world, cell[0], cell[1], rank);
+        of = cell;
         for (int k = 0; k < n; k++) {
             if (rank[k] == me) keep[i] = 1;
             else if (domain->distributed) pack(bodies, i, &outgoing, rank[k]); // at first every rank has all
         }
-        domain->stats.moved += domain->distributed &&
-            bt_division_owner(world, bodies->cell[i][0], bodies->cell[i][1]) != me;
+        domain->stats.moved += domain->distributed && rank[0] != me; // the first is the owner
     }
     for (bt_gid g = 0; g < bodies->n_global; g++) bodies->index_of[g] = -1;
     bt_bodies_compact(bodies, keep);
@@ -195,35 +197,76 @@ static bool near_large(const bt_world *world, bt_idx i, double reach)
     return false;
 }
 
-void bt_domain_around(const bt_world *world, const int rings[2], double reach, bt_bodies *copies)
+/// A cell whose floes a rank asks for.
+typedef struct wish {
+    int32_t cell[2];
+    int rank;
+} wish;
+
+/// Ask the owners for the cells around those that this rank needs, if it does not hold them.
+static void ask_around(const bt_world *world, const bool *needs, const int rings[2], parcels *outgoing)
+{
+    const bt_domain *domain = world->domain;
+    const bt_cells *cells = world->cells;
+    uint8_t *asked = bt_alloc((size_t)domain->n_x * (size_t)domain->n_y, 1);
+    for (bt_idx k = 0; k < cells->n - 1; k++) {
+        const bt_cell *cell = &cells->cell[k];
+        for (int32_t y = cell->y - rings[1]; needs[k] && y <= cell->y + rings[1]; y++)
+            for (int32_t x = cell->x - rings[0]; x <= cell->x + rings[0]; x++) {
+                const int64_t p = bt_division_place(world, x, y);
+                if (p < 0 || asked[p]) continue;
+                asked[p] = 1;
+                int holder[BT_MAX_SHARERS];
+                const int n = bt_division_sharers(world, x, y, holder);
+                bool held = false;
+                for (int h = 0; h < n; h++) held = held || holder[h] == domain->comm->rank;
+                const wish w = {.cell = {domain->low_x + (int32_t)(p % domain->n_x),
+                                         domain->low_y + (int32_t)(p / domain->n_x)},
+                                .rank = domain->comm->rank};
+                if (!held) add(outgoing, domain->owner[p], &w, sizeof w);
+            }
+    }
+    free(asked);
+}
+
+/// Pack the owned floes near large floes for rank 0, which owns these, unless it holds or has got their cell.
+static void pack_near_large(const bt_world *world, const bool *got, double reach, parcels *outgoing)
+{
+    const bt_cells *cells = world->cells;
+    for (bt_idx k = 0; k < cells->n - 1; k++) {
+        const bt_cell *cell = &cells->cell[k];
+        int holder[BT_MAX_SHARERS];
+        if (!cell->own || cell->first == cell->end || got[k]) continue;
+        const int n = bt_division_sharers(world, cell->x, cell->y, holder);
+        bool held = false;
+        for (int h = 0; h < n; h++) held = held || holder[h] == 0;
+        for (bt_idx i = cell->first; !held && i < cell->end; i++)
+            if (near_large(world, i, reach)) pack(&world->bodies, i, outgoing, 0);
+    }
+}
+
+void bt_domain_around(const bt_world *world, const bool *needs, const int rings[2], double reach, bt_bodies *copies)
 {
     *copies = (bt_bodies){.offset = bt_alloc(1, sizeof *copies->offset)};
     if (!world->domain) return;
     const bt_domain *domain = world->domain;
-    const bt_bodies *bodies = &world->bodies;
     const bt_cells *cells = world->cells;
-    if (bodies->home) bt_bodies_make_homes(copies);
-    parcels outgoing = new_parcels(domain->comm->size);
-    uint8_t *to = bt_alloc((size_t)domain->comm->size, 1);
-    for (bt_idx k = 0; k < cells->n - 1; k++) {
-        const bt_cell *cell = &cells->cell[k];
-        if (!cell->own || cell->first == cell->end) continue;
-        memset(to, 0, (size_t)domain->comm->size);
-        for (int32_t y = -rings[1]; y <= rings[1]; y++)
-            for (int32_t x = -rings[0]; x <= rings[0]; x++) {
-                const int r = bt_division_owner(world, cell->x + x, cell->y + y);
-                if (r >= 0) to[r] = 1;
-            }
-        int holder[BT_MAX_SHARERS];
-        const int n = bt_division_sharers(world, cell->x, cell->y, holder);
-        bool held = false; // needed by the rank that owns the large bodies
-        for (int h = 0; h < n; h++) to[holder[h]] = 0, held = held || holder[h] == 0;
-        for (bt_idx i = cell->first; i < cell->end; i++)
-            for (int r = 0; r < domain->comm->size; r++)
-                if (to[r] || (r == 0 && !held && near_large(world, i, reach))) pack(bodies, i, &outgoing, r);
-    }
-    free(to);
+    if (world->bodies.home) bt_bodies_make_homes(copies);
+    parcels wishes = new_parcels(domain->comm->size), outgoing = new_parcels(domain->comm->size);
+    ask_around(world, needs, rings, &wishes);
     size_t n_in;
+    wish *asked = (wish *)deliver(domain->comm, &wishes, 3, &n_in);
+    free_parcels(&wishes);
+    bool *got = bt_alloc((size_t)cells->n, sizeof *got); // by rank 0
+    for (size_t j = 0; j < n_in / sizeof *asked; j++) {
+        const bt_idx k = bt_cells_at(cells, asked[j].cell[0], asked[j].cell[1]);
+        got[k] = got[k] || asked[j].rank == 0;
+        for (bt_idx i = cells->cell[k].first; i < cells->cell[k].end; i++)
+            pack(&world->bodies, i, &outgoing, asked[j].rank);
+    }
+    free(asked);
+    pack_near_large(world, got, reach, &outgoing);
+    free(got);
     char *in = deliver(domain->comm, &outgoing, 3, &n_in);
     free_parcels(&outgoing);
     unpack(copies, in, n_in);
@@ -235,18 +278,21 @@ void bt_domain_share(const bt_world *world, double *x, int width)
     if (!world->domain) return;
     const bt_domain *domain = world->domain;
     const bt_bodies *bodies = &world->bodies;
+    const bt_cells *cells = world->cells;
     const size_t bytes = (size_t)width * sizeof *x;
     parcels outgoing = new_parcels(domain->comm->size);
-    for (bt_idx i = 0; i < bodies->n; i++) {
+    for (bt_idx k = 0; k < cells->n; k++) {
+        const bt_cell *cell = &cells->cell[k];
+        const bool large = k == cells->n - 1; // on every rank
         int rank[BT_MAX_SHARERS];
-        if (!domain->owned[i]) continue;
-        const int n = bodies->large[i] ? domain->comm->size
-                                       : bt_division_sharers(world, bodies->cell[i][0], bodies->cell[i][1], rank);
-        for (int k = 0; k < n; k++) {
-            const int r = bodies->large[i] ? k : rank[k];
-            if (r == domain->comm->rank) continue;
-            add(&outgoing, r, &bodies->gid[i], sizeof *bodies->gid);
-            add(&outgoing, r, x + (size_t)i * (size_t)width, bytes);
+        if (cell->first == cell->end || !domain->owned[cell->first]) continue;
+        const int n = large ? domain->comm->size : bt_division_sharers(world, cell->x, cell->y, rank);
+        for (int j = 0; j < n; j++) {
+            const int r = large ? j : rank[j];
+            for (bt_idx i = cell->first; r != domain->comm->rank && i < cell->end; i++) {
+                add(&outgoing, r, &bodies->gid[i], sizeof *bodies->gid);
+                add(&outgoing, r, x + (size_t)i * (size_t)width, bytes);
+            }
         }
     }
     size_t n_in;

@@ -3,8 +3,9 @@
 //
 // Balance. The heaviest part must lose weight, but its neighbours may be full themselves. So a search from neighbour to
 // neighbour finds the nearest parts lighter than a share, and one vertex is shifted along every link of the path there
-// (diffusion along a shortest path). A shift is accepted only if every part on its path then weighs less than the
-// heaviest did: the sorted loads decrease, so it terminates. Rejected: moving vertices only from a part to a lighter
+// (diffusion along a shortest path). The weight of a part is what it has above its share of that kind in which this is
+// most. A shift is accepted only if every part on its path then weighs less than the heaviest did: the sorted weights
+// decrease, so it terminates. Rejected: moving vertices only from a part to a lighter
 // neighbour; with some ten cells per part it stops with slopes of one cell per part over the whole field.
 // Cut. A vertex moves to the neighbouring part with which it has more edges, as long as that stays within the limit
 // (the greedy pass of Karypis & Kumar 1998).
@@ -23,8 +24,9 @@ enum {
 typedef struct parts {
     const bt_graph *g;
     int n, *part;
-    int64_t share, limit;
-    int64_t *load;           // [n]
+    bt_cut_work share;
+    int64_t slack;
+    bt_cut_work *load;           // [n]
     int *count;              // [n] vertices
     int *head, *next, *prev; // [n], [g->n], [g->n]: vertices of a part as a list
     int *from, *queue;       // [n]: previous part on the path from the heaviest (−1: none), parts reached in order
@@ -39,7 +41,7 @@ static void list_add(parts *lists, int v)
     lists->next[v] = lists->head[a];
     if (lists->head[a] >= 0) lists->prev[lists->head[a]] = v;
     lists->head[a] = v;
-    lists->load[a] += lists->g->weight[v];
+    bt_cut_add(&lists->load[a], lists->g->weight[v], 1);
     lists->count[a]++;
 }
 
@@ -49,7 +51,7 @@ static void list_remove(parts *lists, int v)
     if (lists->prev[v] >= 0) lists->next[lists->prev[v]] = lists->next[v];
     else lists->head[a] = lists->next[v];
     if (lists->next[v] >= 0) lists->prev[lists->next[v]] = lists->prev[v];
-    lists->load[a] -= lists->g->weight[v];
+    bt_cut_add(&lists->load[a], lists->g->weight[v], -1);
     lists->count[a]--;
 }
 
@@ -60,16 +62,40 @@ static void shift(parts *lists, int v, int b)
     list_add(lists, v);
 }
 
-// Vertex of a to give to its neighbour b, −1 if none: preferably one that brings a within the limit (and, if b is the
-// end of the path, keeps b within it), and among these the vertex that lowers the cut most. With `nearest` the vertex
-// whose weight is nearest to the excess of a: the first rule may offer only a berg's cells.
-static int vertex_to_give(const parts *lists, int a, int b, bool end, bool nearest)
+// The kind of which a part has most above its share.
+static int worst_kind(const parts *lists, bt_cut_work load)
+{
+    int worst = 0;
+    for (int k = 1; k < BT_CUT_KINDS; k++)
+        if (load.of[k] - lists->share.of[k] > load.of[worst] - lists->share.of[worst]) worst = k;
+    return worst;
+}
+
+// What a load has above its share of its worst kind.
+static int64_t above(const parts *lists, bt_cut_work load)
+{
+    const int k = worst_kind(lists, load);
+    return load.of[k] - lists->share.of[k];
+}
+
+// The same of part a, with `times` the weight of vertex v added.
+static int64_t above_with(const parts *lists, int a, int v, int times)
+{
+    bt_cut_work load = lists->load[a];
+    bt_cut_add(&load, lists->g->weight[v], times);
+    return above(lists, load);
+}
+
+// Vertex of a with work of a kind to give to its neighbour b, −1 if none: preferably one that brings a within the slack
+// (and, if b is the end of the path, keeps b within it), and among these the vertex that lowers the cut most. With
+// `nearest` the vertex whose weight is nearest to the excess of a: the first rule may offer only a berg's cells.
+static int vertex_to_give(const parts *lists, int kind, int a, int b, bool end, bool nearest)
 {
     const bt_graph *graph = lists->g;
     int best = -1, best_fit = 0;
     int64_t best_gain = 0;
     for (int v = lists->head[a]; v >= 0; v = lists->next[v]) {
-        int64_t w = graph->weight[v], gain = 0;
+        int64_t w = graph->weight[v].of[kind], gain = 0;
         bool touches = false;
         if (w == 0) continue;
         for (int e = graph->start[v]; e < graph->start[v + 1]; e++) {
@@ -79,8 +105,8 @@ static int vertex_to_give(const parts *lists, int a, int b, bool end, bool neare
             else if (lists->part[u] == a) gain -= graph->edge[e];
         }
         if (!touches) continue;
-        int fit = (lists->load[a] - w <= lists->limit) + (!end || lists->load[b] + w <= lists->limit);
-        if (nearest) fit = 0, gain = -llabs(lists->load[a] - w - lists->limit);
+        int fit = (above_with(lists, a, v, -1) <= lists->slack) + (!end || above_with(lists, b, v, 1) <= lists->slack);
+        if (nearest) fit = 0, gain = -llabs(lists->load[a].of[kind] - w - lists->share.of[kind] - lists->slack);
         if (best < 0 || fit > best_fit || (fit == best_fit && (gain > best_gain || (gain == best_gain && v < best))))
             best = v, best_fit = fit, best_gain = gain;
     }
@@ -88,23 +114,23 @@ static int vertex_to_give(const parts *lists, int a, int b, bool end, bool neare
 }
 
 // Shift one vertex along every link of the path from `heavy` to `end`; if that does not help, undo it and return false.
-static bool shift_along(parts *lists, int heavy, int end, bool nearest)
+static bool shift_along(parts *lists, int kind, int heavy, int end, bool nearest)
 {
     int n_way = 0, *way = bt_alloc((size_t)lists->n, sizeof *way), *given = bt_alloc((size_t)lists->n, sizeof *given);
     for (int a = end; a != heavy; a = lists->from[a]) way[n_way++] = a;
-    int64_t before = lists->load[heavy];
+    const int64_t before = above(lists, lists->load[heavy]);
     int a = heavy, n_given = 0;
     bool good = true;
     for (int i = n_way - 1; good && i >= 0; i--) {
-        int v = vertex_to_give(lists, a, way[i], i == 0, nearest);
+        int v = vertex_to_give(lists, kind, a, way[i], i == 0, nearest);
         good = v >= 0;
         if (!good) break;
         given[n_given++] = v;
         shift(lists, v, way[i]);
-        good = lists->load[a] < before && lists->count[a] > 0;
+        good = above(lists, lists->load[a]) < before && lists->count[a] > 0;
         a = way[i];
     }
-    good = good && lists->load[end] < before;
+    good = good && above(lists, lists->load[end]) < before;
     for (int i = n_given - 1; !good && i >= 0; i--) shift(lists, given[i], i ? way[n_way - i] : heavy);
     for (int i = 0; good && i < n_way; i++) lists->stuck[way[i]] = false;
     free(way);
@@ -115,14 +141,15 @@ static bool shift_along(parts *lists, int heavy, int end, bool nearest)
 static bool relieve(parts *lists, int heavy)
 {
     const bt_graph *graph = lists->g;
+    const int kind = worst_kind(lists, lists->load[heavy]);
     int n_reached = 0, n_tried = 0;
     bool done = false;
     lists->from[heavy] = heavy;
     lists->queue[n_reached++] = heavy;
     for (int i = 0; !done && i < n_reached && n_tried < ENDS_TRIED; i++) {
         int a = lists->queue[i];
-        if (lists->load[a] < lists->share) {
-            done = shift_along(lists, heavy, a, false) || shift_along(lists, heavy, a, true);
+        if (lists->load[a].of[kind] < lists->share.of[kind]) {
+            done = shift_along(lists, kind, heavy, a, false) || shift_along(lists, kind, heavy, a, true);
             n_tried++;
             if (done) break;
         }
@@ -143,8 +170,8 @@ static void balance(parts *lists)
     for (int64_t i = 0; i < (int64_t)SHIFTS * lists->n; i++) {
         int heavy = -1;
         for (int a = 0; a < lists->n; a++)
-            if (lists->load[a] > lists->limit && lists->count[a] > 1 && !lists->stuck[a] &&
-                (heavy < 0 || lists->load[a] > lists->load[heavy]))
+            if (above(lists, lists->load[a]) > lists->slack && lists->count[a] > 1 && !lists->stuck[a] &&
+                (heavy < 0 || above(lists, lists->load[a]) > above(lists, lists->load[heavy])))
                 heavy = a;
         if (heavy < 0) return;
         lists->stuck[heavy] = !relieve(lists, heavy);
@@ -162,7 +189,7 @@ static int better_part(parts *lists, int v)
     int64_t most = lists->link[a];
     for (int e = first; e < last; e++) {
         int b = lists->part[graph->to[e]];
-        if (b == a || lists->load[b] + graph->weight[v] > lists->limit) continue;
+        if (b == a || above_with(lists, b, v, 1) > lists->slack) continue;
         if (lists->link[b] > most || (lists->link[b] == most && best >= 0 && b < best)) best = b, most = lists->link[b];
     }
     for (int e = first; e < last; e++) lists->link[lists->part[graph->to[e]]] = 0;
@@ -183,10 +210,10 @@ static void lower_cut(parts *lists)
     }
 }
 
-void bt_cut_refine(const bt_graph *graph, int n_parts, int64_t share, int64_t limit, int *part)
+void bt_cut_refine(const bt_graph *graph, int n_parts, bt_cut_work share, int64_t slack, int *part)
 {
     size_t n = (size_t)n_parts;
-    parts lists = {.g = graph, .n = n_parts, .part = part, .share = share, .limit = limit};
+    parts lists = {.g = graph, .n = n_parts, .part = part, .share = share, .slack = slack};
     lists.load = bt_alloc(n, sizeof *lists.load);
     lists.count = bt_alloc(n, sizeof *lists.count);
     lists.head = bt_alloc(n, sizeof *lists.head);

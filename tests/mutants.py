@@ -427,6 +427,7 @@ MUTANTS = {
         ("on |= s.on;", "on = s.on;", "what has just come to 0 leaves its batch"),
         ("return *listed == in_batches;", "return true;", "what closes is not listed"),
         ("if (mark[i] == LEAVES) return false;", "", "what has opened stays in its batch"),
+        ("opens = w >= 0 && w < INFINITY;", "opens = true;", "what closes without load is quiet"),
     ]),
     "src/solve/batch_sweep.c": (SOLVE + ["scenes:walls_closing"], [
         ("batch->before[c] = now + lag * change;", "batch->before[c] = now;", "missed moves are forgotten"),
@@ -799,6 +800,8 @@ MUTANTS = {
          "records are lost on the way"),
         ("for (bt_gid g = 0; g < bodies->n_global; g++) bodies->index_of[g] = -1;", "",
          "names of floes that have gone"),
+        ("if (!cell->own || cell->first == cell->end || got[k]) continue;",
+         "if (!cell->own || cell->first == cell->end) continue;", "a floe near a large one comes twice"),
     ]),
     "src/output/steady.c": (["unit/test_stats", "unit/test_summary", MADE + "a_turn_takes_its_whole_arc",
                              MADE + "a_tow_that_goes_astern_is_not_steady",

@@ -33,7 +33,8 @@ typedef struct field {
     int n;           // cells along one side; cell (i, j) is j n + i
     double side;     // m
     int64_t *floes, *contacts; // [n²]
-    int64_t *weight, *edge;
+    int64_t *edge;
+    bt_cut_work *weight;
     int *start, *to, *group;
     double (*at)[2];
     bt_graph g;
@@ -90,7 +91,7 @@ static void weigh(field *f, bool berg, int steps)
     for (int t = 0; t < f->n * f->n; t++) {
         double x = f->at[t][0] - middle[0], y = f->at[t][1] - middle[1];
         bool wake = berg && x < BERG && x > -10 * BERG && fabs(y) < BERG;
-        f->weight[t] = f->floes[t] + (int64_t)(POINTS * (wake ? WAKE : 1)) * f->contacts[t];
+        f->weight[t].of[0] = f->floes[t] + (int64_t)(POINTS * (wake ? WAKE : 1)) * f->contacts[t];
         f->group[t] = berg && fabs(x) < BERG / 2 + f->side / 2 && fabs(y) < BERG / 2 + f->side / 2 ? 0 : -1;
     }
 }
@@ -187,8 +188,8 @@ static halo halo_of(const field *f, int n_parts, const int *part)
                     if (k != h) pair[n_pairs++] = (int64_t)holder[h] * n_parts + holder[k];
             }
             for (int k = 0; k < n_users; k++) sent[user[k]] += f->floes[b] * (n_holders - 1);
-            work[4 * part[b] + 2 * (j % 2) + i % 2] += f->weight[b];
-            sum += f->weight[b];
+            work[4 * part[b] + 2 * (j % 2) + i % 2] += f->weight[b].of[0];
+            sum += f->weight[b].of[0];
         }
     n_pairs = unique(pair, n_pairs);
     int *neighbours = bt_alloc((size_t)n_parts, sizeof *neighbours);
@@ -233,7 +234,7 @@ static void row(field *f, const char *series, int n_floes, double diameters, boo
     if (!bt_cut_is_valid(&f->g, n_parts, part)) fprintf(stderr, "%d parts: not a valid cut\n", n_parts), exit(5);
     halo h = halo_of(f, n_parts, part);
     int64_t sum = 0;
-    for (size_t v = 0; v < n; v++) sum += f->weight[v];
+    for (size_t v = 0; v < n; v++) sum += f->weight[v].of[0];
     if (berg) {
         weigh(f, berg, 1);
         bt_cut(&f->g, n_parts, TOLERANCE, part, &later);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sorting things named by two bodies and their parts: runs by insertion, then merged. qsort_r, which calls a function
-// for each comparison, took three times as long for the lists of a cell.
+// Sorting things named by two numbers and two parts, as pairs of bodies are: runs by insertion, then merged. qsort_r,
+// which calls a function for each comparison, took three times as long for the lists of a cell.
 #ifndef BT_NAMED_H
 #define BT_NAMED_H
 
@@ -9,7 +9,7 @@
 #include "bergtow/base.h"
 
 typedef struct bt_named {
-    int64_t a, b;      ///< names of the bodies
+    int64_t a, b;      ///< names of the bodies; or cell and body
     uint32_t part, at; ///< parts of the bodies; place of the thing
 } bt_named;
 

@@ -531,6 +531,17 @@ static void look_cell(bt_world *world, bt_idx k, const void *around, bt_totals *
     free(room.candidate);
 }
 
+/// Is a floe of cell k evaluated now?
+static bool looks_at(const bt_world *world, bt_idx k)
+{
+    const bt_cell *cell = &world->cells->cell[k];
+    double v[2][2];
+    bool any = false;
+    for (bt_idx i = cell->first; !any && world->cells->asleep[k] != BT_ASLEEP && i < cell->end; i++)
+        any = flows(world, i, v);
+    return any;
+}
+
 /// Rings of cells around a cell that contain the floes near any of its floes.
 static int rings_of(const bt_world *world, double side, int32_t wrap)
 {
@@ -544,7 +555,10 @@ void bt_exposure_look(bt_world *world)
     const bt_cells *cells = world->cells;
     surroundings s =
         {.rings = {rings_of(world, cells->side_x, cells->wrap_x), rings_of(world, cells->side_y, cells->wrap_y)}};
-    bt_domain_around(world, s.rings, world->par.lee_reach, &s.copies);
+    bool *needs = bt_alloc((size_t)cells->n, sizeof *needs);
+    for (bt_idx j = 0; world->domain && j < cells->n_busy; j++) needs[cells->busy[j]] = looks_at(world, cells->busy[j]);
+    bt_domain_around(world, needs, s.rings, world->par.lee_reach, &s.copies);
+    free(needs);
     s.sorted = bt_alloc((size_t)s.copies.n, sizeof *s.sorted);
     for (bt_idx j = 0; j < s.copies.n; j++) s.sorted[j] = (placed){{s.copies.cell[j][0], s.copies.cell[j][1]}, j};
     if (s.copies.n > 0) qsort(s.sorted, (size_t)s.copies.n, sizeof *s.sorted, by_cell);

@@ -229,7 +229,8 @@ static const bt_json_key rows[] = {
         "steps of the last call in which one rank had the whole field, as that is faster"),
     MACHINE("moved_floes", moved_floes, "1", "floes that went to another rank then"),
     MACHINE("imbalance", imbalance, "1",
-        "load of the busiest rank over the mean, less 1, mean of the checks of the last call; NaN without one"),
+        "work of the busiest rank over the mean, less 1, with the busiest in the sweeps and the busiest in the rest of "
+        "the steps; mean of the checks of the last call; NaN without one"),
     MACHINE("worst_imbalance", worst_imbalance, "1", "the largest of them"),
     MACHINE("repartition_imbalance", repartition_imbalance, "1",
         "the same just after a division, mean of those after the first"),

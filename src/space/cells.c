@@ -9,6 +9,7 @@
 
 #include "base/elementary.h"
 #include "base/inside.h"
+#include "base/named.h"
 #include "body/bodies.h"
 #include "space/exchange.h"
 
@@ -230,37 +231,29 @@ void bt_cells_choose(bt_world *world, double margin)
 
 // --- storage -------------------------------------------------------------------------------------------------------
 
-typedef struct {
-    int64_t cell; ///< row-major, large bodies last
-    bt_gid gid;
-    bt_idx from;
-} sort_key;
-
-BT_ASCENDING_BY(by_cell, sort_key, cell, gid)
-
 static void **array_of(bt_bodies *bodies, int k) { return (void **)((char *)bodies + bt_body_fields[k].array); }
 
-/// Permute the bodies to the order of `key`, and their vertices, whose number varies, with them.
-static void permute(bt_bodies *bodies, const sort_key *key)
+/// Permute the bodies to the order of `name`, and their vertices, whose number varies, with them.
+static void permute(bt_bodies *bodies, const bt_named *name)
 {
     const size_t n = (size_t)bodies->n;
     for (int k = 0; k < bt_bodies_n_fields(bodies); k++) {
         const size_t size = bt_body_fields[k].size;
         char *old = *array_of(bodies, k), *new = bt_alloc_aligned((size_t)bodies->cap, size);
-        for (size_t i = 0; i < n; i++) memcpy(new + i * size, old + (size_t)key[i].from * size, size);
+        for (size_t i = 0; i < n; i++) memcpy(new + i * size, old + (size_t)name[i].at * size, size);
         free(old);
         *array_of(bodies, k) = new;
     }
     int64_t *offset = bt_realloc(NULL, (size_t)bodies->cap + 1, sizeof *offset);
     offset[0] = 0;
     for (size_t i = 0; i < n; i++)
-        offset[i + 1] = offset[i] + (bodies->offset[key[i].from + 1] - bodies->offset[key[i].from]);
+        offset[i + 1] = offset[i] + (bodies->offset[name[i].at + 1] - bodies->offset[name[i].at]);
     for (int k = 0; k < bt_n_vertex_fields; k++) {
         const size_t size = bt_vertex_fields[k].size;
         char **array = (char **)((char *)bodies + bt_vertex_fields[k].array),
              *new = bt_realloc(NULL, (size_t)bodies->cap_vertices, size);
         for (size_t i = 0; i < n; i++)
-            memcpy(new + (size_t)offset[i] * size, *array + (size_t)bodies->offset[key[i].from] * size,
+            memcpy(new + (size_t)offset[i] * size, *array + (size_t)bodies->offset[name[i].at] * size,
                    size * (size_t)(offset[i + 1] - offset[i]));
         free(*array);
         *array = new;
@@ -273,24 +266,25 @@ static void sort_bodies(bt_world *world)
 {
     bt_bodies *bodies = &world->bodies;
     bt_cells *cells = world->cells;
-    sort_key *key = bt_alloc((size_t)bodies->n, sizeof *key);
+    const size_t n = (size_t)bodies->n;
+    bt_named *name = bt_realloc(NULL, 2 * n + 1, sizeof *name); // by cell, row by row and large bodies last, then id
     bool sorted = true;
     cells->n_in_cells = 0;
     for (bt_idx i = 0; i < bodies->n; i++) {
-        key[i] = (sort_key){INT64_MAX, bodies->gid[i], i};
+        name[i] = (bt_named){INT64_MAX, bodies->gid[i], 0, (uint32_t)i};
         if (!bodies->large[i]) {
-            key[i].cell = (int64_t)(bodies->cell[i][1] - cells->low_y) * cells->n_x +
-                          (bodies->cell[i][0] - cells->low_x);
+            name[i].a = (int64_t)(bodies->cell[i][1] - cells->low_y) * cells->n_x +
+                        (bodies->cell[i][0] - cells->low_x);
             cells->n_in_cells++;
         }
-        sorted = sorted && (i == 0 || by_cell(&key[i - 1], &key[i]) < 0);
+        sorted = sorted && (i == 0 || bt_named_before(&name[i - 1], &name[i]));
     }
     if (!sorted) {
-        qsort(key, (size_t)bodies->n, sizeof *key, by_cell);
-        permute(bodies, key);
+        bt_named_sort(name, name + n, n);
+        permute(bodies, name);
     }
     for (bt_idx i = 0; i < bodies->n; i++) bodies->index_of[bodies->gid[i]] = i;
-    free(key);
+    free(name);
 }
 
 // --- cells ---------------------------------------------------------------------------------------------------------

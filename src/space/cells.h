@@ -228,7 +228,7 @@ void bt_cells_owner(const bt_cells *cells, const int32_t p[2], const int32_t q[2
 bool bt_cells_adjacent(const bt_cells *cells, const int32_t p[2], const int32_t q[2]);
 
 /// Coordinate c around a periodic direction of n cells.
-static inline int32_t bt_cells_wrapped(int32_t c, int32_t n) { return ((c % n) + n) % n; }
+static inline int32_t bt_cells_wrapped(int32_t c, int32_t n) { return c >= 0 && c < n ? c : ((c % n) + n) % n; }
 
 /// Capacity for n entries of a cell: a few more, or every step in which ice is pressed together would need new memory;
 /// only a few, or dense ice would take a tenth more memory.

@@ -12,7 +12,8 @@
 typedef struct grid {
     bt_graph g;
     int nx, ny, *start, *to, *group;
-    int64_t *edge, *weight;
+    int64_t *edge;
+    bt_cut_work *weight;
     double (*at)[2];
 } grid;
 
@@ -30,7 +31,7 @@ static void grid_init(grid *t, int nx, int ny, int64_t weight, int64_t edge)
     int m = 0;
     for (int i = 0; i < (int)n; i++) {
         int x = i % nx, y = i / nx;
-        t->weight[i] = weight;
+        t->weight[i] = (bt_cut_work){{weight}};
         t->group[i] = -1;
         t->at[i][0] = x, t->at[i][1] = y;
         t->start[i] = m;
@@ -50,7 +51,7 @@ static bool graph_is_valid(const bt_graph *g)
 {
     if (g->n < 0 || g->start[0] != 0) return false;
     for (int v = 0; v < g->n; v++)
-        if (g->start[v + 1] < g->start[v] || g->weight[v] < 0) return false;
+        if (g->start[v + 1] < g->start[v] || g->weight[v].of[0] < 0) return false;
     for (int v = 0; v < g->n; v++)
         for (int e = g->start[v]; e < g->start[v + 1]; e++) {
             int u = g->to[e];
@@ -107,7 +108,7 @@ TEST(test_measure)
 {
     grid t;
     grid_init(&t, 3, 2, 5, 1); // 0 0 1 over 0 1 1, by hand
-    t.weight[5] = 7;
+    t.weight[5].of[0] = 7;
     const int part[6] = {0, 0, 1, 0, 1, 1}, before[6] = {0, -1, 0, 0, 1, 0};
     for (int e = t.start[1]; e < t.start[2]; e++)
         if (t.to[e] == 4) t.edge[e] = 3;
@@ -148,7 +149,7 @@ TEST(test_few_cells_a_part)
 {
     grid t;
     grid_init(&t, 40, 40, 0, 16);
-    for (int i = 0; i < t.g.n; i++) t.weight[i] = 60 + (i * 7919) % 23;
+    for (int i = 0; i < t.g.n; i++) t.weight[i].of[0] = 60 + (i * 7919) % 23;
     for (int n_parts = 50; n_parts <= 200; n_parts += 50) {
         bt_cut_quality q;
         int *part = cut(&t, n_parts, 0.03, &q);
@@ -186,7 +187,8 @@ TEST(test_groups)
 TEST(test_group_edges)
 {
     const int start[] = {0, 1, 2, 3, 7, 9, 10}, to[] = {3, 3, 3, 0, 1, 2, 4, 3, 5, 4}, group[] = {2, 2, 2, -1, -1, -1};
-    const int64_t edge[] = {2, 2, 2, 2, 2, 2, 5, 5, 1, 1}, weight[] = {10, 10, 10, 20, 30, 20};
+    const int64_t edge[] = {2, 2, 2, 2, 2, 2, 5, 5, 1, 1};
+    const bt_cut_work weight[] = {{{10}}, {{10}}, {{10}}, {{20}}, {{30}}, {{20}}};
     const double at[][2] = {{0, 0}, {0, 0}, {0, 0}, {3, 0}, {2, 0}, {1, 0}}; // bisection finds the second
     bt_graph g = {6, start, to, edge, weight, at, group};
     assert_true(graph_is_valid(&g));
@@ -203,7 +205,7 @@ static double imbalance_of_others(const grid *t, int n_parts, const int *part, i
 {
     int64_t load[64] = {0}, most = 0, sum = 0;
     for (int i = 0; i < t->g.n; i++)
-        if (i != heavy) load[part[i]] += t->weight[i], sum += t->weight[i];
+        if (i != heavy) load[part[i]] += t->weight[i].of[0], sum += t->weight[i].of[0];
     for (int p = 0; p < n_parts; p++)
         if (load[p] > most) most = load[p];
     return (double)most * (n_parts - 1) / (double)sum - 1;
@@ -213,7 +215,7 @@ TEST(test_one_heavy)
 {
     grid t;
     grid_init(&t, 30, 30, 10, 3);
-    t.weight[435] = 100000;
+    t.weight[435].of[0] = 100000;
     bt_cut_quality q;
     int *part = cut(&t, 16, 0.03, &q);
     for (int i = 0; i < t.g.n; i++) assert_true(i == 435 || part[i] != part[435]);
@@ -234,7 +236,7 @@ TEST(test_weights)
     grid t;
     grid_init(&t, 32, 32, 1, 1);
     for (size_t i = 0; i < sizeof weight / sizeof *weight; i++) {
-        for (int v = 0; v < t.g.n; v++) t.weight[v] = weight[i];
+        for (int v = 0; v < t.g.n; v++) t.weight[v].of[0] = weight[i];
         for (int e = 0; e < t.start[t.g.n]; e++) t.edge[e] = weight[i] / 16;
         bt_cut_quality q;
         int count[16] = {0}, *part = cut(&t, 16, 0.03, &q);
@@ -249,13 +251,13 @@ TEST(test_weights)
         free(part);
     }
     // half of the cells empty: the others are balanced
-    for (int v = 0; v < t.g.n; v++) t.weight[v] = v % 32 < 16 ? 0 : 50, t.edge[v] = 1;
+    for (int v = 0; v < t.g.n; v++) t.weight[v].of[0] = v % 32 < 16 ? 0 : 50, t.edge[v] = 1;
     for (int e = 0; e < t.start[t.g.n]; e++) t.edge[e] = 1;
     bt_cut_quality q;
     free(cut(&t, 16, 0.03, &q));
     assert_true(q.imbalance <= 0.07);
     // weight in one cell only
-    for (int v = 0; v < t.g.n; v++) t.weight[v] = v == 5;
+    for (int v = 0; v < t.g.n; v++) t.weight[v].of[0] = v == 5;
     int *part = cut(&t, 16, 0.03, &q), count[16] = {0};
     for (int v = 0; v < t.g.n; v++) count[part[v]]++;
     for (int p = 0; p < 16; p++) assert_true(count[p] <= 72);
@@ -318,7 +320,7 @@ TEST(test_few_vertices)
     for (int n = 2; n <= 40; n++) // every number of parts for some small grids: no part empty
         for (int n_parts = 2; n_parts <= n + 2; n_parts++) {
             grid_init(&t, n, n % 3 + 1, 10, 1);
-            for (int v = 0; v < t.g.n; v++) t.weight[v] += v % 4;
+            for (int v = 0; v < t.g.n; v++) t.weight[v].of[0] += v % 4;
             free(cut(&t, n_parts, 0.03, &q));
             grid_free(&t);
         }
@@ -339,15 +341,15 @@ TEST(test_bisection)
     bt_cut_quality q = bt_cut_measure(&t.g, 16, part, NULL);
     assert_true(q.imbalance == 0);
     assert_int_equal(q.cut, straight_cut(&t, 4, 4));
-    for (int i = 0; i < t.g.n; i++) t.weight[i] = i / 64 < 32; // the empty half is divided by number
+    for (int i = 0; i < t.g.n; i++) t.weight[i].of[0] = i / 64 < 32; // the empty half is divided by number
     bt_cut_by_bisection(&t.g, 12, part);
     int count[12] = {0}, least = t.g.n;
     for (int i = 0; i < t.g.n; i++) count[part[i]]++;
     for (int p = 0; p < 12; p++) least = count[p] < least ? count[p] : least;
     assert_true(least >= 2048 / 12);
-    for (int i = 0; i < t.g.n; i++) t.weight[i] = 0;
+    for (int i = 0; i < t.g.n; i++) t.weight[i].of[0] = 0;
     bt_cut_by_bisection(&t.g, 64, part);
-    for (int i = 0; i < t.g.n; i++) t.weight[i] = 1;
+    for (int i = 0; i < t.g.n; i++) t.weight[i].of[0] = 1;
     assert_true(bt_cut_measure(&t.g, 64, part, NULL).imbalance == 0);
     free(part);
     grid_free(&t);
@@ -368,6 +370,38 @@ TEST(test_bisection)
             grid_free(&t);
         }
     assert_true(n_used > 0);
+}
+
+// Most of the contacts lie ahead of a towed body, most of the moving floes behind it: parts with an equal sum of both
+// wait for each other in each of them. Red if the kinds are added up before the cut.
+TEST(test_each_kind_is_balanced)
+{
+    grid t;
+    grid_init(&t, 60, 40, 0, 16);
+    for (int i = 0; i < t.g.n; i++) {
+        const int x = i % 60, y = i / 60;
+        if (x >= 40 && x < 56 && y >= 12 && y < 28) t.weight[i].of[0] = 900 + i % 11;
+        if (x < 40) t.weight[i].of[1] = 100 + i % 7;
+        t.weight[i].of[1] += 10;
+    }
+    bt_cut_quality q;
+    for (int n_parts = 2; n_parts <= 16; n_parts *= 2) {
+        int *part = cut(&t, n_parts, 0.02, &q);
+        if (!(q.imbalance <= 0.04)) fail_msg("%d parts: imbalance %g", n_parts, q.imbalance);
+        free(part);
+    }
+    // the sum alone is balanced by a cut across the longer side, with one kind on either side of it
+    int *part = labels(&t, 0);
+    for (int i = 0; i < t.g.n; i++) part[i] = i % 60 >= 40;
+    assert_true(bt_cut_measure(&t.g, 2, part, NULL).imbalance > 0.8);
+    // METIS and bisection by themselves
+    assert_true(bt_cut_by_metis(&t.g, 4, 0.02, part));
+    assert_true(bt_cut_measure(&t.g, 4, part, NULL).imbalance <= 0.05);
+    bt_cut_by_bisection(&t.g, 2, part);
+    assert_true(bt_cut_measure(&t.g, 2, part, NULL).imbalance <= 0.02);
+    for (int i = 0; i < t.g.n; i++) assert_int_equal(part[i], part[i / 60 * 60]); // across the shorter side
+    free(part);
+    grid_free(&t);
 }
 
 TEST(test_labels_stay)
@@ -425,9 +459,9 @@ TEST(test_moving_spot)
         for (int i = 0; i < t.g.n; i++) {
             int x = i % 60 - 8 - step, y = i / 60 - 30;
             bool wake = x <= 3 && x > -12 && abs(y) <= 4;
-            t.weight[i] = (wake ? 300 : 60) + (i * 7919) % 11;
+            t.weight[i].of[0] = (wake ? 300 : 60) + (i * 7919) % 11;
             t.group[i] = abs(x) <= 1 && abs(y) <= 1 ? 0 : -1;
-            sum += t.weight[i];
+            sum += t.weight[i].of[0];
         }
         bt_cut_quality q;
         bt_cut(&t.g, 32, 0.04, part, &q);
