@@ -242,5 +242,5 @@ void bt_division_map(bt_world *world, bool cut)
     int64_t at = 0; // with no cell under a large body, the last
     while (at < (int64_t)domain->n_x * domain->n_y - 1 && !domain->under[at]) at++;
     domain->large_place = at;
-    if (domain->under[at]) domain->large_owner = domain->owner[at];
+    domain->large_owner = domain->owner[at];
 }

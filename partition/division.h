@@ -57,7 +57,7 @@ struct bt_domain {
     int64_t steps;           ///< since then
     int64_t wait;            ///< steps from that check to the next
     int64_t sweeps;          ///< in these steps
-    double fresh;            ///< imbalance that the last cut left
+    double fresh;            ///< imbalance that the last cut left, or less since then
     /// time lost since then by imbalance beyond that, or by one rank with all cells, s, modelled; INFINITY: that cut
     /// did not know the work
     double lost;

@@ -194,6 +194,7 @@ static void check_balance(bt_world *world)
             domain->stats.checks++;
             domain->stats.imbalance += imbalance;
             domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
+            domain->fresh = bt_min(domain->fresh, imbalance); // a jam that has dissolved must not earn a credit
             domain->lost += (imbalance - domain->fresh) * mean;
         }
         domain->spared = bt_max(0, domain->spared - gain);

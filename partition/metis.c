@@ -5,6 +5,7 @@
 //   - one part: division by zero (SIGFPE). The caller avoids that.
 //   - weights that add up to 2³¹ or more, or all zero: METIS_OK with every vertex in one part. Weights are scaled so
 //     that their sum stays below 2³⁰, nonzero ones to at least 1.
+//   - a vertex above a part's share of one of two kinds of work: errors on standard output under METIS_OK. Refused.
 //   - few vertices per part: empty parts under METIS_OK. Every part is checked.
 //   - contiguous parts of a disconnected graph: an error. Contiguity is not requested.
 //   - it sets its own handlers of SIGTERM and SIGABRT and afterwards puts the caller's back as one-shot
@@ -73,6 +74,9 @@ bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *
     for (int e = 0; e < n_edges; e++) sum_edge += graph->edge[e];
     for (int k = 0; k < BT_CUT_KINDS; k++)
         if (sum.of[k] > 0) kind[kinds++] = k;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; kinds > 1 && k < kinds; k++)
+            if (graph->weight[i].of[kind[k]] > sum.of[kind[k]] / n_parts) return false;
 
     idx_t *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc((size_t)n_edges, sizeof *to);
     idx_t *weight = bt_alloc((size_t)n * (size_t)kinds, sizeof *weight),
