@@ -69,7 +69,7 @@ bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *
     if (n > SUM_MAX / 4 || n_edges > SUM_MAX / 4) return false;
     bt_cut_work sum = {{0}};
     int64_t sum_edge = 0;
-    int kinds = 0, kind[BT_CUT_KINDS]; // that there are
+    int kinds = 0, kind[BT_CUT_KINDS] = {0}; // that there are
     for (int i = 0; i < n; i++) bt_cut_add(&sum, graph->weight[i], 1);
     for (int e = 0; e < n_edges; e++) sum_edge += graph->edge[e];
     for (int k = 0; k < BT_CUT_KINDS; k++)

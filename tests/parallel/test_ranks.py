@@ -198,13 +198,15 @@ def test_one_rank_takes_a_field_that_the_towed_body_has_left(tmp_path):
     """Two rows are pressed against a wedge, which the ranks share until it has come to rest; meanwhile the body on its
     line has left the ice. Red where a rank that no longer solves has the large bodies: the line stands still."""
     yc, draw = -20.0, random.Random(3)
-    floes = [{"x": 0.5 + 0.65 * i, "y": -27.7 + 0.65 * j, "vx": draw.uniform(-0.05, 0.05), "vy": draw.uniform(-0.05, 0.05)}
+    floes = [{"x": 0.5 + 0.65 * i, "y": -27.7 + 0.65 * j, "vx": draw.uniform(-0.05, 0.05),
+              "vy": draw.uniform(-0.05, 0.05)}
              for j in range(90) for i in range(90) if abs(-27.7 + 0.65 * j - yc) >= 2.2]
     floes += [{"x": 2 + 0.503 * k, "y": -33 + 0.503 * r, "vx": 0.5, "vy": 0} for k in range(100) for r in range(2)]
     floes = [{"shape": "square", "length": 0.5, "thickness": 0.04, **floe} for floe in floes]
     floes += [{"shape": "square", "length": 0.8, "x": 53.6, "y": y, "thickness": 0.04, "fixed": True}
               for y in (-33.2, -32.35)]
-    case = {"run": {"dt": 0.02, "duration": 3.2}, "domain": {"length": 70, "width": 80, "ends": "open", "sides": "open"},
+    case = {"run": {"dt": 0.02, "duration": 3.2},
+            "domain": {"length": 70, "width": 80, "ends": "open", "sides": "open"},
             "ice": {"concentration": 0, "friction": 0.5, "drag": {"water_skin": 0, "water_form": 0}},
             "solver": {"tolerance": 1e-9}, "floes": floes,
             "body": {"shape": "disc", "length": 3, "draft": 3, "x": 54, "y": yc, "vx": 12, "drag": {"water_form": 0.5}},
