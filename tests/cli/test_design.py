@@ -34,7 +34,7 @@ CASE = changed(TOW, run={"dt": 0.1, "duration": 40, "title": TITLE}, output__win
                ice__concentration=0.3, ice__size=0.9, estimate__length_scale=400,
                report={"client": "Owners & Sons <x>", "project": "/home/secret/P-1", "author": "A. Author",
                        "revision": "B3"})
-OPTIONS = report_ensemble.OPTIONS | {"resamples": 10}
+OPTIONS = report_ensemble.OPTIONS | {"resamples": 2}
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     out = tmp_path / "out"
     cli.perform("design", tmp_path / "case.yml", "-o", out, "--concentrations", "0.2,0.45", "--fields", "1",
-                "--quiet", "--no-pdf", "--no-replay", *more)
+                "--quiet", "--no-pdf", "--no-replay", "--no-load-cases", *more)
     assert yaml.safe_load((out / "design.yml").read_text()).get("with") == wider
     narrow = 3 if "domain.width=6 m" in more else 2.5
     widths = list(Members(out).summary["domain_body_widths"])
@@ -127,6 +127,8 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
 def test_values_set_beside_the_case_are_those_of_the_study(tmp_path, monkeypatch):
     """Red: what the study of several speeds or winds has under `with`, no --set could change."""
     write_case(tmp_path, CASE)
+    monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    monkeypatch.setattr(report_run, "picture", undrawn)
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "out", "--fields", "1", "--quiet", "--no-pdf",
                 "--no-replay", "--no-load-cases", "--speeds", "0.26 m/s", "--set", "run.duration=20 s", "--set",

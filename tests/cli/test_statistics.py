@@ -332,7 +332,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
             cli.perform(command, waiting)
     mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]),
                                                           conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
-    cli.perform("statistics", mixed)
+    cli.perform("statistics", mixed, "--resamples", "1")
     assert "peaks of different conversions" in capsys.readouterr().out
 
 
