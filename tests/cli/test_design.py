@@ -26,6 +26,7 @@ from bergtow.reporting import run as report_run
 from bergtow.result import origins as report_case
 from bergtow.result.members import Members
 from bergtow.result.run import Run
+from bergtow.stats import profile as stat_profile
 from bergtow.study import domain_width
 from bergtow.text import loads as loads_text
 
@@ -44,6 +45,7 @@ def made(tmp_path_factory):
     write_case(folder, CASE)
     patch = pytest.MonkeyPatch()
     patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    patch.setattr(stat_profile, "FINE", 0.3)  # of intervals, most of the time; no test looks at one
     patch.setenv("BERGTOW", str(BERGTOW))
     cli.perform("design", folder / "case.yml", "-o", folder / "out", "--concentrations", "0.2,0.4", "--fields", "5",
                 "--quiet", "--seed", "3")
