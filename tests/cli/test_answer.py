@@ -28,6 +28,7 @@ from bergtow.stats import extreme, largest
 from bergtow.stats import load as stat_load
 from bergtow.stats import loads as stat_loads
 from bergtow.stats import mean as stat_mean
+from bergtow.stats import profile as stat_profile
 from bergtow.study import answer, assumed, gear, load_cases
 from bergtow.text import answer as words
 from bergtow.text import loads as loads_text
@@ -377,6 +378,7 @@ def made(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setenv("BERGTOW", str(BERGTOW))
     patch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
+    patch.setattr(stat_profile, "FINE", 0.3)  # of intervals, most of the time; no test looks at one
     found = bergtow.design(folder / "case.yml", folder / "out", fields=3, vessel="0.001 t", line="150 N", line_factor=2,
                            line_length=3, no_pdf=True, no_replay=True, quiet=True, speeds="0.13 m/s,0.2 m/s",
                            bend_radius=1, head_wind=1)

@@ -26,6 +26,7 @@ from bergtow.reporting import run as report_run
 from bergtow.result import origins as report_case
 from bergtow.result.members import Members
 from bergtow.result.run import Run
+from bergtow.stats import profile as stat_profile
 from bergtow.study import domain_width
 from bergtow.text import loads as loads_text
 
@@ -34,7 +35,7 @@ CASE = changed(TOW, run={"dt": 0.1, "duration": 40, "title": TITLE}, output__win
                ice__concentration=0.3, ice__size=0.9, estimate__length_scale=400,
                report={"client": "Owners & Sons <x>", "project": "/home/secret/P-1", "author": "A. Author",
                        "revision": "B3"})
-OPTIONS = report_ensemble.OPTIONS | {"resamples": 10}
+OPTIONS = report_ensemble.OPTIONS | {"resamples": 2}
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +45,7 @@ def made(tmp_path_factory):
     write_case(folder, CASE)
     patch = pytest.MonkeyPatch()
     patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    patch.setattr(stat_profile, "FINE", 0.3)  # of intervals, most of the time; no test looks at one
     patch.setenv("BERGTOW", str(BERGTOW))
     cli.perform("design", folder / "case.yml", "-o", folder / "out", "--concentrations", "0.2,0.4", "--fields", "5",
                 "--quiet", "--seed", "3")
@@ -111,7 +113,7 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     out = tmp_path / "out"
     cli.perform("design", tmp_path / "case.yml", "-o", out, "--concentrations", "0.2,0.45", "--fields", "1",
-                "--quiet", "--no-pdf", "--no-replay", *more)
+                "--quiet", "--no-pdf", "--no-replay", "--no-load-cases", *more)
     assert yaml.safe_load((out / "design.yml").read_text()).get("with") == wider
     narrow = 3 if "domain.width=6 m" in more else 2.5
     widths = list(Members(out).summary["domain_body_widths"])
@@ -127,6 +129,8 @@ def test_dense_ice_gets_the_width_that_it_needs(tmp_path, monkeypatch, capsys, c
 def test_values_set_beside_the_case_are_those_of_the_study(tmp_path, monkeypatch):
     """Red: what the study of several speeds or winds has under `with`, no --set could change."""
     write_case(tmp_path, CASE)
+    monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    monkeypatch.setattr(report_run, "picture", undrawn)
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "out", "--fields", "1", "--quiet", "--no-pdf",
                 "--no-replay", "--no-load-cases", "--speeds", "0.26 m/s", "--set", "run.duration=20 s", "--set",

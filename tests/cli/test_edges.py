@@ -197,7 +197,7 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
                          (("--speed", "3 m"), "--speed: 3 m: m is the unit of")):
         done = said(*words)
         assert done.returncode == 2 and wrong in done.stderr, done.stderr
-    done = said("--search", "ice.size", "--from", "0.4 m", "--to", "0.8 m", "--resolution", "5 cm", "--speed", "0.1 kn",
+    done = said("--search", "ice.size", "--from", "1.4 m", "--to", "1.5 m", "--resolution", "5 cm", "--speed", "0.1 kn",
                 "--budget", "0.2")
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "out/capability.json").read_text())

@@ -22,6 +22,7 @@ from resuming import children, started
 
 from bergtow import cli
 from bergtow.reporting import ensemble as report_ensemble
+from bergtow.stats import profile as stat_profile
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 CONDITIONS = {"base": "base.yml", "parameters": {"tow.speed": [0.1, 0.15, 0.2]}}
@@ -47,6 +48,7 @@ def page(monkeypatch):
     """The report of an ensemble as texts: its warnings, and the rows and remarks of its members."""
     monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 2})
     monkeypatch.setattr(report_ensemble, "pictures", lambda *_: {})
+    monkeypatch.setattr(stat_profile, "FINE", 0.3)  # of intervals, most of the time; no test looks at one
 
     def made(folder):
         cli.perform("report", folder / "all")

@@ -188,7 +188,8 @@ def test_the_return_time_of_a_design_value():
 
 @pytest.mark.parametrize("process, fields, n", [pytest.param(AR1(0.9), 12, 2000, marks=pytest.mark.slow),
                                                 pytest.param(EAR1(0.7), 20, 480, marks=pytest.mark.slow),
-                                                (EAR1(0.0), 8, 600), (POISSON(0.02), 8, 4000)],
+                                                (EAR1(0.0), 8, 600),
+                                                pytest.param(POISSON(0.02), 8, 4000, marks=pytest.mark.slow)],
                          ids=lambda v: getattr(v, "name", None))
 def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):
     """95 % of them do (tests/long and docs/statistics.md have the numbers); of so few, no fewer than chance explains

@@ -20,6 +20,7 @@ from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
 from bergtow.result.members import Members
 from bergtow.stats import conditions as ensemble
+from bergtow.stats import profile as stat_profile
 from bergtow.stats import variance as stat_budget
 from bergtow.text import loads as loads_text
 from bergtow.writing import plain
@@ -27,6 +28,15 @@ from bergtow.writing import plain
 TITLE = "<script>window.hacked = 1</script> study & 50 %"
 JAM = "the towed body stood still for 40 s of 600 s <i>: a jam"
 OPTIONS = report_ensemble.OPTIONS | {"resamples": 20}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse():
+    """Ends of intervals to a third: they take most of the time, and no test knows where they lie."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(stat_profile, "FINE", 0.3)
+    yield
+    patch.undo()
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
 """Floes that split in whole runs: known answers of the law, what a split keeps, what is counted, and what files say."""
-import json
-
 import h5py
 import numpy as np
 import pytest
@@ -188,13 +186,20 @@ def weak(**keys):
                    ice__splitting={"toughness": 100.0, "strength": 200.0, "least_size": 0.1, **keys})
 
 
-def test_generations_and_reserve_are_limits_that_are_told(tmp_path):
+@pytest.fixture(scope="module")
+def split(tmp_path_factory):
+    """Such a run with a floe by hand in it, and the contacts of its last step."""
+    folder = tmp_path_factory.mktemp("split")
+    case = changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)])
+    return run(folder, case, "--dump-contacts", f"120:{folder / 'step.h5'}")
+
+
+def test_generations_and_reserve_are_limits_that_are_told(split, tmp_path):
     first = run(tmp_path / "first", weak(generations=1))
     made = read(first.dir)
     assert first.summary["splitting"]["splits"] > 3 and made["generation"].max() == 1
     assert first.summary["splitting"]["refused_generation"] > 0
-    again = read(run(tmp_path / "again", weak()).dir)
-    assert again["generation"].max() > 1
+    assert read(split.dir)["generation"].max() > 1
     few = run(tmp_path / "few", weak(reserve=3))
     s = few.summary["splitting"]
     assert s["splits"] == 3 and s["refused_reserve"] > 0
@@ -207,10 +212,9 @@ def test_generations_and_reserve_are_limits_that_are_told(tmp_path):
     assert small["refused_size"] > 0 and small["largest_refused_ratio"] > 1
 
 
-def test_every_piece_has_its_parent_and_their_areas_add_up(tmp_path):
-    r = run(tmp_path, weak())
-    made = read(r.dir)
-    with h5py.File(r.dir / "result.h5") as f:
+def test_every_piece_has_its_parent_and_their_areas_add_up(split):
+    made = read(split.dir)
+    with h5py.File(split.dir / "result.h5") as f:
         own = f["floes/area"][()]
         end, piece = f["frames/piece_end"][()], f["frames/piece"][()]
         poses = f["frames/pose"][()]
@@ -223,7 +227,7 @@ def test_every_piece_has_its_parent_and_their_areas_add_up(tmp_path):
     there = piece[end[-2]:end[-1]] + len(own)
     assert gone.sum() == (parents < len(own)).sum()
     assert area[:len(own)][~gone].sum() + area[there].sum() == pytest.approx(own.sum(), rel=1e-12)
-    told, pieces = r.summary["splitting"], np.sqrt(area[there])
+    told, pieces = split.summary["splitting"], np.sqrt(area[there])
     assert made["generation"].max() > 1  # some pieces are gone, too
     assert told["size_before_m"] == pytest.approx(np.quantile(np.sqrt(own[gone]), 0.5, method="lower"))
     assert told["piece_size_m"] == pytest.approx(np.quantile(pieces, 0.5, method="lower"))
@@ -235,10 +239,9 @@ def test_every_piece_has_its_parent_and_their_areas_add_up(tmp_path):
         assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2 == pytest.approx(expected, rel=1e-9)
 
 
-def test_the_reader_joins_pieces_to_the_floes(tmp_path):
+def test_the_reader_joins_pieces_to_the_floes(split):
     from bergtow.result.run import Run
-    r = run(tmp_path, weak())
-    with Run(r.dir) as folder:
+    with Run(split.dir) as folder:
         n = folder.n_floes - folder.n_pieces
         assert folder.n_pieces == 2 * len(folder.splits["time"]) > 0
         there = np.isfinite(folder.pose(-1)[:, 0])
@@ -248,12 +251,11 @@ def test_the_reader_joins_pieces_to_the_floes(tmp_path):
         assert len(folder.polygons(-1)) == folder.n_floes and np.isfinite(folder.least_contact_force(-1)).all()
 
 
-def test_a_report_counts_splits(tmp_path):
+def test_a_report_counts_splits(split, tmp_path):
     from bergtow.reporting.run import quality
     from bergtow.result.run import Run
-    r = run(tmp_path / "weak", weak())
-    s = r.summary["splitting"]
-    with Run(r.dir) as folder:
+    s = split.summary["splitting"]
+    with Run(split.dir) as folder:
         (value, words), = [row[1:] for row in quality(folder) if row[0] == "splits"]
     assert value == str(s["splits"]) and s["splits"] > 0
     assert words.startswith(f"{s['near']} at a load, {s['far']} bent, {s['burst']} burst, in {s['steps']} steps; ")
@@ -261,12 +263,11 @@ def test_a_report_counts_splits(tmp_path):
         assert "splits" not in [row[0] for row in quality(folder)]
 
 
-def test_a_collision_names_its_floe_or_its_piece(tmp_path):
+def test_a_collision_names_its_floe_or_its_piece(split):
     """By the rows of /floes, /bodies and /pieces, at a time at which it was there. Red: ids, among which those of
     pieces come before those of walls."""
-    r = run(tmp_path, changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)]))
-    made = read(r.dir)
-    with h5py.File(r.dir / "result.h5") as f:
+    made = read(split.dir)
+    with h5py.File(split.dir / "result.h5") as f:
         n, bodies = len(f["floes/area"]), len(f["bodies/names"])
         t, struck = f["impacts/time"][()], f["impacts/floe"][()]
         born = np.concatenate([np.zeros(n + bodies), np.repeat(f["splits/time"][()], 2)])
@@ -275,15 +276,12 @@ def test_a_collision_names_its_floe_or_its_piece(tmp_path):
     assert (struck >= n + bodies).any() and (born[struck] <= t + 1e-9).all() and (t <= gone[struck] + 1e-9).all()
 
 
-def test_force_chains_go_through_pieces(tmp_path):
+def test_force_chains_go_through_pieces(split):
     """Outlines of a dump are those of the frame of its step, and each contact lies on both of its bodies."""
     from bergtow.plot import chains
     from bergtow.result.run import Run
-    dump = tmp_path / "step.h5"
-    case = changed(weak(), floes=[square(0.5, 4.3, y=0.0, thickness=0.05)])
-    r = run(tmp_path, case, "--dump-contacts", f"120:{dump}")
-    read_as = chains.read(dump)
-    with Run(r.dir) as folder:
+    read_as = chains.read(split.dir.parent / "step.h5")
+    with Run(split.dir) as folder:
         c = chains.joined(folder, read_as)
         np.testing.assert_allclose(c.pose[:folder.n_floes], folder.pose(-1), atol=1e-9)
         at = c.pose[c.body, :2] + c.lever
@@ -327,12 +325,11 @@ def test_python_tells_floes_that_are_not_there(tmp_path):
                     change(id)
 
 
-def test_paraview_sees_the_pieces(tmp_path):
+def test_paraview_sees_the_pieces(split):
     import re
-    r = run(tmp_path, weak())
-    text = (r.dir / "frames.xdmf").read_text()
+    text = (split.dir / "frames.xdmf").read_text()
     assert text.count('Name="pieces"') > 0
-    with h5py.File(r.dir / "result.h5") as f:
+    with h5py.File(split.dir / "result.h5") as f:
         for size, path in re.findall(r'Dimensions="([\d ]+)"[^>]*>result\.h5:(/xdmf/\d+/piece\w+)<', text):
             assert tuple(map(int, size.split())) == f[path].shape
 
@@ -347,10 +344,9 @@ def test_bad_input_is_refused(tmp_path, keys, words):
     assert words in run(tmp_path, changed(TOW, **keys), code=CASE).result.stderr
 
 
-def test_the_history_is_in_a_checkpoint_and_checked(tmp_path):
+def test_the_history_is_in_a_checkpoint_and_checked(split):
     """A checkpoint whose history of splits does not fit the floes is refused."""
-    r = run(tmp_path, weak())
-    with h5py.File(r.dir / "checkpoint.h5") as f:
-        assert len(f["splits/parent"]) == r.summary["splitting"]["splits"]
+    with h5py.File(split.dir / "checkpoint.h5") as f:
+        assert len(f["splits/parent"]) == split.summary["splitting"]["splits"]
         assert len(f["splits/vertices"]) == f["splits/corners"][()].sum()
-    assert json.loads((r.dir / "summary.json").read_text())["splitting"]["unconverged_steps"] >= 0
+    assert split.summary["splitting"]["unconverged_steps"] >= 0

@@ -312,9 +312,10 @@ def test_members_of_two_builds_are_reported(tmp_path):
 def test_what_is_refused(tmp_path, plain, capsys):
     result = script("statistics", tmp_path / "none")
     assert result.returncode == 4 and "no such folder" in result.stderr and "Traceback" not in result.stderr
-    for arguments, words in (((tmp_path, ), "holds no ensemble.h5"), ((plain[0], "-o", plain[0] / "ensemble.h5",
-                                                                       "--resamples", "1", "--partial"),
-                                                                      "cannot be written")):
+    mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]),
+                                                          conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
+    for arguments, words in (((tmp_path, ), "holds no ensemble.h5"),
+                             ((mixed, "-o", mixed / "ensemble.h5", "--resamples", "1"), "cannot be written")):
         with pytest.raises(RunError, match=words):
             cli.perform("statistics", *arguments)
     for arguments, words in ((("--error", "0"), "not above zero"), (("--exclude", "unlike"), "invalid choice"),
@@ -330,9 +331,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
     for command in ("statistics", "plot-ensemble"):
         with pytest.raises(RunError, match="no member that has finished; run the ensemble further"):
             cli.perform(command, waiting)
-    mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]),
-                                                          conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
-    cli.perform("statistics", mixed)
+    cli.perform("statistics", mixed, "--resamples", "1")
     assert "peaks of different conversions" in capsys.readouterr().out
 
 

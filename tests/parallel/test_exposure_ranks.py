@@ -10,10 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import quick, run
-from resuming import assert_same_result
-from test_ranks import assert_same, many
-from test_ranks_output import mpirun
+from harness import run
+from test_ranks import assert_legs_end_as, assert_same, many
 
 COMPANY = {
     "run": {"dt": 0.1, "duration": 12},
@@ -48,7 +46,8 @@ def test_the_case_is_worth_it(alone):
     assert not np.array_equal(water, air)
 
 
-@pytest.mark.parametrize("ranks, threads", quick([(1, 2), (2, 1), (2, 2), (3, 1)], (1, 2), (3, 1)))
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks, threads", [(1, 2), (2, 1), (2, 2), (3, 1)])
 def test_ranks_and_threads(alone, ranks, threads):
     folder, one = alone
     assert_same(one, many(folder, ranks, threads))
@@ -56,9 +55,4 @@ def test_ranks_and_threads(alone, ranks, threads):
 
 def test_stopped_and_taken_up(alone):
     folder, one = alone
-    many(folder, 2, 1, "--steps", 47, name="cut")
-    for ranks in (3, 1):
-        more = ["--steps", 31] if ranks == 3 else []
-        result = mpirun(ranks, "resume", "cut", "--quiet", "--threads", 1, *more, cwd=folder, timeout=300)
-        assert result.returncode == 0, result.stderr
-    assert_same_result(one.dir, folder / "cut")
+    assert_legs_end_as(one, folder, 47, 31)

@@ -10,7 +10,7 @@ import json
 import numpy as np
 import pytest
 
-from harness import VALIDATE, call, changed, run, write_case
+from harness import VALIDATE, call, changed, quick, run, write_case
 from test_ranks import assert_same, many
 
 GROUNDS = {
@@ -67,7 +67,7 @@ def test_the_case_is_worth_it(alone):
     assert r.summary["momentum_residual"] < 1e-9
 
 
-@pytest.mark.parametrize("ranks, threads", [(2, 2), (3, 1)])
+@pytest.mark.parametrize("ranks, threads", quick([(2, 2), (3, 1)], (3, 1)))
 def test_ranks_and_threads(alone, ranks, threads):
     folder, one = alone
     r = many(folder, ranks, threads)

@@ -5,14 +5,11 @@ and rebounds in use, and in a jam.
 What turns these tests red: a record left behind in a migration, friction of sheets that starts anew on another rank, an
 area that was looked at before the poses of the step, sheets in the order of memory.
 """
-import h5py
 import pytest
 
-from harness import changed, quick, run
-from resuming import assert_same_result
+from harness import changed, run
 from test_everything import ALL
-from test_ranks import LINE, assert_same, many
-from test_ranks_output import mpirun
+from test_ranks import LINE, assert_legs_end_as, assert_same, many
 
 WINDOW = changed(ALL,
                  ice__concentration=0.75,
@@ -44,7 +41,8 @@ def test_the_case_is_worth_it(alone):
         assert s["max_overlap_relative"] < 0.01  # rafted overlap is none
 
 
-@pytest.mark.parametrize("ranks, threads", quick([(1, 2), (2, 2), (3, 1)], (1, 2), (3, 1)))
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks, threads", [(1, 2), (2, 2), (3, 1)])
 def test_ranks_and_threads(alone, ranks, threads):
     _, folder, one = alone
     assert_same(one, many(folder, ranks, threads))
@@ -52,12 +50,5 @@ def test_ranks_and_threads(alone, ranks, threads):
 
 def test_stopped_and_taken_up(alone):
     name, folder, one = alone
-    many(folder, 2, 1, "--steps", 131, name="cut")
-    with h5py.File(folder / "cut/checkpoint.h5") as f:
-        laws = set(f["contacts/law"][:])
+    laws = set(assert_legs_end_as(one, folder, 131, 60)["contacts/law"])
     assert 2 in laws and (name != "window" or 1 in laws)
-    for ranks in (3, 1):
-        more = ["--steps", 60] if ranks == 3 else []
-        result = mpirun(ranks, "resume", "cut", "--quiet", "--threads", 1, *more, cwd=folder, timeout=300)
-        assert result.returncode == 0, result.stderr
-    assert_same_result(one.dir, folder / "cut")

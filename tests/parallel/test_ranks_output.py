@@ -71,7 +71,7 @@ def test_ranks_that_read_different_files_are_refused(tmp_path, differs):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("ranks", quick([1, 2, 3, 4], 1, 3))
+@pytest.mark.parametrize("ranks", quick([1, 2, 3, 4], 3))
 def test_values_do_not_depend_on_ranks(one, ranks):
     folder, alone = one
     result = mpirun(ranks, "run", "case.yml", "-o", f"out{ranks}", "--threads", 1, cwd=folder)

@@ -8,7 +8,7 @@ left. The first two were tried.
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, TOW, VALIDATE, call, changed, differing, run, warned
+from harness import CASE, DONE, TOW, VALIDATE, call, changed, differing, quick, run, warned
 from test_ranks import assert_same, many
 
 # Two laps and a half through loose ice with small cells, with and without a line, towards either end.
@@ -50,7 +50,7 @@ def test_the_cases_show_what_they_are_for(alone):
         assert r.series("window_x")[-1] < r.series("window_x")[0] - 45
 
 
-@pytest.mark.parametrize("division", range(2))
+@pytest.mark.parametrize("division", quick([0, 1], 1))
 def test_the_same_bits(alone, division):
     folder, one, name = alone
     ranks, threads = {"speed": [(1, 2), (3, 2)], "line": [(2, 1), (4, 1)]}[name][division]

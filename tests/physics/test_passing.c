@@ -86,7 +86,7 @@ TEST(the_sweep_sees_every_meeting)
     uint64_t rng = 3;
     const double near = 2e-3;
     int meet = 0, pass = 0, mistaken = 0;
-    for (int k = 0; k < 4000; k++) {
+    for (int k = 0; k < 2000; k++) {
         double v[2][64], p[64], q[64], least = INFINITY;
         bt_moving m[2];
         for (int i = 0; i < 2; i++) {
@@ -111,7 +111,7 @@ TEST(the_sweep_sees_every_meeting)
             pass++, mistaken += said;
         }
     }
-    assert_true(meet > 300 && pass > 300 && mistaken * 200 < pass);
+    assert_true(meet > 150 && pass > 150 && mistaken * 200 < pass);
 }
 
 /// A pair of random floes whose ways cross or nearly so.
@@ -139,13 +139,13 @@ static bt_world *random_pair(uint64_t *rng, bool turning)
     return w;
 }
 
-// Red: a review that releases nothing (some 300 of those that pass are stopped or turned); one that looks at the end of
+// Red: a review that releases nothing (some 150 of those that pass are stopped or turned); one that looks at the end of
 // the step alone, or does not turn the outlines.
 TEST(what_passes_keeps_its_velocity_and_what_meets_does_not)
 {
     uint64_t rng = 11;
     int passed = 0, close = 0, met = 0;
-    for (int k = 0; k < 3000; k++) {
+    for (int k = 0; k < 1500; k++) {
         const bool turning = k % 2;
         bt_world *w = random_pair(&rng, turning);
         const bt_pose pose[2] = {w->bodies.pose[0], w->bodies.pose[1]};
@@ -164,7 +164,7 @@ TEST(what_passes_keeps_its_velocity_and_what_meets_does_not)
         assert_int_equal(w->stats.misjudged, 0);
         bt_world_free(w);
     }
-    assert_true(passed > 1000 && close > 100 && met > 200);
+    assert_true(passed > 500 && close > 50 && met > 100);
 }
 
 /// A pusher of given speed behind n squares with equal gaps between them.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Checkpoints: a run that is taken up after any step goes on to the same bits; what is read is refused unless it is
+// Checkpoints: a run that is taken up after a step goes on to the same bits; what is read is refused unless it is
 // what was written.
 //
 // Each case runs once and keeps its state and its sample after every step. Then a new world is made from the state
-// after each step n, does LATER steps, and must have the same state (all of it, not only poses) and the same sample
-// after each of them. What turns this red (tried): a member that the tables leave out: labels of the floes, whether
-// they are due to be renewed, the largest margin, impulses, friction and features of contacts, the tow line's impulse,
-// what is broken, the vessel's way, home.copy, open collisions.
+// after every other step n, does LATER steps, and must have the same state (all of it, not only poses) and the same
+// sample after each of them. What turns this red (tried): a member that the tables leave out: labels of the floes,
+// whether they are due to be renewed, the largest margin, impulses, friction and features of contacts, the tow line's
+// impulse, what is broken, the vessel's way, home.copy, open collisions.
 #include <unistd.h>
 
 #include "test.h"
@@ -250,7 +250,7 @@ static void check_same(const struct scenario *s, int from, int at, const bt_snap
         fail_msg("%s: taken up after step %d, step %d: %s", s->name, from, at, text);
 }
 
-static void goes_on_from_every_step(const struct scenario *s)
+static void goes_on_from_every_other_step(const struct scenario *s)
 {
     setting t = {.speed = 0};
     set_up(s, &t);
@@ -270,7 +270,7 @@ static void goes_on_from_every_step(const struct scenario *s)
     }
     bt_world_free(w);
     if ((seen & s->shows) != s->shows) fail_msg("%s: shows %x, wanted %x", s->name, (unsigned)seen, (unsigned)s->shows);
-    for (int n = 0; n < s->steps; n++) {
+    for (int n = 0; n < s->steps; n += 2) {
         bt_world *again = take_up(&t, &state[n]);
         bt_snapshot as_read = {0};
         save(&t, again, &as_read);
@@ -296,9 +296,9 @@ static void goes_on_from_every_step(const struct scenario *s)
     bt_case_free(&t.c);
 }
 
-TEST(a_run_goes_on_from_every_step)
+TEST(a_run_goes_on_from_every_other_step)
 {
-    for (int k = 0; k < N_SCENARIOS; k++) goes_on_from_every_step(&scenarios[k]);
+    for (int k = 0; k < N_SCENARIOS; k++) goes_on_from_every_other_step(&scenarios[k]);
 }
 
 // --- the file --------------------------------------------------------------------------------------------------------

@@ -384,8 +384,8 @@ static void assert_shares(const bt_case *large, bt_case c, const char *what)
 // body's image over the seam is forgotten (overlap).
 TEST(test_cut)
 {
-    const double concentration[] = {0.2, 0.5, 0.8, 0.9};
-    for (int k = 0; k < 4; k++)
+    const double concentration[] = {0.2, 0.9};
+    for (int k = 0; k < 2; k++)
         for (int seed = 7; seed < 9; seed++) {
             bt_case c = basin(), wide;
             c.ice.concentration = concentration[k], c.ice.seed = seed;
