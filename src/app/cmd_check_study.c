@@ -7,12 +7,9 @@
 #include "app/cmd_check.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
-#include "base/fileio.h"
 #include "base/largest.h"
-#include "base/tree.h"
 #include "base/units.h"
 #include "case/schema.h"
-#include "case/case_base.h"
 #include "run/study.h"
 
 #include <inttypes.h>

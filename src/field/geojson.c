@@ -17,7 +17,6 @@
 // geographic frame; rings are reversed as needed. A MultiPolygon of one polygon counts as a Polygon. A height (third
 // coordinate) is ignored. With ice.outlines_crs: frame, files of earlier versions of this program are read: metres [x,
 // y] of the frame.
-#include <errno.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>

@@ -12,7 +12,6 @@
 #include "partition/domain.h"
 #include "solve/kernel.h"
 #include "space/cells.h"
-#include "space/phases.h"
 
 // --- contacts of the body --------------------------------------------------------------------------------------------
 

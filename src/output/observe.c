@@ -14,7 +14,6 @@
 
 #include "bergtow/forces.h"
 #include "loads/impact.h"
-#include "solve/solver.h"
 #include "bergtow/sum.h"
 #include "contact/row.h"
 #include "space/cells.h"

@@ -19,7 +19,6 @@
 #include "output/observe.h"
 #include "solve/batch.h"
 #include "solve/islands.h"
-#include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_files.h"

@@ -22,7 +22,6 @@
 #include "field/map_crs.h"
 #include "output/checkpoint.h"
 #include "bergtow/quantity.h"
-#include "output/folder.h"
 #include "output/quantity_list.h"
 #include "output/steady.h"
 #include "run/ensemble_record.h"

@@ -86,9 +86,6 @@ typedef struct bt_splitting {
 
 void bt_splitting_free(bt_splitting *splitting);
 
-/// Number of pieces so far.
-static inline bt_gid bt_splitting_pieces(const bt_splitting *splitting) { return splitting ? 2 * splitting->n : 0; }
-
 /// The split that made piece k (from 0); the piece is its number k % 2.
 static inline const bt_split_record *bt_splitting_birth(const bt_splitting *splitting, bt_gid k)
 {
