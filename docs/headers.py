@@ -7,7 +7,7 @@ import re
 from tables import plain, write
 
 ATTRIBUTE = re.compile(r"\s*__attribute__\s*\(\(.*?\)\)(?=\s*[;,])", re.S)
-FOR_CPP = re.compile(r"^#ifdef __cplusplus\n.*?^#endif\n", re.S | re.M)
+FOR_CPP = re.compile(r"^#ifdef __cplusplus\b.*?^#endif\n|^BT_(?:BEGIN|END)_C\n", re.S | re.M)
 NAME = re.compile(r"\b(bt_\w+|BT_\w+)\s*\(")
 
 

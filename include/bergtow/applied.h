@@ -15,9 +15,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// Numbers in a row of loads. Explicit: FX, FY (N), MOMENT (N m). Linear, taken at the end of the step, j − K (U, ω) as
 /// in bt_load: G, GX, GY, GW (kg/s, kg m/s, kg m/s, kg m²/s), JX, JY, JW (N, N, N m). A force that decreases with the
@@ -57,8 +55,6 @@ bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *fo
 /// Is there a force with a function?
 bool bt_force_is_applied(void);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -12,9 +12,15 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#ifdef __cplusplus
-extern "C" {
+#ifdef __cplusplus // declarations have the linkage of C
+#define BT_BEGIN_C extern "C" {
+#define BT_END_C }
+#else
+#define BT_BEGIN_C
+#define BT_END_C
 #endif
+
+BT_BEGIN_C
 
 #define BT_VERSION "0.1.0"
 
@@ -107,8 +113,6 @@ static inline double bt_max(double a, double b) { return a > b ? a : b; }
 
 #define BT_PI 3.14159265358979323846
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -21,9 +21,7 @@
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef enum {
     BT_DYNAMIC,   ///< moved by forces and contacts
@@ -147,8 +145,6 @@ static inline int bt_part_next(const bt_bodies *bodies, bt_idx i, int part)
     return bodies->offset[i] + next < bodies->offset[i + 1] ? next : -1;
 }
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -11,9 +11,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // basin, geographic
 // wall, periodic, open, moving (ends only)
@@ -363,8 +361,6 @@ void bt_case_list_keys(void *stream);
 /// choices and meaning; the range is in the unit that a number without a unit has.
 void bt_case_list_keys_json(void *stream);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -12,9 +12,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// Span at a pull > 0, m. length and stiffness EA > 0, weight > 0.
 double bt_catenary_span(double length, double stiffness, double weight, double pull);
@@ -23,8 +21,6 @@ double bt_catenary_span(double length, double stiffness, double weight, double p
 /// same bits on every machine.
 double bt_catenary_pull(double length, double stiffness, double weight, double span, double *tangent);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

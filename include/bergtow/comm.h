@@ -16,9 +16,7 @@
 #include "bergtow/base.h"
 #include "bergtow/sum.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef struct bt_comm {
     MPI_Comm mpi;    ///< MPI_COMM_NULL without MPI; never used when size is 1
@@ -106,8 +104,6 @@ bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx 
 /// [*total][width] there, to be freed by the caller; NULL and *total = 0 elsewhere.
 double *bt_comm_gather(const bt_comm *comm, int64_t n, int width, const double *rows, int64_t *total);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -18,9 +18,7 @@
 #include "bergtow/law_key.h"
 #include "bergtow/world.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// A contact of two bodies, as passed to a law.
 typedef struct bt_law_contact {
@@ -86,8 +84,6 @@ int bt_n_contact_laws(void);
 /// The k-th added law, from 0, in the order of registration.
 const bt_contact_law *bt_contact_law_of(int k);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

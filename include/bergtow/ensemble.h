@@ -39,9 +39,7 @@
 #include "bergtow/comm.h"
 #include "bergtow/study.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 enum {
     BT_MAX_ATTEMPTS = 20,     ///< most attempts of a member whose process dies each time
@@ -89,8 +87,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
 /// texts, which are NULL if there is none; the pointers may be NULL.
 bt_member_state bt_ensemble_state(const char *folder, int *code, char **failure, char **why);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -48,9 +48,7 @@
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// The program's own estimates; registered ones follow.
 typedef enum {
@@ -155,8 +153,6 @@ void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_
 /// Area-weighted means of a field: thickness and equivalent radius of the floes, m. 0 without floes.
 void bt_estimate_field(const bt_field *field, double *thickness, double *radius);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

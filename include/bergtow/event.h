@@ -8,9 +8,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// Append only, never renumber: result.h5 contains the numbers.
 typedef enum {
@@ -43,8 +41,6 @@ extern const char *const bt_event_names[];
 /// One event as a sentence without its time: "branch 1 of the tow line broke at 2.04e+05 N".
 void bt_event_describe(const bt_event *event, char out[160]);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

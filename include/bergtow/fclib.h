@@ -5,9 +5,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// Places of the contacts and bodies of a problem, which FCLIB's format does not have, for pictures. Normals point from
 /// the first body of a contact to the second, levers from the centroid of each to the contact point, all in the world
@@ -45,8 +43,6 @@ typedef struct bt_fclib_problem {
 /// format cannot hold, such as one without contacts), BT_ERR_IO.
 bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors *err);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -8,9 +8,7 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// Counts of changes to outlines that were read.
 typedef struct bt_outline_counts {
@@ -146,8 +144,6 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
 /// contents of the file.
 bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconvex, bt_errors *err);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

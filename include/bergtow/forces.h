@@ -54,9 +54,7 @@
 #include "bergtow/law_key.h"
 #include "bergtow/world.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 enum {
     BT_MAX_FORCE_LAWS = 64,
@@ -228,8 +226,6 @@ void bt_forces_load(const bt_world *world, bt_idx i, const bt_vel *u, bt_load *l
 bt_drag bt_forces_drag(const bt_moments *moments, double draft, double sail, double water_density, double air_density,
                        double water_form, double water_skin, double air_form, double air_skin);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

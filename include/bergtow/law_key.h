@@ -8,9 +8,7 @@
 
 #include "bergtow/case.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// An added key: always a real number.
 typedef struct bt_law_key {
@@ -34,8 +32,6 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
 /// read; otherwise the result is undefined.
 void bt_keys_get(const bt_case *input, const char *section, const bt_law_key *keys, int n, double *own);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

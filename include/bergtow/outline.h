@@ -5,9 +5,7 @@
 
 #include "bergtow/shape.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 enum { BT_MAX_PART_VERTICES = 3 * BT_MAX_VERTICES }; ///< of all parts of one outline: at most n + 2 (n − 3)
 
@@ -63,8 +61,6 @@ bool bt_outline_in_degrees(double lon, double lat, bool narrow);
 /// projection, which no pole and no meridian disturbs; where they lie far apart, their mean direction. (0, 0) of none.
 void bt_outline_middle(int64_t n, const double *place, double middle[2]);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -5,9 +5,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 /// Largest numbers: of contact laws, the program's own included; of added ones (contact.h); of parameters `own` of one
 /// law; of numbers of one added law; of numbers of all the program's own laws together.
@@ -49,8 +47,6 @@ typedef struct bt_params {
     int64_t exposure_steps; ///< steps between evaluations, 0 = never: all bodies have their whole drag
 } bt_params;
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -14,9 +14,7 @@
 
 #include "bergtow/world.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 enum { BT_MAX_ADDED = 32 }; ///< most quantities besides the program's own
 
@@ -87,8 +85,6 @@ const bt_quantity *bt_added(int k);
 /// of the series with role BT_ROLE_BALANCE. Made anew whenever quantities are added; not thread-safe.
 const char *bt_balance_words(void);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

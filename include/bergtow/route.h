@@ -25,9 +25,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 enum {
     BT_ROUTE_TERMS = 5,   ///< of the force: water, plough, compaction, large, rafting
@@ -138,8 +136,6 @@ double bt_route_dubins(const double from[3], const double to[3], double radius, 
 /// Length, m, of one of the words LSL, RSR, LSR, RSL, RLR, LRL, 0 to 5; INFINITY if it does not exist.
 double bt_route_word(const double from[3], const double to[3], double radius, int word, double leg[3][2]);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -9,9 +9,7 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef struct bt_run_options {
     const char *dir;          ///< output folder
@@ -54,8 +52,6 @@ bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *options, bt_e
 /// OMP_NUM_THREADS, else its available cores; cores also available to other ranks are divided among them.
 int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

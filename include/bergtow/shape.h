@@ -8,9 +8,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 #define BT_MAX_VERTICES 128 ///< of one polygon; the contact code keeps per-pair buffers of this length
 
@@ -75,8 +73,6 @@ enum { BT_MAX_ADDED_SHAPES = 4 };
 /// missing or used name, no convex outline of 2 × 1 m, no room.
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -37,9 +37,7 @@
 #include "bergtow/applied.h"
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef struct bt_simulation bt_simulation;
 
@@ -204,8 +202,6 @@ void bt_release(char *text);
 /// "0.1.0"
 const char *bt_version(void);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -5,9 +5,7 @@
 
 #include "bergtow/base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef struct bt_mean {
     double mean, sd;    ///< of the samples
@@ -58,8 +56,6 @@ int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double 
 /// The last start tried: a minimum there is the end of the search, not a minimum of the series.
 int64_t bt_stats_last_start(int64_t n, int64_t first);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

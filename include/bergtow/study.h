@@ -40,9 +40,7 @@
 
 #include "bergtow/case.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 typedef enum { BT_SAMPLING_GRID, BT_SAMPLING_LATIN_HYPERCUBE } bt_sampling;
 /// Seeds of the fields: from seed, condition and repeat; from seed and repeat; seed + repeat.
@@ -144,8 +142,6 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err);
 /// Are two such texts equal apart from comments, which describe keys and may differ between program versions?
 bool bt_study_resolved_alike(const char *a, const char *b);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

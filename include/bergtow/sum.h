@@ -10,12 +10,10 @@
 #define BERGTOW_SUM_H
 
 #include <math.h>
-#include <stdbool.h>
-#include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "bergtow/base.h"
+
+BT_BEGIN_C
 
 __extension__ typedef __int128 bt_int128;
 __extension__ typedef unsigned __int128 bt_uint128;
@@ -50,8 +48,6 @@ static inline void bt_sum_join(bt_sum *sum, const bt_sum *more)
 /// The sum as a double, rounded once; NaN if a term was bad.
 static inline double bt_sum_value(const bt_sum *sum) { return sum->bad ? (double)NAN : (double)sum->v * 0x1p-64; }
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

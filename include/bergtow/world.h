@@ -8,9 +8,7 @@
 #include "bergtow/event.h"
 #include "bergtow/params.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+BT_BEGIN_C
 
 struct bt_cells;
 struct bt_solver;
@@ -133,8 +131,6 @@ bt_overlaps bt_world_overlaps(bt_world *world, double allowed);
 /// the water, tow. Equal for equal states, however stored or distributed.
 uint64_t bt_world_hash(const bt_world *world);
 
-#ifdef __cplusplus
-}
-#endif
+BT_END_C
 
 #endif

@@ -138,7 +138,6 @@ _SIGNATURES = {
     "bt_route_through": (None, POINTER(RouteTask), c_int, POINTER(c_double), POINTER(RoutePlan)),
     "bt_route_free": (None, POINTER(RoutePlan)),
     "bt_route_cover": (None, POINTER(RouteTask), c_int64, c_int64, POINTER(c_double)),
-    "bt_route_dubins": (c_double, POINTER(c_double), POINTER(c_double), c_double, POINTER(c_double)),
     "bt_list_json": (c_void_p, c_char_p),
     "bt_release": (None, c_void_p),
     "bt_force_apply": (c_int, c_char_p, c_char_p, APPLIED_FORCE, c_void_p, POINTER(Errors)),

@@ -6,7 +6,6 @@
 #include "bergtow/comm.h"
 #include "case/arch.h"
 #include "case/case_check.h"
-#include "case/constraints.h"
 #include "case/case_tow.h"
 #include "case/cost.h"
 #include "case/ice_bounds.h"

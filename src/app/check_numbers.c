@@ -17,7 +17,7 @@
 #include "case/arch.h"
 #include "case/case_derived.h"
 #include "case/case_tow.h"
-#include "case/constraints.h"
+#include "case/case_check.h"
 #include "case/cost.h"
 #include "case/rope.h"
 #include "case/schema.h"

@@ -42,6 +42,10 @@ int64_t bt_cmd_number(const struct argp_state *state, const char *option, const 
 /// out/NAME for path/NAME.yml; the caller frees it.
 char *bt_cmd_default_folder(const char *path);
 
+/// Ends the program with a message and code 2 if this processor lacks instructions for which it was compiled. May be
+/// called before the constructors of libraries.
+void bt_processor_check(void);
+
 /// The command as it could be typed again, for the provenance of the result. argv[0] is the command. The caller frees
 /// it.
 char *bt_cmd_join(int argc, char **argv);

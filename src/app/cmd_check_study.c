@@ -7,12 +7,9 @@
 #include "app/cmd_check.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
-#include "base/fileio.h"
 #include "base/largest.h"
-#include "base/tree.h"
 #include "base/units.h"
 #include "case/schema.h"
-#include "case/case_base.h"
 #include "run/study.h"
 
 #include <inttypes.h>
@@ -325,9 +322,7 @@ bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err)
     bt_status status = bt_study_read(&study, file->path, err);
     if (status == BT_OK) status = bt_study_override(&study, file->set, file->n_set, err);
     if (status == BT_OK && ranks > 1) status = bt_study_fits(&study, ranks, err);
-    const size_t before = err->n;
-    if (status == BT_OK) bt_study_check_ice(&study, err);
-    if (err->n > before) status = BT_ERR_CASE;
+    if (status == BT_OK) status = bt_study_check_ice(&study, err);
     if (status == BT_OK) {
         numbers *sums = bt_alloc((size_t)study.n_conditions, sizeof *sums);
         bt_errors warnings = {0};

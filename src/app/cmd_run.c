@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 // bergtow run: run a case and write a result folder.
-#include "output/checkpoint.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
-#include "base/fileio.h"
 #include "base/process.h"
 
 #include <inttypes.h>

@@ -2,12 +2,11 @@
 // The program bergtow: options that need no command, and the dispatch to the commands.
 #include "bergtow/comm.h"
 #include "app/cmd.h"
-#include "app/processor.h"
 #include "revision.h"
 #include "base/process.h"
 #include "base/name.h"
 #include "case/case_base.h"
-#include "output/quantity_list.h"
+#include "output/summary_keys.h"
 
 #include <omp.h>
 #include <sched.h>

@@ -4,7 +4,7 @@
 // As built by the Makefile, the program runs on any x86-64 or ARM, and uses AVX2 if available. If
 // EXTRA_CFLAGS=-march=native or a packager's flags allow more, an older processor of the same cluster would end it at
 // the first instruction that it does not know, with SIGILL and no message.
-#include "app/processor.h"
+#include "app/cmd.h"
 
 #include <stddef.h>
 #include <string.h>

@@ -163,24 +163,19 @@ static char *room_for(hid_t type, hid_t space)
     return one ? bt_alloc(H5Tget_size(type) + 1, 1) : NULL;
 }
 
-/// Return the text if it was read; otherwise free it and return NULL.
-static char *read_or_not(char *text, bool read)
-{
-    if (read) return text;
-    free(text);
-    return NULL;
-}
-
 char *bt_h5_read_word(bt_h5_reader *reader, const char *name)
 {
     if (reader->status != BT_OK || H5Aexists_by_name(reader->file, "/", name, H5P_DEFAULT) <= 0) return NULL;
     const hid_t a = H5Aopen_by_name(reader->file, "/", name, H5P_DEFAULT, H5P_DEFAULT),
                 type = a < 0 ? -1 : H5Aget_type(a), space = a < 0 ? -1 : H5Aget_space(a);
     char *text = room_for(type, space), *variable = NULL;
-    if (text) text = read_or_not(text, H5Aread(a, type, text) >= 0);
-    else if (type >= 0 && H5Tis_variable_str(type) > 0 && H5Sget_simple_extent_npoints(space) == 1 &&
-             H5Aread(a, type, &variable) >= 0 && variable)
+    if (text && H5Aread(a, type, text) < 0) {
+        free(text);
+        text = NULL;
+    } else if (!text && type >= 0 && H5Tis_variable_str(type) > 0 && H5Sget_simple_extent_npoints(space) == 1 &&
+               H5Aread(a, type, &variable) >= 0 && variable) {
         text = bt_text_copy(variable);
+    }
     if (variable) H5free_memory(variable);
     if (space >= 0) H5Sclose(space);
     if (type >= 0) H5Tclose(type);

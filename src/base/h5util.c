@@ -249,13 +249,6 @@ static hid_t quiet_creation(void)
     return p;
 }
 
-/// Set the filters that read the chunks of bt_h5_write_chunk.
-static void set_filters(hid_t create)
-{
-    H5Pset_shuffle(create);
-    H5Pset_deflate(create, 1);
-}
-
 /// Takes over `create` and `space`, and closes them.
 static void write_in_space(bt_h5 *h5, const char *name, hid_t create, hid_t type, hid_t space, const void *data)
 {
@@ -278,7 +271,10 @@ static hid_t layout(const bt_h5 *h5, int rank, const hsize_t *chunk, bool packed
 {
     const hid_t p = quiet_creation();
     if (chunk) H5Pset_chunk(p, rank, chunk);
-    if (packed) set_filters(p);
+    if (packed) { // the filters that read the chunks of bt_h5_write_chunk
+        H5Pset_shuffle(p);
+        H5Pset_deflate(p, 1);
+    }
     if (bt_h5_shared(h5)) {
         H5Pset_alloc_time(p, H5D_ALLOC_TIME_EARLY);
         H5Pset_fill_time(p, H5D_FILL_TIME_NEVER);

@@ -153,15 +153,9 @@ void bt_json_free(bt_json *json)
 /// Does `key` belong to the object of this name?
 static bool inside(const char *key, const char *object, size_t n) { return !strncmp(key, object, n) && key[n] == '.'; }
 
-static const char *last_part(const char *key)
-{
-    const char *dot = strrchr(key, '.');
-    return dot ? dot + 1 : key;
-}
-
 static void write_value(bt_json *json, const bt_json_key *k, const struct bt_json_view *view, const void *source)
 {
-    const char *key = last_part(k->key), *at = source ? (const char *)source + k->offset : NULL;
+    const char *key = bt_last_part(k->key), *at = source ? (const char *)source + k->offset : NULL;
     switch (k->kind) {
     case BT_JSON_REAL: bt_json_number(json, key, k->number ? k->number(view)
                                                            : *(const double *)(const void *)at); break;
@@ -197,10 +191,10 @@ void bt_json_keys_write(bt_json *json, const bt_json_key *keys, int n, const str
         if (key->kind != BT_JSON_GROUP) {
             if (there) write_value(json, key, view, source[key->from]);
         } else if (there) {
-            bt_json_open(json, last_part(key->key), '{');
+            bt_json_open(json, bt_last_part(key->key), '{');
             open[depth++] = strlen(key->key);
         } else {
-            bt_json_string(json, last_part(key->key), NULL);
+            bt_json_string(json, bt_last_part(key->key), NULL);
             while (i + 1 < n && inside(keys[i + 1].key, key->key, strlen(key->key))) i++;
         }
     }

@@ -10,7 +10,6 @@
 
 #include <stdio.h>
 
-#include "bergtow/case.h"
 
 enum {
     BT_MOST_TEXT_BYTES = 16 << 20,     ///< a case or study file

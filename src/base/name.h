@@ -3,6 +3,8 @@
 #ifndef BT_NAME_H
 #define BT_NAME_H
 
+#include <string.h>
+
 #include "bergtow/base.h"
 
 enum { BT_LONGEST_KEY = 64 };   ///< bytes of the longest name of a key, with the 0 at its end
@@ -17,6 +19,13 @@ extern bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
 
 /// Take the next of several names separated by blanks, such as those of keys, cut to the room; false after the last.
 bool bt_next_name(const char **names, char name[BT_LONGEST_KEY]);
+
+/// The part of a name after its last dot.
+static inline const char *bt_last_part(const char *name)
+{
+    const char *dot = strrchr(name, '.');
+    return dot ? dot + 1 : name;
+}
 
 /// Bytes of the valid UTF-8 sequence at s (RFC 3629), a zero-terminated text; 0 if there is none.
 size_t bt_utf8_length(const unsigned char *s);

@@ -9,7 +9,6 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
-#include "case/constraints.h"
 #include "case/cost.h"
 #include "case/ice_bounds.h"
 #include "base/elementary.h"

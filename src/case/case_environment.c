@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "bergtow/shape.h"
-#include "case/schema.h"
 #include "base/elementary.h"
 #include "base/table.h"
 

@@ -9,7 +9,6 @@
 // open water is a value of ice.concentration like others.
 //
 // Limits: a value against a number or against another key, and combinations that are refused.
-#include "case/constraints.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -12,7 +12,6 @@
 #include <string.h>
 
 #include "case/case_check.h"
-#include "case/constraints.h"
 #include "case/schema.h"
 
 static const struct {

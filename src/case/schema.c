@@ -632,12 +632,6 @@ bool bt_schema_is_section(const char *name)
     return false;
 }
 
-static const char *last_part(const char *name)
-{
-    const char *dot = strrchr(name, '.');
-    return dot ? dot + 1 : name;
-}
-
 const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char buffer[64])
 {
     int least = bt_suggest_limit(name) + 1;
@@ -645,7 +639,7 @@ const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char 
     // A known last part in the wrong section counts as one edit: run.seed is nearer to ice.seed than to anything else.
     for (int i = 0; i < n; i++) {
         int d = bt_suggest_distance(name, keys[i].name, least);
-        if (d > 1 && !strcmp(last_part(name), last_part(keys[i].name))) d = 1;
+        if (d > 1 && !strcmp(bt_last_part(name), bt_last_part(keys[i].name))) d = 1;
         if (d < least) {
             least = d;
             best = keys[i].name;

@@ -5,7 +5,6 @@
 #include "base/largest.h"
 #include "base/name.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>

@@ -208,12 +208,6 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
     return estimate;
 }
 
-/// Area-weighted mean diameter, <d³>/<d²>.
-static double weighted_size(const bt_case *input)
-{
-    return bt_case_size_moment(input, 3) / bt_case_size_moment(input, 2);
-}
-
 void bt_estimate_conditions(const bt_case *input, bt_estimate_input *in)
 {
     bt_estimate_ordered(input, (const double[]){NAN, NAN}, in);
@@ -225,7 +219,8 @@ void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_
     *in = (bt_estimate_input){
         .concentration = input->ice.concentration,
         .thickness = input->ice.thickness,
-        .floe_radius = 0.5 * weighted_size(input),
+        // weighted by area
+        .floe_radius = 0.5 * (bt_case_size_moment(input, 3) / bt_case_size_moment(input, 2)),
         .speed = NAN,
         .along = NAN,
         .water_speed = NAN,

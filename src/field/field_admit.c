@@ -9,8 +9,6 @@
 
 #include "bergtow/outline.h"
 #include "field/field_make.h"
-#include "case/ice_bounds.h"
-#include "field/map_crs.h"
 #include "base/elementary.h"
 
 void bt_refuse(bt_refusals *refusals, const char *fmt, ...)

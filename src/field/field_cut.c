@@ -53,19 +53,9 @@ static bool in_obstacle(const bt_region *region, int n, const double *v, double 
         const bt_obstacle *obstacle = &region->obstacles[k];
         const double dx = obstacle->x - x, dy = obstacle->y - z, reach = obstacle->radius + radius;
         if (dx * dx + dy * dy >= reach * reach) continue;
-        double own[2 * BT_MAX_VERTICES];
-        for (int i = 0; i < obstacle->n; i++)
-            own[2 * i] = obstacle->v[2 * i] - obstacle->x, own[2 * i + 1] = obstacle->v[2 * i + 1] - obstacle->y;
-        if (bt_apart_of(n, v, obstacle->n, own, dx, dy).gap < 0) return true;
+        if (bt_region_apart(obstacle, n, v, dx, dy).gap < 0) return true;
     }
     return false;
-}
-
-/// Range of the vertices along coordinate k, m.
-static void reach_of(int n, const double *v, int k, double *low, double *high)
-{
-    *low = INFINITY, *high = -INFINITY;
-    for (int i = 0; i < n; i++) *low = bt_min(*low, v[2 * i + k]), *high = bt_max(*high, v[2 * i + k]);
 }
 
 /// Clip the polygon v in place at the cut sides that it crosses, less the clearance; returns the number of vertices
@@ -75,10 +65,9 @@ static int part_within(const axis axes[2], double clearance, int n, double *v, b
     double out[2 * BT_MAX_VERTICES + 16];
     for (int k = 0; k < 2; k++)
         for (int end = 0; end < 2; end++) {
-            double low, high;
-            reach_of(n, v, k, &low, &high);
+            const bt_box box = bt_box_of(n, v);
             const double sign = end ? 1 : -1, side = end ? axes[k].high : axes[k].low;
-            if (!(end ? axes[k].at_high && high > side : axes[k].at_low && low < side)) continue;
+            if (!(end ? axes[k].at_high && box.high[k] > side : axes[k].at_low && box.low[k] < side)) continue;
             *crossed = true;
             n = bt_shape_clip(n, v, k ? 0 : sign, k ? sign : 0, sign * side - clearance, out);
             if (n < 3) return 0;

@@ -168,10 +168,7 @@ void bt_field_growth(const bt_region *region, const bt_field *field, double limi
             const bt_obstacle *obstacle = &region->obstacles[o];
             double dx = obstacle->x - x, dy = obstacle->y - z, reach = limit * radius[i] + obstacle->radius;
             if (dx * dx + dy * dy >= reach * reach) continue;
-            double rel[2 * BT_MAX_VERTICES];
-            for (int k = 0; k < obstacle->n; k++)
-                rel[2 * k] = obstacle->v[2 * k] - obstacle->x, rel[2 * k + 1] = obstacle->v[2 * k + 1] - obstacle->y;
-            clearance[i] = bt_min(clearance[i], bt_apart_of(n, v, obstacle->n, rel, dx, dy).first);
+            clearance[i] = bt_min(clearance[i], bt_region_apart(obstacle, n, v, dx, dy).first);
         }
     }
     clearance_search search = {field, outline, radius, limit, clearance};

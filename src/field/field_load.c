@@ -6,7 +6,7 @@
 #include "bergtow/field.h"
 #include "case/warning.h"
 #include "case/ice_bounds.h"
-#include "case/constraints.h"
+#include "case/case_check.h"
 #include "field/field_admit.h"
 #include "field/field_make.h"
 #include "field/map_crs.h"

@@ -312,11 +312,6 @@ double bt_field_thickness(const bt_case *input, bt_idx i)
     return bt_min(most, bt_max(least, h * bt_exp(sqrt(s2) * bt_rng_normal(&rng) - s2 / 2)));
 }
 
-static void set_thickness(const bt_case *input, bt_field *field)
-{
-    for (bt_idx i = 0; i < field->n; i++) field->thickness[i] = bt_field_thickness(input, i);
-}
-
 static bt_status make(const bt_case *input, const bt_region *region, const bt_sizes *sizes, bt_field *field,
                       bt_errors *err)
 {
@@ -346,7 +341,7 @@ static bt_status make(const bt_case *input, const bt_region *region, const bt_si
     }
     if (status != BT_OK) return status;
     bt_field_sort(field, region);
-    set_thickness(input, field);
+    for (bt_idx i = 0; i < field->n; i++) field->thickness[i] = bt_field_thickness(input, i);
     return BT_OK;
 }
 

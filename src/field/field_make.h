@@ -32,6 +32,8 @@ void bt_region_of_domain(bt_region *region, const bt_case *input);
 void bt_region_free(bt_region *region);
 /// Area within the region of a polygon and of its images across edges where the domain of the case wraps, m².
 double bt_region_area_of(const bt_region *region, const bt_case *input, int n, const double *v);
+/// Distance of a floe v [n][2], about its centroid, from an obstacle at (dx, dy) from there.
+bt_apart bt_region_apart(const bt_obstacle *obstacle, int n, const double *v, double dx, double dy);
 /// Bring a point into the region along its periodic directions.
 void bt_region_wrap(const bt_region *region, double *px, double *py);
 

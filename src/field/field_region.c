@@ -60,6 +60,14 @@ double bt_region_area_of(const bt_region *region, const bt_case *input, int n, c
     return sum;
 }
 
+bt_apart bt_region_apart(const bt_obstacle *obstacle, int n, const double *v, double dx, double dy)
+{
+    double own[2 * BT_MAX_VERTICES];
+    for (int i = 0; i < obstacle->n; i++)
+        own[2 * i] = obstacle->v[2 * i] - obstacle->x, own[2 * i + 1] = obstacle->v[2 * i + 1] - obstacle->y;
+    return bt_apart_of(n, v, obstacle->n, own, dx, dy);
+}
+
 /// Box around polygon v, aligned with its longest edge, and larger by `clearance` on all sides.
 static void box_about(int n, const double *v, double clearance, double box[8])
 {
@@ -252,23 +260,16 @@ int bt_tessellation_clear(const bt_region *region, int n, double *v, bool boxed)
         if (n > 4 * BT_TESSELLATION_VERTICES) // many obstacles around one cell
             n = bt_tessellation_clean(n, v, 0, BT_TESSELLATION_VERTICES);
         const bt_obstacle *obstacle = &region->obstacles[k];
-        double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-        for (int i = 0; i < n; i++) {
-            x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
-            y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
-        }
-        if (x0 > obstacle->x + obstacle->radius || x1 < obstacle->x - obstacle->radius ||
-            y0 > obstacle->y + obstacle->radius || y1 < obstacle->y - obstacle->radius) continue;
+        const bt_box cell = bt_box_of(n, v);
+        if (cell.low[0] > obstacle->x + obstacle->radius || cell.high[0] < obstacle->x - obstacle->radius ||
+            cell.low[1] > obstacle->y + obstacle->radius || cell.high[1] < obstacle->y - obstacle->radius) continue;
         const double *outline = obstacle->v;
         int m = obstacle->n;
         double box[8];
         if (boxed) {
-            double bx0 = INFINITY, bx1 = -INFINITY, by0 = INFINITY, by1 = -INFINITY;
-            for (int i = 0; i < obstacle->n; i++) {
-                bx0 = bt_min(bx0, obstacle->v[2 * i]), bx1 = bt_max(bx1, obstacle->v[2 * i]);
-                by0 = bt_min(by0, obstacle->v[2 * i + 1]), by1 = bt_max(by1, obstacle->v[2 * i + 1]);
-            }
-            memcpy(box, (double[8]){bx0, by0, bx1, by0, bx1, by1, bx0, by1}, sizeof box);
+            const bt_box b = bt_box_of(m, outline);
+            memcpy(box, (double[8]){b.low[0], b.low[1], b.high[0], b.low[1], b.high[0], b.high[1], b.low[0], b.high[1]},
+                   sizeof box);
             outline = box;
             m = 4;
         }

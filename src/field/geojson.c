@@ -17,7 +17,6 @@
 // geographic frame; rings are reversed as needed. A MultiPolygon of one polygon counts as a Polygon. A height (third
 // coordinate) is ignored. With ice.outlines_crs: frame, files of earlier versions of this program are read: metres [x,
 // y] of the frame.
-#include <errno.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -394,13 +393,6 @@ static void read_feature(reader *in, size_t index)
     if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&in->r, "%s: %s", name_of(in, index, name), why);
 }
 
-/// Metres of the kind the case names, for a file without a crs.
-static void choose_metres(reader *in)
-{
-    in->kind = in->c->ice.outlines_crs == BT_CRS_PLANE ? PLANE : FRAME;
-    snprintf(in->crs.name, sizeof in->crs.name, "local");
-}
-
 /// Find the kind of the coordinates from the file's crs or the case; refuse a file that contradicts the case.
 static void choose_coordinates(reader *in, const json_t *root)
 {
@@ -452,7 +444,8 @@ static void choose_coordinates(reader *in, const json_t *root)
                   "east and north",
                   name, in->r.path);
     } else if (metres) {
-        choose_metres(in);
+        in->kind = in->c->ice.outlines_crs == BT_CRS_PLANE ? PLANE : FRAME;
+        snprintf(in->crs.name, sizeof in->crs.name, "local");
     } else {
         in->kind = DEGREES;
         in->assumed = !degrees;

@@ -9,7 +9,6 @@
 // 3°, polar: any). Mercator is refused: at 76° its metre is a quarter of a metre on the ground. Codes: EPSG registry.
 #include "field/map_crs.h"
 
-#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

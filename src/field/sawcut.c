@@ -22,11 +22,8 @@ static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order
 // have: a floe of area a is √(a aspect) long, unless the cell is shorter, or narrower than a over that length.
 static void shape_piece(double *v, double area, double aspect)
 {
-    double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-    for (int i = 0; i < 4; i++) {
-        x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
-        y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
-    }
+    const bt_box box = bt_box_of(4, v);
+    const double x0 = box.low[0], x1 = box.high[0], y0 = box.low[1], y1 = box.high[1];
     bool along_x = x1 - x0 >= y1 - y0; // the long side along the cell's long side
     double l = along_x ? x1 - x0 : y1 - y0, w = along_x ? y1 - y0 : x1 - x0;
     double a = bt_min(1.03 * area, l * w); // some room, for the common factor that makes up for floes that do not fit

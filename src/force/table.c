@@ -37,11 +37,6 @@ static void add_series_of(const bt_force_law *law)
 
 // --- a law of a program ----------------------------------------------------------------------------------------------
 
-static bool add_keys(const bt_force_law *law, bt_errors *err)
-{
-    return bt_keys_add(law->name, law->keys, law->n_keys, err);
-}
-
 /// Keys and series of the laws of the program, before main, so that every reader of the tables finds them complete. The
 /// first of all constructors (the lowest priority number that programs may use), so that constructors of other files
 /// can register laws.
@@ -49,8 +44,9 @@ __attribute__((constructor(101))) static void begin(void)
 {
     bt_errors err = {0};
     for (int k = 0; k < bt_n_force_laws; k++) {
-        add_keys(bt_force_laws[k], &err);
-        add_series_of(bt_force_laws[k]);
+        const bt_force_law *law = bt_force_laws[k];
+        bt_keys_add(law->name, law->keys, law->n_keys, &err);
+        add_series_of(law);
     }
     bt_keys_fault(&err);
 }
@@ -90,7 +86,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
         bt_errors_add(err, "force law %s: a program can have at most %d, and all are in use; give an applied force the "
                       "name of a force whose simulation has ended", name, BT_MAX_FORCE_LAWS);
     if (err->n == before) check_series(law, name, err);
-    if (err->n > before || !add_keys(law, err)) return BT_ERR_USAGE;
+    if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
     bt_force_laws[bt_n_force_laws++] = law;
     add_series_of(law);
     return BT_OK;

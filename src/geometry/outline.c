@@ -2,6 +2,7 @@
 // Simple polygons: cleaning, faults, convex parts, projection.
 #include "bergtow/outline.h"
 #include "base/elementary.h"
+#include "geometry/box.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,12 +18,8 @@ static double cross(const double *o, const double *p, const double *q)
 
 static double extent_of(int n, const double *v)
 {
-    double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-    for (int i = 0; i < n; i++) {
-        x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
-        y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
-    }
-    return n > 0 ? bt_hypot(x1 - x0, y1 - y0) : 0;
+    const bt_box box = bt_box_of(n, v);
+    return n > 0 ? bt_hypot(box.high[0] - box.low[0], box.high[1] - box.low[1]) : 0;
 }
 
 /// Is q between p and r on a straight line, or at the same place as p? A spike, where the line turns back, does not
@@ -102,17 +99,11 @@ bool bt_outline_crosses(int n, const double *v)
 
 const char *bt_outline_fault(int n, const double *v)
 {
-    if (n < 3) return "it has fewer than 3 vertices";
-    if (n > BT_MAX_VERTICES) return "it has more than 128 vertices";
-    for (int i = 0; i < 2 * n; i++)
-        if (!isfinite(v[i])) return "a vertex is not a finite number";
-    const double extent = extent_of(n, v), area2 = bt_outline_area2(n, v);
-    if (!(extent > 0) || !isfinite(extent * extent)) return "its vertices coincide or are out of range";
-    for (int i = 0; i < n; i++) {
-        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
-        if (bt_hypot(q[0] - p[0], q[1] - p[1]) <= NEAR * extent) return "two neighbouring vertices coincide";
-    }
+    double extent;
+    const char *fault = bt_ring_fault(n, v, NEAR, &extent);
+    if (fault) return fault;
     if (bt_outline_crosses(n, v)) return "its edges cross or touch each other";
+    const double area2 = bt_outline_area2(n, v);
     if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
     if (area2 < 0) return "its vertices run clockwise; list them anticlockwise (from +x towards +y)";
     return NULL;

@@ -175,18 +175,6 @@ bool bt_sweep_meets(const bt_moving *a, const bt_moving *b, double dx, double dy
 
 // --- flush outlines --------------------------------------------------------------------------------------------------
 
-typedef struct { double low[2], high[2]; } box;
-
-static box box_of(const bt_welded *outline)
-{
-    box bounds = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
-    for (int i = 0; i < 2 * outline->n; i++) {
-        bounds.low[i % 2] = bt_min(bounds.low[i % 2], outline->v[i]);
-        bounds.high[i % 2] = bt_max(bounds.high[i % 2], outline->v[i]);
-    }
-    return bounds;
-}
-
 /// Move x to its nearest place on `outline`, which is shifted by (dx, dy). False if that is not within reach.
 static bool place_on(const bt_welded *outline, double dx, double dy, double reach, double x[2])
 {
@@ -217,10 +205,10 @@ static bool sound(const bt_welded *outline, bool convex)
 void bt_weld(int n, bt_welded *outline, double reach, double period_x, double period_y)
 {
     const int images_x = period_x > 0, images_y = period_y > 0;
-    box *bounds = bt_alloc((size_t)n, sizeof *bounds);
+    bt_box *bounds = bt_alloc((size_t)n, sizeof *bounds);
     for (int i = 0; i < n; i++) {
         bt_welded moved = outline[i];
-        bounds[i] = box_of(&outline[i]);
+        bounds[i] = bt_box_of(outline[i].n, outline[i].v);
         bool done[BT_MAX_VERTICES] = {false}, any = false;
         for (int j = 0; j < i; j++)
             for (int kx = -images_x; kx <= images_x; kx++)
@@ -235,7 +223,7 @@ void bt_weld(int n, bt_welded *outline, double reach, double period_x, double pe
                                             any;
                 }
         if (any && sound(&moved, bt_outline_convex(outline[i].n, outline[i].v)))
-            outline[i] = moved, bounds[i] = box_of(&outline[i]);
+            outline[i] = moved, bounds[i] = bt_box_of(outline[i].n, outline[i].v);
     }
     free(bounds);
 }

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "bergtow/outline.h"
+#include "geometry/box.h"
 
 // --- distance and motion ---------------------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@
 // The antiderivative is checked by differentiation. As h → 0 the bracket stays bounded (h⁴ asinh(s/h) → 0).
 #include "bergtow/shape.h"
 #include "base/elementary.h"
+#include "geometry/box.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -79,24 +80,31 @@ bt_moments bt_shape_moments(int n, const double *v) { return moments(n, v, true)
 
 bt_moments bt_shape_extent(int n, const double *v) { return moments(n, v, false); }
 
-/// near: distance / extent up to which neighbouring vertices coincide; angle: largest turn the wrong way, rad.
-static const char *fault_of(int n, const double *v, double near, double angle)
+const char *bt_ring_fault(int n, const double *v, double near, double *extent)
 {
     if (n < 3) return "it has fewer than 3 vertices";
     if (n > BT_MAX_VERTICES) return "it has more than 128 vertices";
-    double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-    for (int i = 0; i < n; i++) {
-        if (!isfinite(v[2 * i]) || !isfinite(v[2 * i + 1])) return "a vertex is not a finite number";
-        x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
-        y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
-    }
+    for (int i = 0; i < 2 * n; i++)
+        if (!isfinite(v[i])) return "a vertex is not a finite number";
     // Lengths relative to the extent: 1e-9 of it is a tenth of a micron on a 100 m floe.
-    double extent = bt_hypot(x1 - x0, y1 - y0);
-    if (!(extent > 0) || !isfinite(extent * extent)) return "its vertices coincide or are out of range";
-    double area2 = 0, turned = 0;
+    const bt_box box = bt_box_of(n, v);
+    *extent = bt_hypot(box.high[0] - box.low[0], box.high[1] - box.low[1]);
+    if (!(*extent > 0) || !isfinite(*extent * *extent)) return "its vertices coincide or are out of range";
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
-        if (bt_hypot(q[0] - p[0], q[1] - p[1]) <= near * extent) return "two neighbouring vertices coincide";
+        if (bt_hypot(q[0] - p[0], q[1] - p[1]) <= near * *extent) return "two neighbouring vertices coincide";
+    }
+    return NULL;
+}
+
+/// near: distance / extent up to which neighbouring vertices coincide; angle: largest turn the wrong way, rad.
+static const char *fault_of(int n, const double *v, double near, double angle)
+{
+    double extent, area2 = 0, turned = 0;
+    const char *fault = bt_ring_fault(n, v, near, &extent);
+    if (fault) return fault;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
         area2 += cross(p[0] - v[0], p[1] - v[1], q[0] - v[0], q[1] - v[1]);
     }
     if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";

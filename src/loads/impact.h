@@ -40,6 +40,7 @@
 
 #include "bergtow/case.h"
 #include "bergtow/world.h"
+#include "contact/cell_contacts.h"
 #include "loads/panel.h"
 
 /// One manifold on the towed body in one step. Numbers only, so that ranks can exchange it as a row.
@@ -124,5 +125,30 @@ void bt_impacts_end(bt_impacts *impacts);
 
 /// Description of the conversion, such as "half-sine of 0.1 s".
 void bt_impact_describe(const bt_impact_rule *rule, char out[160]);
+
+// --- one contact as a collision --------------------------------------------------------------------------------------
+
+// Of the step just solved: the part of its impulse that stops the approach, and the corner in contact.
+
+typedef struct bt_collision {
+    double impulse;   ///< λ_c, N s
+    double whole;     ///< Λ: of this step and the next, if the collision continues there, N s
+    double approach;  ///< −v1 if the contact closes, otherwise 0, m/s
+    double rest;      ///< −v2 if it still closes, otherwise 0, m/s
+    double mass;      ///< m_e, kg
+    double ran, rbn;  ///< ra×n, rb×n of the pressure centre, m
+} bt_collision;
+
+/// The collision part of a contact with a normal impulse above 0, after the solve and before poses move.
+bt_collision bt_contact_collision(const bt_world *world, const bt_contact *contact);
+
+typedef struct bt_contact_corner {
+    double angle;     ///< interior, rad; NaN if there is none
+    int of;           ///< 0 = corner of a, 1 = of b; −1 = the sharper of two corners that meet
+} bt_contact_corner;
+
+/// The corner that makes a contact point of a pair of parts, from its feature as numbered by manifold.c.
+bt_contact_corner bt_contact_corner_of(const bt_world *world, const bt_contact *contact, const uint16_t part[2],
+                                       uint32_t feature);
 
 #endif

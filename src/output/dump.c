@@ -237,15 +237,6 @@ static void lever_of(double nx, double ny, double rn, double rt, double out[2])
     out[1] = rt * ny - rn * nx;
 }
 
-/// Row of a body: the original bodies first, then all pieces of floes, whose ids lie between those of the others.
-static int64_t row_of(const bt_world *world, bt_gid gid)
-{
-    const bt_splitting *splitting = world->splitting;
-    if (!splitting || gid < splitting->first) return gid;
-    return gid < splitting->first + splitting->reserve
-               ? world->bodies.n_global - splitting->reserve + gid - splitting->first : gid - splitting->reserve;
-}
-
 /// Places of the rows and of all bodies; the caller then owns the arrays.
 static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
 {
@@ -256,7 +247,7 @@ static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
     const bt_gid unborn = world->splitting ? world->splitting->reserve - 2 * world->splitting->n : 0;
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
-        body[2 * k] = row_of(world, p->gid_a), body[2 * k + 1] = row_of(world, p->gid_b);
+        body[2 * k] = bt_splitting_row(world, p->gid_a), body[2 * k + 1] = bt_splitting_row(world, p->gid_b);
         normal[2 * k] = p->nx, normal[2 * k + 1] = p->ny;
         lever_of(p->nx, p->ny, p->ran, p->rat, lever + 4 * k);
         lever_of(p->nx, p->ny, p->rbn, p->rbt, lever + 4 * k + 2);
@@ -265,7 +256,7 @@ static bt_fclib_places places_of(const bt_world *world, const row *rows, int n)
         const bt_idx i = bt_world_index(world, g);
         const double at[3] = {i < 0 ? NAN : bodies->pose[i].x, i < 0 ? NAN : bodies->pose[i].y,
                               i < 0 ? NAN : bodies->pose[i].yaw};
-        memcpy(pose + 3 * row_of(world, g), at, sizeof at);
+        memcpy(pose + 3 * bt_splitting_row(world, g), at, sizeof at);
     }
     return (bt_fclib_places){.time = (double)world->step * world->par.dt,
                              .dt = world->par.dt,

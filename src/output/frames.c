@@ -332,13 +332,6 @@ static void write_frame(bt_frames *frames, bt_slab *floes, bt_slab *others, cons
     free(buffer);
 }
 
-/// Only one rank writes the line, which is the same on all.
-static void write_line(bt_frames *frames, const bt_frame_line *line)
-{
-    bt_h5_append(frames->h, frames->line_points, H5T_NATIVE_DOUBLE, (hsize_t)frames->n, 1, line->point);
-    bt_h5_append(frames->h, frames->line_tension, H5T_NATIVE_DOUBLE, (hsize_t)frames->n, 1, line->tension);
-}
-
 char *bt_frames_group(const bt_frames *frames, char path[64])
 {
     snprintf(path, 64, "/xdmf/%06lld", (long long)frames->n);
@@ -369,7 +362,10 @@ bt_status bt_frames_add(bt_frames *frames, double time, const bt_frame_row *rows
         bt_h5_give_up(h5, status);
         return status;
     }
-    if (frames->branches) write_line(frames, line);
+    if (frames->branches) { // the line is the same on all ranks
+        bt_h5_append(h5, frames->line_points, H5T_NATIVE_DOUBLE, (hsize_t)frames->n, 1, line->point);
+        bt_h5_append(h5, frames->line_tension, H5T_NATIVE_DOUBLE, (hsize_t)frames->n, 1, line->tension);
+    }
     bt_h5_append(h5, frames->time, H5T_NATIVE_DOUBLE, (hsize_t)frames->n, 1, &time);
     if (frames->n == frames->cap) {
         frames->cap = frames->cap ? 2 * frames->cap : 64;

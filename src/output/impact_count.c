@@ -9,7 +9,6 @@
 
 #include "base/inside.h"
 #include "base/units.h"
-#include "output/summary.h"
 
 void bt_impact_count_init(bt_impact_count *count, const bt_impacts *impacts, const bt_history *history,
                           const bt_steady *steady)

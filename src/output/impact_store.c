@@ -311,14 +311,6 @@ static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
     free(x);
 }
 
-/// Number of steps up to `step` that do not end before the earliest start.
-static int64_t late_steps(const bt_impact_store *store, int64_t step)
-{
-    int64_t n = 0;
-    for (int64_t k = 1; k <= step; k++) n += !((double)k * store->from->dt < store->earliest);
-    return n;
-}
-
 static void load_blocks(bt_impact_store *store, bt_snapshot *from, int64_t steps)
 {
     int64_t rows = 0;
@@ -326,8 +318,10 @@ static void load_blocks(bt_impact_store *store, bt_snapshot *from, int64_t steps
     bool finite = true;
     for (int64_t k = 0; k < rows * LOADS_WIDTH; k++) finite = finite && isfinite(load[k]);
     bt_snapshot_want(from, finite, "collisions/panel_blocks", -1, "is not finite");
-    bt_snapshot_want(from, steps == late_steps(store, bt_snapshot_int(from, "world/step")), "collisions/panel_steps",
-                     -1, "does not fit the number of steps");
+    const int64_t done = bt_snapshot_int(from, "world/step");
+    int64_t late = 0; // steps that do not end before the earliest start
+    for (int64_t k = 1; k <= done; k++) late += !((double)k * store->from->dt < store->earliest);
+    bt_snapshot_want(from, steps == late, "collisions/panel_steps", -1, "does not fit the number of steps");
     if (!from->faulty)
         bt_snapshot_want(from, rows == bt_panel_blocks_rows(&store->blocks, steps), "collisions/panel_blocks", -1,
                          "does not fit the number of steps");

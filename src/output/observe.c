@@ -14,7 +14,6 @@
 
 #include "bergtow/forces.h"
 #include "loads/impact.h"
-#include "solve/solver.h"
 #include "bergtow/sum.h"
 #include "contact/row.h"
 #include "space/cells.h"
@@ -71,14 +70,6 @@ static void observe_cell(bt_world *world, bt_idx k, const void *context, bt_tota
     bt_sum_add(&totals->sum[TOUCHING], (double)touching);
 }
 
-static bt_totals observe_cells(bt_world *world, double slow2)
-{
-    bt_totals all = {.n_sums = N_SEEN};
-    bt_phases_busy(world, observe_cell, &slow2, &all);
-    bt_domain_reduce(world, &all);
-    return all;
-}
-
 /// Contact impulse on the towed body along (dx, dy) without using its rows.
 static double budget_impulse(const bt_world *world, const bt_totals *seen, double dx, double dy)
 {
@@ -121,14 +112,6 @@ static void observe_line(const bt_tow *tow, bt_sample *sample)
     sample->vessel_line = sample->tow_force; // both along the course
 }
 
-/// Add the forces that hold the body back besides ice and inertia, in table order: water, air, Coriolis, tilt, ….
-static double add_forces(const bt_world *world, double sum)
-{
-    for (int k = 0; k < world->forces->n_series; k++)
-        if (!bt_force_series_of[k].part) sum += bt_force_against(world, k);
-    return sum;
-}
-
 static void observe_body(const bt_world *world, const bt_totals *seen, bt_sample *sample)
 {
     const bt_bodies *bodies = &world->bodies;
@@ -165,7 +148,10 @@ static void observe_body(const bt_world *world, const bt_totals *seen, bt_sample
     if (bt_tow_has_line(tow)) {
         observe_line(tow, sample);
     } else if (tow->mode == BT_TOW_SPEED) {
-        sample->tow_force = add_forces(world, sample->ice_resistance) + sample->inertia_force;
+        double sum = sample->ice_resistance; // and water, air, Coriolis, tilt, …, in table order
+        for (int k = 0; k < world->forces->n_series; k++)
+            if (!bt_force_series_of[k].part) sum += bt_force_against(world, k);
+        sample->tow_force = sum + sample->inertia_force;
     } else {
         sample->tow_force = 0;
     }
@@ -224,7 +210,9 @@ void bt_observe(bt_world *world, double reference_speed, bt_sample *sample)
 {
     *sample = (bt_sample){.time = (double)world->step * world->par.dt};
     const double slow2 = 1e-4 * reference_speed * reference_speed;
-    const bt_totals seen = observe_cells(world, slow2);
+    bt_totals seen = {.n_sums = N_SEEN};
+    bt_phases_busy(world, observe_cell, &slow2, &seen);
+    bt_domain_reduce(world, &seen);
     sample->moving = bt_sum_value(&seen.sum[MOVING]);
     const unsigned has = bt_observe_applies(world);
     if (has & 1u << BT_APPLIES_BODY) observe_body(world, &seen, sample);

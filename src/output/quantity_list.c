@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The registry as text and JSON: all names come from the tables.
-#include "output/quantity_list.h"
 
 #include <stdio.h>
 

@@ -6,7 +6,6 @@
 #include "output/frames.h"
 #include "output/record.h"
 #include "base/checksum.h"
-#include "base/h5read.h"
 #include "base/h5util.h"
 #include "output/impact_store.h"
 #include "output/piece_store.h"

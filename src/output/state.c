@@ -12,7 +12,6 @@
 #include "contact/law.h"
 #include "force/forces.h"
 #include "force/laws.h"
-#include "loads/impact.h"
 #include "space/cells.h"
 #include "tow/tow.h"
 #include "step/splitting.h"
@@ -523,14 +522,6 @@ static const char *rows_not_finite(const char *group, const bt_state_row *row, i
     return NULL;
 }
 
-/// Are the numbers of an open collision finite? Its corner is NaN if there is none.
-static bool open_finite(const bt_impact_open *o)
-{
-    const double real[] = {o->so_far.time, o->so_far.x,         o->so_far.y, o->so_far.impulse, o->so_far.approach,
-                           o->so_far.mass, o->so_far.thickness, o->rest,     o->largest};
-    return bt_state_finite(real, BT_N_OF(real));
-}
-
 const char *bt_state_not_finite(const bt_world *world, char name[64])
 {
     const char *found = rows_not_finite("world", world_rows, BT_N_OF(world_rows), world, name);
@@ -544,7 +535,7 @@ const char *bt_state_not_finite(const bt_world *world, char name[64])
     if (!bt_state_finite((const double *)(const void *)impacts->closed, impacts->n_closed * IMPACT_WIDTH))
         return "impacts/closed";
     for (int64_t k = 0; k < impacts->n_open; k++)
-        if (!open_finite(&impacts->open[k])) return "impacts/open";
+        if (!bt_state_open_finite(&impacts->open[k])) return "impacts/open";
     return bt_state_finite((const double *)(const void *)impacts->panels.panel, impacts->panels.n * PANEL_WIDTH) ? NULL
                                                                                                 : "impacts/panels";
 }

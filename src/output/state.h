@@ -11,6 +11,7 @@
 #include "field/lead.h"
 #include "output/stall.h"
 #include "contact/cell_contacts.h"
+#include "loads/impact.h"
 
 /// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:
 /// BT_ERR_NUMERIC (bodies lost).
@@ -53,6 +54,9 @@ void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 // --- its check -------------------------------------------------------------------------------------------------------
 
 // Is the state in a checkpoint one that steps can leave? (private to state.c)
+
+/// Are the numbers of an open collision finite? Its corner is NaN if there is none.
+bool bt_state_open_finite(const bt_impact_open *o);
 
 /// Are all n numbers neither NaN nor infinite?
 static inline bool bt_state_finite(const double *x, int64_t n)

@@ -14,7 +14,6 @@
 
 #include "bergtow/contact.h"
 #include "contact/law.h"
-#include "loads/impact.h"
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
 #include "tow/tow.h"
@@ -219,6 +218,13 @@ static void check_undisturbed(const bt_world *world, bt_snapshot *snap)
 
 static bool is_gid(double x, bt_gid n) { return x >= 0 && x < (double)n && x == floor(x); }
 
+bool bt_state_open_finite(const bt_impact_open *o)
+{
+    const double real[] = {o->so_far.time, o->so_far.x,         o->so_far.y, o->so_far.impulse, o->so_far.approach,
+                           o->so_far.mass, o->so_far.thickness, o->rest,     o->largest};
+    return bt_state_finite(real, BT_N_OF(real));
+}
+
 static void check_impacts(const bt_world *world, bt_snapshot *snap)
 {
     const bt_impacts *impacts = world->impacts;
@@ -227,11 +233,8 @@ static void check_impacts(const bt_world *world, bt_snapshot *snap)
         const bt_impact *impact = &impacts->open[k].so_far;
         bt_snapshot_want(snap, is_gid(impact->gid, n) && (k == 0 || impacts->open[k - 1].so_far.gid < impact->gid),
                          "impacts/open", k, "is not a collision, or out of order");
-        const double real[] = {
-            impact->time, impact->x, impact->y, impact->impulse, impact->approach, impact->mass, impact->thickness,
-            impacts->open[k].rest, impacts->open[k].largest};
-        bt_snapshot_want(snap, bt_state_finite(real, sizeof real / sizeof *real) && impact->impulse >= 0,
-                         "impacts/open", k, "is not finite");
+        bt_snapshot_want(snap, bt_state_open_finite(&impacts->open[k]) && impact->impulse >= 0, "impacts/open", k,
+                         "is not finite");
     }
 }
 

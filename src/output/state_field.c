@@ -149,20 +149,17 @@ static bt_status save_outlines(const bt_world *world, const bt_comm *comm, bt_gi
     return status;
 }
 
-static void save_field_head(const bt_field *field, bt_snapshot *snap)
-{
-    bt_snapshot_add_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
-    bt_snapshot_add_text(snap, "field/crs", field->outlines.crs);
-    bt_snapshot_add_text(snap, "field/nearly", field->outlines.nearly);
-    bt_snapshot_add(snap, "field/offsets", BT_ITEM_I64, field->n + 1, 1, field->offsets);
-}
-
 bt_status bt_state_save_field(const bt_field *field, const bt_world *world, const bt_comm *comm, bt_snapshot *snap,
                               bt_errors *err)
 {
     double n = comm->rank == 0 ? field->n : 0;
     bt_comm_reduce(comm, NULL, 0, &n, 1, NULL, 0);
-    if (comm->rank == 0) save_field_head(field, snap);
+    if (comm->rank == 0) {
+        bt_snapshot_add_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
+        bt_snapshot_add_text(snap, "field/crs", field->outlines.crs);
+        bt_snapshot_add_text(snap, "field/nearly", field->outlines.nearly);
+        bt_snapshot_add(snap, "field/offsets", BT_ITEM_I64, field->n + 1, 1, field->offsets);
+    }
     const bt_status status = save_outlines(world, comm, (bt_gid)n, field->offsets, snap, err);
     if (comm->rank != 0) return status;
     bt_snapshot_add(snap, "field/pose", BT_ITEM_F64, field->n, 3, field->pose);

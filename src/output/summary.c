@@ -18,7 +18,6 @@
 #include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_tow.h"
-#include "case/constraints.h"
 #include "case/ice_bounds.h"
 #include "case/time_step.h"
 #include "case/warning.h"
@@ -107,14 +106,6 @@ static double reduce(const double *x, int64_t first, int64_t end, bt_keep keep)
     double out = x[first];
     for (int64_t i = first + 1; i < end; i++) out = keep == BT_KEEP_SUM ? out + x[i] : bt_max_seen(out, x[i]);
     return out;
-}
-
-static void reduce_added(bt_summary *summary, const bt_history *history)
-{
-    const int64_t first = summary->body ? summary->window.first : 0;
-    summary->n_added = history->n_columns - BT_N_COLUMNS;
-    for (int k = 0; k < summary->n_added; k++)
-        summary->added[k] = reduce(history->column[BT_N_COLUMNS + k], first, history->n, bt_added(k)->keep);
 }
 
 static void reduce_window(bt_summary *summary, const bt_history *history)
@@ -388,7 +379,10 @@ void bt_summary_make(bt_summary *summary, const bt_history *history, const bt_ca
         summary->balance = summary->closure = summary->closure_relative = summary->budget_closure_relative = nan;
     bt_steady_none(&summary->window);
     if (body) bt_steady_find(&summary->window, history, input, totals);
-    reduce_added(summary, history);
+    summary->n_added = history->n_columns - BT_N_COLUMNS;
+    for (int k = 0; k < summary->n_added; k++)
+        summary->added[k] = reduce(history->column[BT_N_COLUMNS + k], body ? summary->window.first : 0, history->n,
+                                   bt_added(k)->keep);
     if (body) {
         reduce_window(summary, history);
         clear_resistance_if_untowed(summary, input);

@@ -32,4 +32,11 @@ typedef struct bt_meaning {
 } bt_meaning;
 bt_meaning bt_summary_meaning(const char *key);
 
+// --- bergtow --list-quantities ---------------------------------------------------------------------------------------
+
+/// Print series, keys of summary.json and estimates for people. stream: FILE *.
+void bt_quantities_list(void *stream);
+/// Print them for programs: {"series": [...], "summary": [...], "estimates": [...]}.
+void bt_quantities_list_json(void *stream);
+
 #endif

@@ -307,8 +307,7 @@ static void repel(bt_planner *planner, const bt_route *route)
     if (!planner->near) planner->near = bt_alloc((size_t)ice->nx * (size_t)ice->ny, 1);
     for (int64_t k = 0; k < route->n_stretches; k++) {
         const bt_route_stretch *stretch = &route->stretch[k];
-        const bt_leg leg = {.x = stretch->x, .y = stretch->y, .tx = stretch->tx, .ty = stretch->ty,
-                            .length = stretch->length, .turn = stretch->turn};
+        const bt_leg leg = bt_swath_leg(stretch);
         for (int part = 0; part < 8; part++) {
             double at[2], t[2], c[2];
             bt_leg_at(&leg, (part + 0.5) / 8 * stretch->length, at, t);

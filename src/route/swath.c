@@ -372,26 +372,18 @@ static void clip_floes(const bt_planner *planner, bt_route *route)
     // clipping a polygon that is not convex by one line at most doubles its points
     double *w[2] = {bt_alloc((size_t)(16 * most + 64), 2 * sizeof(double)),
                     bt_alloc((size_t)(16 * most + 64), 2 * sizeof(double))};
-    double *box = bt_alloc((size_t)task->n_floes + 1, 4 * sizeof *box);
-    for (int64_t i = 0; i < task->n_floes; i++) {
-        double *b = box + 4 * i;
-        b[0] = b[1] = INFINITY, b[2] = b[3] = -INFINITY;
-        for (int64_t k = task->floe_first[i]; k < task->floe_first[i + 1]; k++)
-            for (int a = 0; a < 2; a++) {
-                b[a] = bt_min(b[a], task->floe[2 * k + a]);
-                b[2 + a] = bt_max(b[2 + a], task->floe[2 * k + a]);
-            }
-    }
+    bt_box *box = bt_alloc((size_t)task->n_floes + 1, sizeof *box);
+    for (int64_t i = 0; i < task->n_floes; i++)
+        box[i] = bt_box_of(task->floe_first[i + 1] - task->floe_first[i], task->floe + 2 * task->floe_first[i]);
     for (int64_t s = 0; s < route->n_stretches; s++) {
         const bt_route_stretch *stretch = &route->stretch[s];
-        const bt_leg leg = {.x = stretch->x, .y = stretch->y, .tx = stretch->tx, .ty = stretch->ty,
-                            .length = stretch->length, .turn = stretch->turn};
+        const bt_leg leg = bt_swath_leg(stretch);
         const int pieces = 1 + (int)(fabs(stretch->turn) * stretch->length * 60 / BT_PI);
         // chords of the inner and outer arc, moved out so that the area of a slice is that between the arcs
         const double half = 0.5 * fabs(stretch->turn) * stretch->length / pieces;
         const double wider = half > 0 ? sqrt(2 * half / bt_sin(2 * half)) : 1, side = 0.5 * task->width;
         for (int k = 0; k < pieces; k++) {
-            double v[8], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+            double v[8];
             for (int end = 0; end < 2; end++) {
                 double at[2], tan[2];
                 bt_leg_at(&leg, (k + end) * stretch->length / pieces, at, tan);
@@ -404,12 +396,11 @@ static void clip_floes(const bt_planner *planner, bt_route *route)
                     }
                     double *q = v + (left ? (end ? 4 : 6) : (end ? 2 : 0));
                     q[0] = at[0] - aside * tan[1], q[1] = at[1] + aside * tan[0];
-                    for (int a = 0; a < 2; a++) low[a] = bt_min(low[a], q[a]), high[a] = bt_max(high[a], q[a]);
                 }
             }
+            const bt_box own = bt_box_of(4, v);
             for (int64_t i = 0; i < task->n_floes; i++) {
-                const double *b = box + 4 * i;
-                if (b[0] > high[0] || b[1] > high[1] || b[2] < low[0] || b[3] < low[1]) continue;
+                if (bt_box_apart(&box[i], &own)) continue;
                 const int64_t first = task->floe_first[i], n = task->floe_first[i + 1] - first;
                 memcpy(w[0], task->floe + 2 * first, (size_t)n * 2 * sizeof **w);
                 const double area = fabs(bt_polygon_shared(n, 4, v, w));
@@ -430,8 +421,7 @@ void bt_swath_report(const bt_planner *planner, bt_route *route)
     route->clearance = INFINITY;
     for (int64_t s = 0; s < route->n_stretches; s++) {
         const bt_route_stretch *stretch = &route->stretch[s];
-        const bt_leg leg = {.x = stretch->x, .y = stretch->y, .tx = stretch->tx, .ty = stretch->ty,
-                            .length = stretch->length, .turn = stretch->turn};
+        const bt_leg leg = bt_swath_leg(stretch);
         const int n = slices(planner, stretch->length);
         for (int k = 0; k < n; k++) {
             int64_t cell[CELLS];

@@ -93,6 +93,13 @@ void bt_swath_keep(bt_planner *planner);
 /// Number of stretches that bt_swath_cost makes of these legs.
 int64_t bt_swath_stretches(const bt_planner *planner, int n, const bt_leg *leg);
 
+/// The leg that a stretch is.
+static inline bt_leg bt_swath_leg(const bt_route_stretch *stretch)
+{
+    return (bt_leg){.x = stretch->x, .y = stretch->y, .tx = stretch->tx, .ty = stretch->ty, .length = stretch->length,
+                    .turn = stretch->turn};
+}
+
 /// Is a cheaper than b?
 bool bt_swath_better(const bt_path_cost *a, const bt_path_cost *b);
 

@@ -312,21 +312,6 @@ static void share_cores(bt_ensemble *ensemble, bool open)
     if (open) ensemble->threads = bt_max(1, ensemble->threads / ensemble->jobs);
 }
 
-static bt_status check_ice(const bt_study *study, bt_errors *err)
-{
-    const size_t before = err->n;
-    bt_study_check_ice(study, err);
-    return err->n == before ? BT_OK : BT_ERR_CASE;
-}
-
-static void warn_fixed(const bt_ensemble *ensemble)
-{
-    if (ensemble->fixed == 0 || ensemble->s->repeats == 1) return;
-    bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions no ice depends on the seed (ice from a file, or "
-                   "none): the fields of each are one run",
-                   ensemble->fixed, ensemble->s->n_conditions);
-}
-
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                           bt_errors *err)
 {
@@ -336,7 +321,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     int threads = 1;
     bool open = false;
     if (status == BT_OK) status = choose_threads(comm, study, options, &threads, &open, err);
-    if (status == BT_OK && comm->rank == 0) status = check_ice(study, err);
+    if (status == BT_OK && comm->rank == 0) status = bt_study_check_ice(study, err);
     if (status == BT_OK && comm->rank == 0) status = bt_ensemble_prepare_folder(study, options, digest, err);
     status = bt_comm_agree(comm, status);
     if (status != BT_OK) return status;
@@ -373,7 +358,9 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
                study->ranks, ensemble.threads);
         fflush(stdout);
     }
-    if (comm->rank == 0 && !options->job) warn_fixed(&ensemble);
+    if (comm->rank == 0 && !options->job && ensemble.fixed > 0 && study->repeats > 1)
+        bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions no ice depends on the seed (ice from a file, "
+                       "or none): the fields of each are one run", ensemble.fixed, study->n_conditions);
     if (comm->rank == 0) gather(&ensemble, false); // after a kill the file may be out of date
     struct sigaction before[BT_N_CAUGHT];
     stop_signal = 0;

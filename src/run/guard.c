@@ -7,7 +7,6 @@
 #include <stdio.h>
 
 #include "case/case_derived.h"
-#include "force/environment.h"
 #include "bergtow/forces.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"

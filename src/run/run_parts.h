@@ -7,7 +7,6 @@
 #include "bergtow/field.h"
 #include "output/record.h"
 #include "bergtow/run.h"
-#include "run/setup.h"
 #include "bergtow/world.h"
 #include "run/guard.h"
 #include "run/halt.h"

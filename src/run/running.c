@@ -19,7 +19,6 @@
 #include "output/observe.h"
 #include "solve/batch.h"
 #include "solve/islands.h"
-#include "solve/solver.h"
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_files.h"
@@ -32,6 +31,7 @@
 #include "output/gather.h"
 #include "case/case_derived.h"
 #include "run/run_parts.h"
+#include "run/setup.h"
 
 typedef bt_running run;
 
@@ -288,13 +288,6 @@ static bt_status agree(run *running, bt_status status)
     return bits & 1 ? bt_comm_agree(running->comm, status) : BT_OK;
 }
 
-static void add_phases(bt_run_totals *totals, const bt_step_stats *st)
-{
-#define ADD(name, text) totals->phases.name += st->phases.name, totals->shared.name += st->shared.name;
-    BT_WALL_PHASES(ADD)
-#undef ADD
-}
-
 /// Take a frame at the first step at or after each multiple of the interval, and at the end.
 static bt_status frame_if_due(run *running, double time, bt_errors *err)
 {
@@ -306,12 +299,6 @@ static bt_status frame_if_due(run *running, double time, bt_errors *err)
     while ((double)running->frames_due * interval * (1 - 1e-12) <= time) running->frames_due++;
     if (due || whole) running->frames++;
     return record_frame(running, err);
-}
-
-/// Report the force laws that have failed.
-static bt_status tell_failed(const bt_forces *forces, bt_errors *err)
-{
-    return bt_fail(err, BT_ERR_NUMERIC, "force %s: %s; the run ends here", forces->failed->name, forces->why);
 }
 
 bool bt_running_has_next(const bt_running *running)
@@ -357,15 +344,20 @@ bt_status bt_running_step(bt_running *running, bt_errors *err)
     bt_world *world = running->w;
     bt_status status = BT_OK;
     step_at_pace(world, &running->pace);
-    add_phases(&running->totals, &world->stats);
+#define ADD(name, text) \
+    running->totals.phases.name += world->stats.phases.name, running->totals.shared.name += world->stats.shared.name;
+    BT_WALL_PHASES(ADD)
+#undef ADD
     world->stats.in_team = 0;
     const double t0 = bt_clock();
     if (world->step == running->o->dump_step) status = dump(running, err);
     bt_sample *const sample = &running->sample;
     bt_observe(world, running->reference_speed, sample);
     bt_stall_step(&running->totals.stall, world, sample->ice_resistance, sample->tow_force, running->roster.mean_size);
-    const bt_status sound = world->forces->failed ? tell_failed(world->forces, err)
-                                                  : bt_guard_check(&running->guard, world, sample, err);
+    const bt_forces *forces = world->forces;
+    const bt_status sound = forces->failed ? bt_fail(err, BT_ERR_NUMERIC, "force %s: %s; the run ends here",
+                                                     forces->failed->name, forces->why)
+                                           : bt_guard_check(&running->guard, world, sample, err);
     // faults have been reported, and the series hold valid numbers only
     const bool writable = sound == BT_OK || !bt_sample_fault(sample, bt_observe_applies(world));
     if (status == BT_OK && running->record && writable) status = bt_record_sample(running->record, sample, err);

@@ -290,8 +290,9 @@ static void look_at_condition(const bt_study *study, int64_t condition, verdict 
     bt_member_free(&member);
 }
 
-void bt_study_check_ice(const bt_study *study, bt_errors *err)
+bt_status bt_study_check_ice(const bt_study *study, bt_errors *err)
 {
+    const size_t before = err->n;
     verdict v = {.fixed = study->repeats > 1};
     v.list = study_settings(study, &v.n);
     v.idle = bt_alloc((size_t)v.n + 1, sizeof *v.idle);
@@ -317,6 +318,7 @@ void bt_study_check_ice(const bt_study *study, bt_errors *err)
                           v.list[i].at, v.list[i].length, v.list[i].text, v.list[i].section);
     free(v.idle);
     free(v.list);
+    return err->n == before ? BT_OK : BT_ERR_CASE;
 }
 
 // --- files that a study names ----------------------------------------------------------------------------------------

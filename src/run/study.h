@@ -37,8 +37,8 @@ void bt_study_check_axes(const bt_study *study, bt_errors *err);
 
 /// Add errors if members would be the same run: more than one field although no condition has ice that depends on the
 /// seed, or keys for making ice although all conditions read theirs. Reads conditions until one rules out both; errors
-/// in a case are not reported here.
-void bt_study_check_ice(const bt_study *study, bt_errors *err);
+/// in a case are not reported here. Errors: BT_ERR_CASE.
+bt_status bt_study_check_ice(const bt_study *study, bt_errors *err);
 
 // --- files that a study names ----------------------------------------------------------------------------------------
 

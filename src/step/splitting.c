@@ -12,9 +12,9 @@
 #include "contact/cell_contacts.h"
 #include "contact/crush.h"
 #include "contact/law.h"
-#include "loads/collision.h"
+#include "loads/impact.h"
 #include "partition/domain.h"
-#include "split/cut.h"
+#include "split/section.h"
 
 // --- loads -----------------------------------------------------------------------------------------------------------
 

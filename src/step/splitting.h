@@ -86,8 +86,15 @@ typedef struct bt_splitting {
 
 void bt_splitting_free(bt_splitting *splitting);
 
-/// Number of pieces so far.
-static inline bt_gid bt_splitting_pieces(const bt_splitting *splitting) { return splitting ? 2 * splitting->n : 0; }
+/// Row of a body where the original bodies come first and then all pieces of floes, whose ids lie between those of the
+/// others.
+static inline int64_t bt_splitting_row(const bt_world *world, bt_gid gid)
+{
+    const bt_splitting *splitting = world->splitting;
+    if (!splitting || gid < splitting->first) return gid;
+    if (gid >= splitting->first + splitting->reserve) return gid - splitting->reserve;
+    return world->bodies.n_global - splitting->reserve + (gid - splitting->first);
+}
 
 /// The split that made piece k (from 0); the piece is its number k % 2.
 static inline const bt_split_record *bt_splitting_birth(const bt_splitting *splitting, bt_gid k)

@@ -74,13 +74,7 @@ static uint64_t mix_double(uint64_t h, double x)
 
 /// Name of a body in the hash: ids reserved for pieces come last, so that a world where nothing has split has the same
 /// hash as one where nothing can.
-static uint64_t name_of(const bt_world *world, bt_gid gid)
-{
-    const bt_splitting *splitting = world->splitting;
-    if (!splitting || gid < splitting->first) return (uint64_t)gid;
-    if (gid >= splitting->first + splitting->reserve) return (uint64_t)(gid - splitting->reserve);
-    return (uint64_t)(world->bodies.n_global - splitting->reserve + (gid - splitting->first));
-}
+static uint64_t name_of(const bt_world *world, bt_gid gid) { return (uint64_t)bt_splitting_row(world, gid); }
 
 /// Hash of a record of a contact law other than the rigid one. The first such law enters as 0, so that states keep
 /// their old hashes.

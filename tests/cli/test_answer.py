@@ -395,7 +395,7 @@ def said_of(x):
     if not isinstance(x, (int, float)) or not math.isfinite(x):
         return set(re.findall(r"\d+(?:\.\d+)?", x)) if isinstance(x, str) else set()
     return {words.short(abs(x) * factor, digits) for factor in (1, 1e-3, 1 / words.KNOT, 1 / 60, 60) for digits in (
-        2, 3)} | {str(math.ceil(x / words.TONNE)), str(round(100 * x)), words.plain(x)}
+        2, 3)} | {str(math.ceil(words.tonnes(x))), str(round(100 * x)), words.plain(x)}
 
 
 def test_every_number_of_the_sentence_is_in_the_rows_that_it_names(made):

@@ -82,7 +82,7 @@ def test_every_function_of_the_headers_is_there(manual):
     entries = set(re.findall(r'id="c\.(bt_\w+)"', found))
     wanted = set()
     for path in (ROOT / "include/bergtow").glob("*.h"):
-        text = re.sub(r"//.*", "", path.read_text()).replace('extern "C" {', "")
+        text = re.sub(r"//.*", "", path.read_text())
         text = re.sub(r"\{[^{}]*\}", ";", re.sub(r"\{[^{}]*\}", ";", text))  # members, and bodies of inline functions
         wanted |= set(re.findall(r"^(?!typedef|static|#|extern)[a-z][\w *]*?\b(bt_\w+)\([^;]*;", text, re.M))
     assert len(wanted) > 60 and wanted <= entries, wanted - entries

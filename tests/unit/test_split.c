@@ -2,7 +2,7 @@
 // Splitting of a floe: closed forms of the law, what a section carries against quadrature, and cuts that lose nothing.
 #include "test.h"
 #include "base/rng.h"
-#include "split/cut.h"
+#include "split/section.h"
 #include "split/find.h"
 
 static const double K = 150e3, STRENGTH = 300e3;

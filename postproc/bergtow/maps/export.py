@@ -27,6 +27,7 @@ from bergtow.errors import IO, USAGE, BergtowError, RunError
 from bergtow.maps import plane as map_plane
 from bergtow.maps import read as map_read
 from bergtow.result.frames import lonlat_of
+from bergtow.result.hdf5 import first_line
 from bergtow.result.run import Run
 from bergtow.said import say
 
@@ -399,12 +400,6 @@ def dataset(t, place, start, title):
          "source": "bergtow, discrete element model", "made_by": writing.MARK, "comment": place.words})
 
 
-def write_netcdf(t, place, path, force, start, title):
-    data = dataset(t, place, start, title)
-    with writing.written(path, force) as new:
-        data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT", encoding={"time": {"_FillValue": None}})
-
-
 # ---- the command
 
 
@@ -462,7 +457,9 @@ def perform(a):
             if kind == ".csv":
                 write_table(t, place, path, a.force)
             else:
-                write_netcdf(t, place, path, a.force, a.start, run.attributes.get("title", "") or "tow through ice")
+                data = dataset(t, place, a.start, run.attributes.get("title", "") or "tow through ice")
+                with writing.written(path, a.force) as new:
+                    data.to_netcdf(new, engine="scipy", format="NETCDF3_64BIT", encoding={"time": {"_FillValue": None}})
             say(f"{path}: {len(t.name)} trajectories, {len(t.time)} times")
             if kind == ".nc" and not a.start:
                 say("time: seconds since 1970, assumed: the case gives no date; give it with --start")
@@ -504,7 +501,7 @@ def _write(layers, place, path, kind, force):
         else:
             writing.write_text(geojson(layers[0], place), path, force)
     except RuntimeError as error:
-        raise RunError(path, f"cannot be written ({map_read.first_line(error)})", "choose another place with -o",
+        raise RunError(path, f"cannot be written ({first_line(error)})", "choose another place with -o",
                        IO) from None
     if renamed:
         say("columns: names in a shapefile have only ten characters: "

@@ -23,6 +23,7 @@ import numpy as np
 from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.maps import stairs as map_stairs
+from bergtow.result.hdf5 import first_line
 
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
 MOST_PIXELS = 400_000_000
@@ -126,10 +127,6 @@ def quietly(call, *words, **named):
         return call(*words, **named)
     finally:
         gdal.PopErrorHandler()
-
-
-def first_line(error):
-    return (str(error).splitlines() or ["no reason given"])[0]
 
 
 def refuse_unused(path, how, names, kind):

@@ -126,17 +126,13 @@ def repaired(shapes, rules, book):
     floes = [floe for shape in shapes for floe in whole(shape, book)]
     floes = [f for f in floes if chosen(f, rules, book)]
     size = float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1e3
-    finest = allowed_overlap() * size
+    slop = next(float(key["default"]) for key in _library.listed("keys")["keys"] if key["name"] == "solver.slop")
+    finest = slop * size  # the overlap that a case accepts by default
     rules.tolerance = rules.tolerance or finest
     rules.thin, rules.gap = THIN * min(rules.tolerance, finest), GAP * size
     floes = [f for floe in floes for f in simplified(floe, rules, book)]
     floes = [f for f in floes if large_enough(f, rules, book) and stays(f, rules, book)]
     return apart(floes, rules, book)
-
-
-def allowed_overlap():
-    """Overlap of floes, relative to their mean size, that a case accepts by default."""
-    return next(float(key["default"]) for key in _library.listed("keys")["keys"] if key["name"] == "solver.slop")
 
 
 def diameter(polygon):

@@ -3,7 +3,6 @@
 hand calculation, the validation evidence, sources, symbols, standards. Blocks are those of reporting/ensemble.py."""
 import numpy as np
 
-from bergtow.result import answers
 from bergtow.result.origins import short as in_short
 from bergtow.result.run import within
 from bergtow.table import number, quantity
@@ -199,9 +198,3 @@ def sources(values, estimates):
                 *((source, some(keys)) for source, keys in sorted(found.items()))]},
             {"kind": "heading", "text": "Symbols"}, {"kind": "pairs", "label": "symbols", "rows": SYMBOLS},
             {"kind": "heading", "text": "Standards"}, lines(STANDARDS)]
-
-
-def answer_beside(folder):
-    """answer.json of bergtow design; None if there is none."""
-    found = answers.read("answer", folder)
-    return found if isinstance(found, dict) and "sentence" in found else None

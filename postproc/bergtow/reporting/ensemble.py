@@ -28,10 +28,10 @@ from bergtow.stats.loads import CONSTANT
 from bergtow.study import analysis
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
+from bergtow.towing import tonnes
 
 import numpy as np
 
-TONNE_FORCE = 9806.65  # N
 #: keys that do not affect any result
 PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
 #: keys of the numerical method, not of the tow: the appendix gives their origin, and convergence their effect
@@ -139,7 +139,7 @@ def governing(s):
     def both(x, least=-np.inf):
         """A force, followed by its value in tonnes-force."""
         x = text_table.designed(x, least)
-        return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
+        return f"{report_run.force(x)} ({text_table.number(tonnes(x))} tonne-force)" if np.isfinite(x) else \
             "without bound"
     said, high = without_value(s, d["value"]), d["interval_95"][1]
     said += (f"Largest of {'the others' if said else 'these'}: {unbroken(c['label'])}, "
@@ -262,13 +262,6 @@ def parts(found, drawn):
     return out
 
 
-def of_part(name, part):
-    """(heading, blocks) for a chapter of study/analysis.py."""
-    figure = part.get("figure")
-    drawn = report_run.picture(name, part["heading"], figure) if figure else None
-    return part["heading"], blocks(part["parts"]) + ([drawn] if drawn else [])
-
-
 #: text that replaces a chapter without results
 NOT_STUDIED = {
     "converge": "Not studied: it is not known whether the result depends on the width and length of the domain, time "
@@ -310,7 +303,9 @@ def beside(results, told=None):
     out = []
     for name, (heading, _) in analysis.KINDS.items():
         if name in results:
-            out.append(of_part(name, analysis.chapter(name, results[name])))
+            part = analysis.chapter(name, results[name])
+            drawn = part["figure"] and report_run.picture(name, heading, part["figure"])
+            out.append((heading, blocks(part["parts"]) + ([drawn] if drawn else [])))
         elif name in NOT_STUDIED and not (name == "budget" and told and told.get("assumed")):
             out.append((heading, [lines(NOT_STUDIED[name])]))
     return out
@@ -407,7 +402,8 @@ def context(folder, place=None, given=None, also=()):
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(*runs[0][2:] if runs else ({}, {}), given or {})
     warned = loads_text.warnings(s) + intro
-    told = document.answer_beside(e.path)
+    told = answers.read("answer", e.path)  # of bergtow design
+    told = told if isinstance(told, dict) and "sentence" in told else None
     sentence, remarks, tables = of_answer(told)
     checked, estimates = independent_check(e, s, told)
     drawn = pictures(e, options, s)

@@ -299,17 +299,13 @@ def plan(ice: Ice, hull: Hull, start: Iterable[float], goal: Points, **options: 
     if status.endswith("too_thick"):
         data |= {"force": force, "factor": t.force_factor, "limit": t.force_limit}
     if status.endswith("no_go"):
-        data |= {"polygon": _nearest_polygon(task, data["x"], data["y"]), "needed": t.reach + t.clearance}
+        far = [apart.to_edges(np.array([[data["x"], data["y"]]]), polygon)[0]
+               for polygon in np.split(task.no_go, task.no_go_first[1:-1])]
+        data |= {"polygon": int(np.argmin(far)), "needed": t.reach + t.clearance}
     if status == "fewer_routes":
         data = {"wanted": t.routes, "found": n - 1}
     cover, cover_extent = task.cover()
     return Plan(status, data, routes, spacing, cell, states, cover, cover_extent)
-
-
-def _nearest_polygon(task: _Task, x: float, y: float) -> int:
-    """Index of the no-go polygon whose outline is nearest to a position."""
-    polygons = np.split(task.no_go, task.no_go_first[1:-1])
-    return int(np.argmin([apart.to_edges(np.array([[x, y]]), polygon)[0] for polygon in polygons]))
 
 
 def route_through(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[float], corners: Points = (), *,

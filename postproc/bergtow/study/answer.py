@@ -226,12 +226,6 @@ def held_back(row):
     return mean < 0 or mean == 0 and speed > 0
 
 
-def steady_case(row):
-    value = row["value"]
-    return load_cases.row("steady", value["n"], value["kind"], "ensemble", runs=row["fields"], of=row["id"],
-                          interval_95=value.get("interval_95"), reason=value.get("reason"))
-
-
 def own_start(row, ramp):
     """The start as the case orders it, from the steady tows: a load case as long as no run confirms the ramp that is
     to take its place."""
@@ -334,7 +328,10 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     """The whole answer. asked: the request in the call; rows: conditions(); cases: load cases except the steady one; t:
     the load_cases.Tow of the hardest condition, None without a value."""
     worst = hardest(rows, asked["speed_m_s"])
-    cases = ([steady_case(worst)] if worst else []) + cases
+    if worst:
+        value = worst["value"]
+        cases = [load_cases.row("steady", value["n"], value["kind"], "ensemble", runs=worst["fields"], of=worst["id"],
+                                interval_95=value.get("interval_95"), reason=value.get("reason")), *cases]
     if ramp and ramp["by"] == "closed_form" and worst["start_up"] is not None:
         cases.append(own_start(worst, ramp))
     some = [c for c in cases if c["in_design"] and np.isfinite(c["n"]) and not held_back(worst)]
@@ -356,7 +353,7 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     by_speed = speeds(rows, v, efficiency)
     pull = gear.pull_at(v, asked["speed_m_s"], efficiency)
     vessel = {"id": "vessel", "name": v.name or None, "needed_bollard_pull_n": needed[0],
-              "needed_interval_95": needed[1:] or None, "needed_t": needed[0] / gear.TONNE,
+              "needed_interval_95": needed[1:] or None, "needed_t": towing.tonnes(needed[0]),
               "speed_m_s": asked["speed_m_s"], "free_speed_m_s": v.free_speed, "free_speed_from": v.free_from,
               "efficiency": efficiency, "given_n": v.pull, "has_n": pull,
               "holds": gear.verdict(n, top and bounds(top), pull), "own_resistance": None, "needed_with_ice_n": None}

@@ -19,7 +19,6 @@ from bergtow.towing.start import bisected
 import numpy as np
 
 FREE_SPEED = 14 * 1852 / 3600   # m/s, assumed if neither the vessel nor the case gives it, as in cases/fullscale
-TONNE = 1000 * towing.vessel.STANDARD_GRAVITY  # N, tonne-force
 
 
 @dataclass(frozen=True)
@@ -107,10 +106,9 @@ def needed_pull(v, load, speed, efficiency, own=0.0):
     return towing.needed_bollard_pull(load, speed, free_speed=v.free_speed, weather=efficiency, own_resistance=own)
 
 
-def pull_at(v, speed, efficiency, own=0.0):
+def pull_at(v, speed, efficiency):
     """The pull of the vessel at a speed, N; NaN without a vessel."""
-    left = efficiency * v.pull * towing.pull_share(speed, v.free_speed) - own
-    return left if not left < 0 else 0.0
+    return efficiency * v.pull * towing.pull_share(speed, v.free_speed)
 
 
 def verdict(load, interval, has):

@@ -5,9 +5,9 @@ import math
 
 from bergtow.table import Table, designed, level, number, short, written
 from bergtow.text import loads as loads_text
+from bergtow.towing.library import KNOT
+from bergtow.towing.vessel import tonnes
 
-KNOT = 1852 / 3600
-TONNE = 9806.65
 HEADINGS = {"load_cases": "Load cases", "parts": "What the tow force is made of", "assumed": "What is assumed",
             "speeds": "Speeds", "plan": "What it took"}
 CASES = {"case.steady": "steady tow", "case.start": "start", "case.own_start": "start as the case orders it",
@@ -111,10 +111,6 @@ def _needs(v, a, tow="The tow"):
             f"{_over(a)}{_in_case(v, a)}{exceeded}")
 
 
-def _steady(v, a):
-    return _needs(v, a, "The steady tow")
-
-
 def _largest(v, a):
     few = next(c["values"] for c in a["load_cases"] if c["id"] == v["case"])
     of = (f", of {few['n_tows']} runs: a lower bound, below which at least {percent(few['share_below'])} of such runs "
@@ -155,11 +151,11 @@ def _vessel(v, a):
     if not known(v["needed_bollard_pull_n"]):
         return "No bollard pull can be named"
     of = v["needed_interval_95"] or (None, None)
-    low, high = (math.ceil(x / TONNE) if known(x) else None for x in of)
+    low, high = (math.ceil(tonnes(x)) if known(x) else None for x in of)
     interval = f" (95 % interval {low} to {'no bound' if high is None else f'{high} t'})" if low is not None else ""
-    tonnes = math.ceil(v["needed_bollard_pull_n"] / TONNE)
     least = "more than" if (a["design"] or {}).get("kind") == "at_least" else "at least"
-    return f"It takes a vessel of {least} {tonnes} t bollard pull{interval}{eta} at {speed(v['speed_m_s'])}"
+    pull = math.ceil(tonnes(v["needed_bollard_pull_n"]))
+    return f"It takes a vessel of {least} {pull} t bollard pull{interval}{eta} at {speed(v['speed_m_s'])}"
 
 
 def _line(v, a):
@@ -209,7 +205,8 @@ def _held_back(v, a):
             "named")
 
 
-WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest, "steady": _steady,
+WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_largest": _largest,
+         "steady": lambda v, a: _needs(v, a, "The steady tow"),
          "needs_at_least": _at_least, "band": _band, "vessel": _vessel, "line": _line, "feasible": _feasible,
          "start": _start, "held_back": _held_back,
          "no_value": lambda v, a: "No tow force can be named: no tow has a window that is long enough"}
@@ -337,7 +334,7 @@ def remarks(answer):
     if v["free_speed_from"] == "assumed":
         out.append(f"the free-running speed of the vessel is assumed, {speed(v['free_speed_m_s'])}")
     if own := v["own_resistance"]:
-        more = " to ".join(f"{math.ceil(n / TONNE)} t" for n in v["needed_with_ice_n"] if known(n))
+        more = " to ".join(f"{math.ceil(tonnes(n))} t" for n in v["needed_with_ice_n"] if known(n))
         out.append("the bollard pull leaves out the resistance of the vessel itself in this ice, "
                    f"{kn(own['low_n'])} to {kn(own['high_n'])} kN, an order of magnitude ({own['source']})"
                    + (f"; with it {more}" if more else ""))
