@@ -21,6 +21,7 @@
 #include "fuzz.h"
 #include "snapshot_file.h"
 #include "run/run_parts.h"
+#include "run/setup.h"
 
 static const struct { const char *text; int64_t steps;
 } bases[] = {
