@@ -61,24 +61,17 @@ static bool movable_large(const bt_world *world, bt_idx i)
     return world->bodies.large[i] && world->bodies.motion[i] == BT_DYNAMIC;
 }
 
-double bt_division_large_path(const bt_world *world)
-{
-    double most = -1;
-    for (bt_idx i = 0; i < world->bodies.n; i++)
-        if (movable_large(world, i)) most = bt_max(most, world->bodies.path[i]);
-    return most;
-}
-
 /// Mark the cells whose floes large movable bodies may meet before they have moved by two floes.
 static void mark_under(bt_world *world)
 {
     const bt_cells *cells = world->cells;
     bt_domain *domain = world->domain;
     memset(domain->under, 0, (size_t)domain->n_x * (size_t)domain->n_y);
-    domain->large_path = bt_division_large_path(world);
     domain->drift = 0;
+    domain->movable = false;
     for (bt_idx i = 0; i < world->bodies.n; i++) {
         if (!movable_large(world, i)) continue;
+        domain->movable = true;
         const bt_cell_range range =
             bt_pairs_range(world, i, cells->margin_max + 4 * world->par.size + cells->reach + cells->allowance);
         for (int32_t y = range.y0; y <= range.y1; y++)

@@ -41,7 +41,7 @@ struct bt_domain {
     double side_x, side_y;   ///< of the cells for which it was made, m
     int large_owner;         ///< rank that owns the large movable bodies
     int64_t large_place;     ///< of a cell under them, or any
-    double large_path;       ///< path of the large movable bodies when the division was made, m
+    bool movable;            ///< there are large movable bodies
     /// displacement of the water through cells that do not move with it (periodic directions), since then, m
     double drift;
     uint8_t *owned;          ///< [n bodies] this rank owns the body
@@ -81,9 +81,6 @@ bool bt_division_is_forced(const bt_world *world);
 /// Time by which a divided field is faster than one rank with all cells, s a step, modelled; work: of a step on all
 /// ranks, s.
 double bt_division_gain(const bt_world *world, double work);
-
-/// Longest path of a large movable body, m; −1 if there is none.
-double bt_division_large_path(const bt_world *world);
 
 /// Rank that owns cell (x, y) of the map; −1 outside.
 int bt_division_owner(const bt_world *world, int32_t x, int32_t y);

@@ -227,8 +227,9 @@ void bt_domain_note(bt_world *world)
     domain->drift += world->par.dt *
                      ((world->par.period_x > 0 ? fabs(world->par.water_u) : 0) +
                       (world->par.period_y > 0 ? fabs(world->par.water_v) : 0));
-    const double path = bt_division_large_path(world);
-    const bool far = path >= 0 && path - domain->large_path + domain->drift > 2 * world->par.size;
+    // The paths of large bodies since the cells were made, which is when the map was renewed: the sum of the longest of
+    // each step, as one may run on after another has stopped.
+    const bool far = domain->movable && cells->moved[cells->n - 1] + domain->drift > 2 * world->par.size;
     domain->sweeps += world->stats.sweeps + world->stats.position_sweeps;
     domain->stats.undivided += domain->undivided;
     if (++domain->steps >= domain->wait) check_balance(world);

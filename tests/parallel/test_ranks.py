@@ -232,6 +232,19 @@ def test_one_rank_takes_a_field_that_the_towed_body_has_left(tmp_path):
     assert 0 < r.summary["undivided_steps"] < r.summary["n_steps"]
 
 
+def test_one_large_body_runs_on_after_another_has_stopped(tmp_path):
+    """The body has stopped at a wall after a long way when a large floe reaches ice that other ranks own. Red where the
+    longest way of all tells when the floes around large bodies are looked up anew: the large floe went through them."""
+    still = {"water_form": 0, "water_skin": 0}
+    case = {"run": {"dt": 0.05, "duration": 16}, "tow": {"mode": "none"}, "output": {"frame_interval": 100},
+            "domain": {"length": 135, "width": 50, "ends": "wall", "sides": "wall"},
+            "ice": {"concentration": 0.5, "size": 0.6, "thickness": 0.04, "friction": 0.3, "drag": still,
+                    "x_min": 60, "x_max": 130, "y_min": -12, "y_max": 8},
+            "floes": [{"shape": "disc", "length": 9, "x": 10, "y": -16.1, "vx": 4, "vy": 0, "thickness": 0.5}],
+            "body": {"shape": "disc", "x": 5, "y": 18, "length": 2, "draft": 0.5, "vx": 20, "vy": 0, "drag": still}}
+    assert_same(run(tmp_path, case, "--threads", 1, "--quiet"), many(tmp_path, 3, 1))
+
+
 def test_a_wrong_division_is_refused(tmp_path):
     result = mpirun(2, "run", "case.yml", cwd=tmp_path, env=environment(BERGTOW_DIVIDE="never"))
     assert result.returncode == 2 and "BERGTOW_DIVIDE=never: give always, or unset it" in result.stderr
