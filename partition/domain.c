@@ -6,6 +6,7 @@
 #include "partition/domain.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,12 +33,25 @@ static bool owns_large(const bt_world *world)
     return !world->domain || world->domain->large_owner == world->domain->comm->rank;
 }
 
+static void need(const bt_world *world, int32_t x, int32_t y)
+{
+    const bt_domain *domain = world->domain;
+    const int64_t p = bt_division_place(world, x, y);
+    if (p < 0 || domain->under[p] || domain->undivided) return;
+    fprintf(stderr,
+            "bergtow: step %lld: rank %d has a large body near floes that the ranks do not exchange; please report this "
+            "case, and run it on one rank\n",
+            (long long)world->step, domain->comm->rank);
+    bt_comm_abort(BT_ERR_NUMERIC);
+}
+
 static bool is_due(const bt_world *world) { return world->domain && world->domain->due; }
 
 static const bt_exchange exchange = {
     .maxima = bt_domain_maxima,
     .owns_cell = owns_cell,
     .owns_large = owns_large,
+    .need = need,
     .due = is_due,
     .migrate = bt_domain_migrate,
     .connect = bt_domain_connect,

@@ -25,6 +25,8 @@ typedef struct bt_exchange {
     /// Does this rank own the contacts of cell (x, y)? And those of the large movable bodies?
     bool (*owns_cell)(const bt_world *world, int32_t x, int32_t y);
     bool (*owns_large)(const bt_world *world);
+    /// End the run if the ranks do not exchange the floes of cell (x, y), which a large body of this rank may meet.
+    void (*need)(const bt_world *world, int32_t x, int32_t y);
     /// Is a new division due?
     bool (*due)(const bt_world *world);
     /// Collective. After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they

@@ -16,6 +16,7 @@
 #include <string.h>
 
 #include "body/bodies.h"
+#include "space/exchange.h"
 
 enum { X, Y, LOW_X, LOW_Y, HIGH_X, HIGH_Y, N_BOX };
 
@@ -291,6 +292,7 @@ static size_t pairs_of_large(const bt_world *world, double clearance_small, doub
         for (int32_t y = range.y0; y <= range.y1; y++)
             for (int32_t x = range.x0; x <= range.x1; x++) {
                 const bt_idx k = bt_cells_at(ts, x, y);
+                if (world->exchange) world->exchange->need(world, x, y);
                 if (k < 0) continue;
                 const size_t end = add_boxes(world, k, scratch, 0);
                 for (size_t i = 0; i < end; i++)
