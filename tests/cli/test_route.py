@@ -907,6 +907,15 @@ def test_edges_of_no_go_areas_are_straight_on_their_map(tmp_path):
         assert np.abs(apart.to_edges(np.zeros((1, 2)), coarse) - 156.2) < 1
 
 
+def test_land_about_the_antipode_is_not_about_the_case(tmp_path):
+    """Red: Antarctica, in a file of all land, holds an Arctic case."""
+    def cap(lat, pole):
+        return [[-180, lat], [0, lat], [180, lat], [180, pole], [-180, pole], [-180, lat]]
+    assert no_go(tmp_path, cap(-65, -90)) == []
+    arctic, = no_go(tmp_path, cap(65, 90))
+    assert apart.inside(np.zeros((1, 2)), arctic)[0]
+
+
 def test_a_plan_tells_of_its_no_go_files_and_warnings(tmp_path):
     """Red: nobody sees that a file lies elsewhere, or what `bergtow check` says of the map."""
     case = ROOT / "cases/route/map.yml"

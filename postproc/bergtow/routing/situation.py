@@ -29,6 +29,7 @@ FIXED = 2  # bt_simulation: a body permanently at rest
 GRAVITY = 9.81  # m/s2
 ORIGIN = "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, unless the ice is outlines in metres"
 BENT, HALVINGS = 1.0, 12  # m, of the edges of a no-go area; how often one is halved at most
+HEMISPHERE = 1e7  # m
 #: keys of the tow that each route sets itself
 OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
@@ -147,14 +148,16 @@ def no_go_areas(path, place):
         return place.map(xy) if local else place.metres(plane.lonlat(xy))
 
     polygons = []
-    for polygon in (p for s in found.shapes for p in getattr(s.geometry, "geoms", [s.geometry])):
+    for k, polygon in enumerate(p for s in found.shapes for p in getattr(s.geometry, "geoms", [s.geometry])):
         ring = np.array(polygon.exterior.coords)
         if not local and crs.is_geographic:
             ring[:, 0] = np.unwrap(ring[:, 0], period=360)
-        polygons.append(unbent(ring, metres)[:-1])
-        far = polygons[-1] - polygons[-1][0]
-        if np.linalg.matrix_rank(far, 1e-9 * np.ptp(far)) < 2:
-            raise RunError(path, f"polygon {len(polygons)} has no area", "correct it or remove it")
+        xy = unbent(ring, metres)[:-1]
+        if np.linalg.matrix_rank(xy - xy[0], 1e-9 * np.ptp(xy - xy[0])) < 2:
+            raise RunError(path, f"polygon {k + 1} has no area", "correct it or remove it")
+        # one that holds the antipode, as Antarctica may, is drawn around everything else
+        if np.hypot(*xy.T).min() < HEMISPHERE or not apart.inside(np.zeros((1, 2)), xy)[0]:
+            polygons.append(xy)
     if not local and crs.is_geographic and not any(map(near, polygons)):
         swapped = np.concatenate([map_plane.vertices(s.geometry)[:, ::-1] for s in found.shapes])
         if near(place.metres(swapped[np.abs(swapped[:, 1]) <= 90])):
