@@ -137,6 +137,7 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
         bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
                 "ice.thickness: no effect, because all outlines have their own thickness");
     warn_of_region(counts, warnings);
+    if (!*counts->crs) return; // nothing of a map was read
     const bt_map_place place = bt_map_place_of(counts, input);
     warn_of_latitude(&place, input, warnings);
     warn_of_plane(&place, input, warnings);
