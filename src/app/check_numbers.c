@@ -169,6 +169,8 @@ static void print_outlines(sink *to, const bt_outline_counts *counts)
         printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64
                " double or collinear vertices dropped\n",
                counts->read, counts->turned, counts->dropped);
+    if (counts->bare && counts->bare < counts->read)
+        printf("without a thickness  %" PRId64 " of them, which have that of the case\n", counts->bare);
     if (*counts->crs) printf("coordinates          %s\n", counts->crs);
     if (*counts->crs && isfinite(counts->east))
         printf("origin               %.10g m east, %.10g m north at x = y = 0\n", counts->east, counts->north);

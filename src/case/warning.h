@@ -103,8 +103,8 @@
     ROW(ICE_OUTSIDE, "ice_outside", "floes of_floes area_m2", "floes lie outside the ice region")                      \
     ROW(OTHER_REGION, "other_region", "file_m2 domain_m2", "the file's concentration refers to another ice region")    \
     ROW(LATITUDE_FIRST, "latitude_first", "latitude_deg longitude_deg", "coordinates may be in the wrong order")       \
-    ROW(NO_LATITUDE, "no_latitude", "latitude_deg", "the outlines have a latitude, but the case has none")             \
-    ROW(OTHER_LATITUDE, "other_latitude", "latitude_deg case_deg", "the case and the outlines differ in latitude")     \
+    ROW(NO_LATITUDE, "no_latitude", "latitude_deg", "the map has a latitude, but the case has none")                   \
+    ROW(OTHER_LATITUDE, "other_latitude", "latitude_deg case_deg", "the case and its map differ in latitude")          \
     ROW(GRID_PLANE, "grid_plane", "crs along across area_percent", "plane coordinates are not corrected")              \
     ROW(NO_THICKNESS, "no_thickness", "outlines of_outlines property thickness_m", "outlines have no thickness")       \
     ROW(STAYS_RIGID, "stays_rigid", "floes", "floes in convex parts do not raft")                                      \

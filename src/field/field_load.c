@@ -32,8 +32,14 @@ bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
     if (status != BT_OK) return status;
     bt_refusals refusals = {.path = input->ice.field, .err = err, .status = BT_OK};
     char why[BT_ICE_WHY];
+    const bt_map_crs crs = bt_map_crs_of(field->outlines.crs);
     note_case(input, field);
-    if (*field->frame && strcmp(field->frame, bt_field_frame(input)))
+    if (crs.kind == BT_MAP_PLANE && !isnan(input->ice.origin_lon)) // nor are outlines in metres read with these keys
+        bt_refuse(&refusals,
+                  "its coordinates are metres of %s, whose north is not that of longitude and latitude, but "
+                  "ice.origin_lon and ice.origin_lat are degrees; remove them: the file has its place",
+                  crs.name);
+    else if (*field->frame && strcmp(field->frame, bt_field_frame(input)))
         bt_refuse(&refusals,
                   "was made for domain.frame: %s, whose x and y would be mirrored in the frame of this case, %s; set "
                   "domain.frame: %s, or make the field for this frame",
@@ -63,37 +69,46 @@ static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
                 counts->own_area, counts->region_area);
 }
 
-static void warn_of_latitude(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
+/// Latitude of the place of the ice, rad; NaN if unknown.
+static double latitude_of(const bt_map_place *place)
 {
+    if (place->kind == BT_MAP_DEGREES) return place->second;
+    if (place->kind != BT_MAP_PLANE) return NAN;
+    const bt_map_crs crs = bt_map_crs_of(place->crs);
+    return bt_map_crs_latitude(&crs, place->first, place->second);
+}
+
+static void warn_of_latitude(const bt_map_place *map, const bt_case *input, bt_errors *warnings)
+{
+    const double place = latitude_of(map) * 180 / BT_PI, lon = map->first * 180 / BT_PI;
     // a basin has no geographic position
-    if (!counts->read || !isfinite(counts->lat) || input->domain.frame != BT_FRAME_GEOGRAPHIC) return;
-    const double place = counts->lat * 180 / BT_PI, lon = counts->lon * 180 / BT_PI;
-    if (isnan(input->ice.origin_lon) && place < 0 && lon >= 37 && lon <= 90)
+    if (isnan(place) || input->domain.frame != BT_FRAME_GEOGRAPHIC) return;
+    if (map->kind == BT_MAP_DEGREES && isnan(input->ice.origin_lon) && place < 0 && lon >= 37 && lon <= 90)
         bt_warn(warnings, BT_WARN_LATITUDE_FIRST,
-                "the outlines lie at latitude %.4g deg, longitude %.4g deg, in the south; if they should lie in the "
+                "the ice lies at latitude %.4g deg, longitude %.4g deg, in the south; if it should lie in the "
                 "north, latitude comes first in the file: write [longitude, latitude]",
                 place, lon);
     const double given = input->water.latitude * 180 / BT_PI;
     if (given == 0 && fabs(place) > 1)
         bt_warn(warnings, BT_WARN_NO_LATITUDE,
-                "the outlines lie at latitude %.4g deg, but without water.latitude there is no Coriolis force; set it "
-                "to %.4g deg",
+                "the ice lies at latitude %.4g deg, but without water.latitude there is no Coriolis force; set it to "
+                "%.4g deg",
                 place, place);
     else if (fabs(place - given) > 1)
         bt_warn(warnings, BT_WARN_OTHER_LATITUDE,
-                "the outlines lie at latitude %.4g deg, but water.latitude is %.4g deg; correct one", place, given);
+                "the ice lies at latitude %.4g deg, but water.latitude is %.4g deg; correct one", place, given);
 }
 
 /// Distortion of lengths and directions by a projection, from its scale at x = y = 0.
-static void warn_of_plane(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
+static void warn_of_plane(const bt_map_place *place, const bt_case *input, bt_errors *warnings)
 {
-    const bt_map_crs crs = bt_map_crs_of(counts->crs);
-    if (!counts->read || crs.kind != BT_MAP_PLANE) return;
+    if (place->kind != BT_MAP_PLANE) return;
+    const bt_map_crs crs = bt_map_crs_of(place->crs);
     double along, across;
-    bt_map_crs_scale(&crs, counts->east, counts->north, &along, &across);
+    bt_map_crs_scale(&crs, place->first, place->second, &along, &across);
     const bool turned = crs.any_north && input->domain.frame == BT_FRAME_GEOGRAPHIC;
     bt_warn(warnings, BT_WARN_GRID_PLANE,
-            "the outlines are in metres of %s, used as plane coordinates. Its scale factor (at x = y = 0 %.4g along "
+            "the floes are in metres of %s, used as plane coordinates. Its scale factor (at x = y = 0 %.4g along "
             "the meridian and %.4g across, areas %+.2g %%) and the angle of its north to true north (convergence%s) "
             "are not corrected; `bergtow outlines` corrects them%s",
             crs.name, along, across, 100 * (along * across - 1),
@@ -105,9 +120,14 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
 {
     if (counts->unnamed)
         bt_warn(warnings, BT_WARN_NO_THICKNESS,
-                "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the thickness "
-                "of the case, %g m on average; rename the property if it is the thickness in metres",
-                (long long)counts->unnamed, (long long)counts->read, counts->nearly, input->ice.thickness);
+                "%lld of %lld outlines have no property `thickness`, but some have %s, which is not read: they have "
+                "the thickness of the case, %g m on average; rename the property if it is the thickness in metres",
+                (long long)counts->bare, (long long)counts->read, counts->nearly, input->ice.thickness);
+    else if (counts->bare && counts->bare < counts->read) // if none has one, that of the case is meant
+        bt_warn(warnings, BT_WARN_NO_THICKNESS,
+                "%lld of %lld outlines have no property `thickness`%s: they have the thickness of the case, %g m on "
+                "average",
+                (long long)counts->bare, (long long)counts->read, "", input->ice.thickness);
     if (counts->split && input->ice.rafting_kappa > 0)
         bt_warn(warnings, BT_WARN_STAYS_RIGID,
                 "ice.rafting: %lld floes are not convex and consist of convex parts: they stay rigid; ice.nonconvex: "
@@ -117,6 +137,8 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
         bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
                 "ice.thickness: no effect, because all outlines have their own thickness");
     warn_of_region(counts, warnings);
-    warn_of_latitude(counts, input, warnings);
-    warn_of_plane(counts, input, warnings);
+    if (!*counts->crs) return; // nothing of a map was read
+    const bt_map_place place = bt_map_place_of(counts, input);
+    warn_of_latitude(&place, input, warnings);
+    warn_of_plane(&place, input, warnings);
 }

@@ -24,34 +24,38 @@ static const double EARTH = 6371e3; // m, mean radius
 static const struct {
     int first, last;
     bt_map_kind kind;
-    bool any_north;
+    bool any_north, south;
     double true_lat, offset; // of a polar projection
 } known[] = {
-    {4326, 4326, BT_MAP_DEGREES, false, 0, 0}, // WGS 84
-    {4979, 4979, BT_MAP_DEGREES, false, 0, 0}, // the same with a height
-    {4258, 4258, BT_MAP_DEGREES, false, 0, 0}, // ETRS89
-    {4937, 4937, BT_MAP_DEGREES, false, 0, 0}, // the same with a height
-    {4269, 4269, BT_MAP_DEGREES, false, 0, 0}, // NAD83
-    {4617, 4617, BT_MAP_DEGREES, false, 0, 0}, // NAD83 (CSRS)
-    {32601, 32660, BT_MAP_PLANE, false, 0, 0}, // UTM north, WGS 84
-    {32701, 32760, BT_MAP_PLANE, false, 0, 0}, // UTM south
-    {25828, 25838, BT_MAP_PLANE, false, 0, 0}, // UTM, ETRS89
-    {26901, 26923, BT_MAP_PLANE, false, 0, 0}, // UTM, NAD83
-    {3411, 3413, BT_MAP_PLANE, true, 70, 0}, // NSIDC sea ice polar stereographic: Hughes north, south; WGS 84 north
-    {3976, 3976, BT_MAP_PLANE, true, 70, 0}, // NSIDC sea ice polar stereographic south, WGS 84
-    {3031, 3031, BT_MAP_PLANE, true, 71, 0}, // Antarctic polar stereographic
-    {3995, 3995, BT_MAP_PLANE, true, 71, 0}, // Arctic polar stereographic
-    {3996, 3996, BT_MAP_PLANE, true, 75, 0}, // IBCAO
-    {5041, 5042, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS north, south
-    {32661, 32661, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS north, other order of axes in the registry
-    {32761, 32761, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // UPS south
-    {5936, 5940, BT_MAP_PLANE, true, UPS_LATITUDE, 2e6}, // EPSG Arctic: Alaska, Canada, Greenland, Norway, Russia
-    {3571, 3576, BT_MAP_PLANE, true, 0, 0}, // north pole Lambert azimuthal equal-area, six meridians
-    {6931, 6932, BT_MAP_PLANE, true, 0, 0}, // EASE-Grid 2.0 north, south
-    {3857, 3857, BT_MAP_WARPED, false, 0, 0}, // Pseudo-Mercator of web maps
-    {3395, 3395, BT_MAP_WARPED, false, 0, 0}, // World Mercator
-    {3785, 3785, BT_MAP_WARPED, false, 0, 0}, // Pseudo-Mercator, withdrawn
-    {900913, 900913, BT_MAP_WARPED, false, 0, 0}, // the same, before it had a code
+    {4326, 4326, BT_MAP_DEGREES, false, false, 0, 0}, // WGS 84
+    {4979, 4979, BT_MAP_DEGREES, false, false, 0, 0}, // the same with a height
+    {4258, 4258, BT_MAP_DEGREES, false, false, 0, 0}, // ETRS89
+    {4937, 4937, BT_MAP_DEGREES, false, false, 0, 0}, // the same with a height
+    {4269, 4269, BT_MAP_DEGREES, false, false, 0, 0}, // NAD83
+    {4617, 4617, BT_MAP_DEGREES, false, false, 0, 0}, // NAD83 (CSRS)
+    {32601, 32660, BT_MAP_PLANE, false, false, 0, 0}, // UTM north, WGS 84
+    {32701, 32760, BT_MAP_PLANE, false, true, 0, 0}, // UTM south
+    {25828, 25838, BT_MAP_PLANE, false, false, 0, 0}, // UTM, ETRS89
+    {26901, 26923, BT_MAP_PLANE, false, false, 0, 0}, // UTM, NAD83
+    {3411, 3411, BT_MAP_PLANE, true, false, 70, 0}, // NSIDC sea ice polar stereographic north, Hughes
+    {3412, 3412, BT_MAP_PLANE, true, true, 70, 0}, // the same, south
+    {3413, 3413, BT_MAP_PLANE, true, false, 70, 0}, // the same, north, WGS 84
+    {3976, 3976, BT_MAP_PLANE, true, true, 70, 0}, // the same, south, WGS 84
+    {3031, 3031, BT_MAP_PLANE, true, true, 71, 0}, // Antarctic polar stereographic
+    {3995, 3995, BT_MAP_PLANE, true, false, 71, 0}, // Arctic polar stereographic
+    {3996, 3996, BT_MAP_PLANE, true, false, 75, 0}, // IBCAO
+    {5041, 5041, BT_MAP_PLANE, true, false, UPS_LATITUDE, 2e6}, // UPS north
+    {5042, 5042, BT_MAP_PLANE, true, true, UPS_LATITUDE, 2e6}, // UPS south
+    {32661, 32661, BT_MAP_PLANE, true, false, UPS_LATITUDE, 2e6}, // UPS north, other order of axes in the registry
+    {32761, 32761, BT_MAP_PLANE, true, true, UPS_LATITUDE, 2e6}, // UPS south
+    {5936, 5940, BT_MAP_PLANE, true, false, UPS_LATITUDE, 2e6}, // Arctic: Alaska, Canada, Greenland, Norway, Russia
+    {3571, 3576, BT_MAP_PLANE, true, false, 0, 0}, // north pole Lambert azimuthal equal-area, six meridians
+    {6931, 6931, BT_MAP_PLANE, true, false, 0, 0}, // EASE-Grid 2.0 north
+    {6932, 6932, BT_MAP_PLANE, true, true, 0, 0}, // EASE-Grid 2.0 south
+    {3857, 3857, BT_MAP_WARPED, false, false, 0, 0}, // Pseudo-Mercator of web maps
+    {3395, 3395, BT_MAP_WARPED, false, false, 0, 0}, // World Mercator
+    {3785, 3785, BT_MAP_WARPED, false, false, 0, 0}, // Pseudo-Mercator, withdrawn
+    {900913, 900913, BT_MAP_WARPED, false, false, 0, 0}, // the same, before it had a code
 };
 
 /// The part after the last ':' or '/'.
@@ -86,8 +90,8 @@ bt_map_crs bt_map_crs_of(const char *name)
         snprintf(crs.name, sizeof crs.name, "EPSG:%d", code);
         for (size_t i = 0; i < sizeof known / sizeof *known; i++)
             if (code >= known[i].first && code <= known[i].last)
-                crs.kind = known[i].kind, crs.any_north = known[i].any_north, crs.true_lat = known[i].true_lat,
-                crs.offset = known[i].offset;
+                crs.kind = known[i].kind, crs.any_north = known[i].any_north, crs.south = known[i].south,
+                crs.true_lat = known[i].true_lat, crs.offset = known[i].offset;
     }
     return crs;
 }
@@ -108,6 +112,31 @@ void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *
         *along = sqrt(1 - half * half);
         *across = 1 / *along;
     }
+}
+
+double bt_map_crs_latitude(const bt_map_crs *crs, double east, double north)
+{
+    // On the sphere from which each kind of projection starts; then its latitude there, less that on the ellipsoid, is
+    // -part e² sin(2 lat) [Snyder 1987, 3-5, 3-18, 3-26, to first order in e²].
+    const double ecc2 = 6.694e-3, axis = 6378.1e3;
+    double lat, part;
+    if (!crs->any_north) { // transverse Mercator, northings from the equator, in the south less 10,000 km
+        const double along = (north - 1e7 * crs->south) / (0.9996 * 6367.4e3), off = (east - 500e3) / (0.9996 * axis);
+        const double cosh_off = (bt_exp(off) + bt_exp(-off)) / 2, sine = bt_sin(along) / cosh_off;
+        lat = bt_atan2(sine, sqrt(1 - sine * sine)), part = 3. / 8;
+        return lat + part * ecc2 * bt_sin(2 * lat);
+    }
+    const double rho = bt_hypot(east - crs->offset, north - crs->offset);
+    if (crs->true_lat > 0) { // stereographic
+        const double exact = crs->true_lat * BT_PI / 180, given = exact - ecc2 / 2 * bt_sin(2 * exact);
+        const double sine = bt_sin(exact), circle = axis * bt_cos(exact) / sqrt(1 - ecc2 * sine * sine);
+        lat = BT_PI / 2 - 2 * bt_atan2(rho * bt_tan(BT_PI / 4 - given / 2), circle), part = 1. / 2;
+    } else { // equal areas: rho = 2 R sin(c/2)
+        const double half = bt_min(rho / (2 * EARTH), 1);
+        lat = BT_PI / 2 - 2 * bt_atan2(half, sqrt(1 - half * half)), part = 1. / 3;
+    }
+    lat += part * ecc2 * bt_sin(2 * lat);
+    return crs->south ? -lat : lat;
 }
 
 // --- places ----------------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ typedef struct bt_map_crs {
     char name[32];   ///< "OGC:CRS84", "EPSG:32633", "local"; an unknown one as given, truncated
     double true_lat; ///< latitude of true scale if polar, deg; 0: equal-area, or not polar
     double offset;   ///< east and north of the pole, m
+    bool south;      ///< of the southern hemisphere
     bool any_north;  ///< grid north can differ from true north by any angle: polar projections
 } bt_map_crs;
 
@@ -34,6 +35,9 @@ bt_map_crs bt_map_crs_of(const char *name);
 /// Scale factor at a place of a projection, metres on the map per metre on the ground, along and across the meridian,
 /// on a sphere: within a thousandth of that on the ellipsoid.
 void bt_map_crs_scale(const bt_map_crs *crs, double east, double north, double *along, double *across);
+
+/// Latitude of a place of a projection, rad, within 0.001°.
+double bt_map_crs_latitude(const bt_map_crs *crs, double east, double north);
 
 // --- places ----------------------------------------------------------------------------------------------------------
 

@@ -588,6 +588,15 @@ def test_a_map_that_is_turned_is_no_rectangle(tmp_path):
     assert numbers["imaged_share"] == pytest.approx(0.5, abs=0.02)
 
 
+def test_the_concentration_of_a_box_is_of_what_lies_in_it(tmp_path):
+    """As of the case that reads it. Red: whole floes over the box, 2.5 of it."""
+    path = write(tmp_path / "map.geojson", [regular(x, 0, 50 * np.sqrt(2), 4, np.pi / 4) for x in (-55, 55)],
+                 map_read.local_crs())
+    _, record = outlines(path, "--centre", "0,0", "--box", "120m,60m", "--clear", "2m", "--heading", 90)
+    clear = np.pi * 2 ** 2
+    assert record["floes"]["concentration"] == pytest.approx(110 * 60 / (120 * 60 - clear), rel=1e-4)
+
+
 @pytest.mark.parametrize("name, read", [("THICKNESS", True), ("Thickness", True), ("thick_m", False)])
 def test_a_thickness_by_another_name(tmp_path, capsys, name, read):
     path = write(tmp_path / "map.geojson", [places(r) for r in RINGS])
@@ -783,6 +792,42 @@ def test_an_ice_chart_is_not_a_map_of_floes(tmp_path):
     assert "100 %" in warning["text"] and len(warning["text"]) <= 160
     assert warning["values"]["holes_m2"] == pytest.approx(plane_area(regular(0, 0, 2e3)), rel=1e-3)
     assert warning["values"]["columns"] == ["POLY_TYPE", "ct"]
+
+
+def with_attributes(path, values, **more):
+    netcdf(path, -2.0, labels=values)
+    with netCDF4.Dataset(path, "a") as f:
+        f["labels"].setncatts(more)
+    return path
+
+
+@pytest.mark.parametrize("more", [{"units": "%"}, {"standard_name": "sea_ice_area_fraction", "units": "1"},
+                                  {"long_name": "Ice Concentration"}, {"long_name": "floe number", "units": "1"}])
+def test_a_grid_of_concentration_is_an_ice_chart(tmp_path, more):
+    """Red: regions of 30 % became floes of 100 %, and nothing was said."""
+    map_ = with_attributes(tmp_path / "map.nc", GRID * 30, **more)
+    _, record = outlines(map_, "--crs", "local")
+    assert ("ice_chart" in coded(record)) == (more.get("long_name") != "floe number")
+
+
+def test_packed_numbers_are_no_labels(tmp_path):
+    """Red: 0.01 to 1 in steps of a hundredth is taken for a hundred labels."""
+    map_ = with_attributes(tmp_path / "map.nc", GRID * 30, scale_factor=0.01)
+    assert "not labels" in outlines(map_, "--crs", "local", code=IO)
+
+
+def test_a_grid_with_a_time(tmp_path):
+    """Red: the time is taken for the map, and with --layer and --band the messages lead in a circle."""
+    with netCDF4.Dataset(tmp_path / "map.nc", "w") as f:
+        for name, n in ("time", 1), ("y", 60), ("x", 80):
+            f.createDimension(name, n)
+            f.createVariable(name, "f8", (name,))[:] = np.arange(n) * (-2.0 if name == "y" else 2.0)
+        f["time"].units = "days since 2020-01-01"
+        for name in "x", "y":
+            f[name].setncatts({"standard_name": f"projection_{name}_coordinate", "units": "m"})
+        f.createVariable("labels", GRID.dtype, ("time", "y", "x"))[:] = GRID[None]
+    rings, _ = outlines(tmp_path / "map.nc", "--crs", "local", "--heading", 90)
+    assert len(rings) == 2 and lie_as_in_the_image(rings)
 
 
 def labelled(path, labels):

@@ -405,10 +405,22 @@ def test_a_thickness_by_another_name_is_reported(tmp_path, name):
 
 def test_other_properties_are_nobodys_business(tmp_path):
     write(tmp_path, feature(ARROW, area=3, class_="floe", date="2026-04-01", id=7, thickness=0.5, thick=2),
-          feature(BOX, name="B"), **named(LOCAL))
+          feature(BOX, name="B", thickness=0.6), **named(LOCAL))
     r = run(tmp_path, FRAMES["geographic"])
-    assert not warned(r, "thickness")
+    assert not warned(r, "property `thickness`")
     assert r.summary["outlines"]["nearly_thickness"] == 0
+
+
+@pytest.mark.parametrize("without", [0, 1, 3])
+def test_floes_that_lack_a_thickness_are_counted(tmp_path, without):
+    """If others have one; else that of the case is meant. Red: no word of those that have that of the case."""
+    write(tmp_path, *(feature(shift(BOX, 0, 10 * k - 40), **{} if k < without else {"thickness": 0.6})
+                      for k in range(3)), **named(LOCAL))
+    found = warnings_of(tmp_path, FRAMES["geographic"])
+    assert found.get("no_thickness") == (None if without in (0, 3) else {
+        "outlines": 1, "of_outlines": 3, "property": "", "thickness_m": 1})
+    counted = re.search(r"^without a thickness +(\d+)", call("check", tmp_path / "case.yml").stdout, re.M)
+    assert (counted and int(counted[1])) == (1 if without == 1 else None)
 
 
 def test_names_do_not_steer_the_terminal(tmp_path):
@@ -438,13 +450,51 @@ def test_absurd_values_of_a_case(tmp_path, key, value):
 # ---- what the place on the earth says ----
 
 
+def warnings_of(folder, case):
+    """{code: values} of check."""
+    r = call("check", write_case(folder, case), "--json")
+    assert r.returncode == DONE, r.stderr
+    return {w["code"]: w["values"] for w in json.loads(r.stdout)["warnings"]}
+
+
 @pytest.mark.parametrize("latitude, says", [(0, "without water.latitude there is no Coriolis force; set it to 7"),
                                             (-60, "but water.latitude is -60 deg; correct one"), (LAT, None)])
 def test_the_latitude_of_the_map_and_of_the_case(tmp_path, latitude, says):
     write(tmp_path, lonlat(ARROW))
     r = call("check", write_case(tmp_path, changed(FRAMES["geographic"], water__latitude=latitude)))
     assert r.returncode == DONE, r.stderr
-    assert ("the outlines lie at latitude" in r.stdout) == (says is not None) and (says or "") in r.stdout
+    assert ("the ice lies at latitude" in r.stdout) == (says is not None) and (says or "") in r.stdout
+
+
+# x = y = 0 and its latitude [PROJ]
+@pytest.mark.parametrize("crs, origin, latitude", [
+    ("EPSG:3413", (1331319.73, -620804.59), 76.5), ("EPSG:3412", (1331319.73, -620804.59), -76.5),
+    ("EPSG:32661", (2.1e6, 3.2e6), 79.185), ("EPSG:6932", (1e6, 1e6), -77.31),
+    ("EPSG:32633", (627977.18, 8493840.14), 76.478), ("EPSG:32733", (6e5, 2.5e6), -67.599)])
+def test_the_latitude_of_a_projection(tmp_path, crs, origin, latitude):
+    """Of outlines, and of a field file of them. Red: only degrees have a latitude, and only outlines warn."""
+    write(tmp_path, shift(ARROW, *origin), **named(crs))
+    first = changed(FRAMES["geographic"], ice__origin_east=origin[0], ice__origin_north=origin[1])
+    field(tmp_path, first)
+    second = changed(FRAMES["geographic"], ice={"field": "out.h5"})
+    for case in first, second:
+        for given in latitude, -latitude:
+            found = warnings_of(tmp_path, changed(case, water__latitude=given))
+            assert "grid_plane" in found
+            assert found.get("other_latitude", {"latitude_deg": None})["latitude_deg"] == (
+                pytest.approx(latitude, abs=0.01) if given != latitude else None)
+
+
+def test_degrees_are_no_place_of_a_field_in_metres(tmp_path):
+    """As they are none of outlines in metres. Red: taken, which turns the field by the convergence."""
+    write(tmp_path, shift(ARROW, 1331319.73, -620804.59), **named("EPSG:3413"))
+    field(tmp_path, FRAMES["geographic"])
+    case = changed(FRAMES["geographic"], ice={"field": "out.h5"} | {"origin_lon": LON, "origin_lat": LAT})
+    r = call("check", write_case(tmp_path, case))
+    assert r.returncode == CASE and "ice.origin_lon" in r.stderr
+    write(tmp_path, ARROW, **named(LOCAL))  # their north is whatever the case says
+    field(tmp_path, FRAMES["geographic"], name="local.h5")
+    assert "other_latitude" not in warnings_of(tmp_path, changed(case, ice__field="local.h5", water__latitude=LAT))
 
 
 def test_latitude_first_of_western_places(tmp_path):
@@ -456,7 +506,7 @@ def test_latitude_first_of_western_places(tmp_path):
     assert "latitude seems to come first" in field(tmp_path, FRAMES["geographic"], code=CASE)
     write(tmp_path, swapped(-65, 70))
     said = call("check", write_case(tmp_path, FRAMES["geographic"])).stdout
-    assert "in the south; if they should lie in the north, latitude comes first" in said
+    assert "in the south; if it should lie in the north, latitude comes first" in said
     for lon, lat in ((120, 40), (-65, 70), (50, 75), (0, -70), (-40, -54)):  # in order
         write(tmp_path, lonlat(ARROW, lon, lat))
         r = call("check", write_case(tmp_path, FRAMES["geographic"]))

@@ -28,8 +28,8 @@ def chart(found, book):
         return None
     holes = book["holes"].after - book["holes"].before if "holes" in book else 0.0
     land = f", {area(holes)} of holes (land, water) became ice" if holes else ""
-    return doubt("ice_chart", f"{', '.join(found.chart[:2])} are columns of an ice chart, so each region became a floe "
-                 f"of 100 %{land}; use outlines of single floes", columns=found.chart, holes_m2=holes)
+    return doubt("ice_chart", f"{', '.join(found.chart[:2])}: as of an ice chart, so each region became a floe of "
+                 f"100 %{land}; use outlines of single floes", columns=found.chart, holes_m2=holes)
 
 
 def merged(floes, book):

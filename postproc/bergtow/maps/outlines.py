@@ -173,8 +173,10 @@ def summed_up(floes, found, rules):
         ground = ground.difference(map_repair.Point(0, 0).buffer(rules.clear, 64))
     if not ground.area > 0:
         raise RunError(found.path, "has nothing of the box in its image", "set --centre, or --box")
+    whole = map_read.prep(ground).contains
+    ice = sum(f.polygon.area if whole(f.polygon) else f.polygon.intersection(ground).area for f in floes)
     refers_to = map_text.BOX if boxed else map_text.HULL if hull else map_text.IMAGED
-    return map_text.numbers(floes, (x0, x1, y0, y1), ground.area, refers_to,
+    return map_text.numbers(floes, (x0, x1, y0, y1), ice / ground.area, refers_to,
                             seen.area / rectangle.area) | {"reach_m": list(reach)}
 
 

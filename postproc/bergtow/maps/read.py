@@ -90,7 +90,7 @@ class Map:
     about: str = ""             #: description in the file
     near: list = field(default_factory=list)     #: unread columns with names close to that of the thickness
     skipped: dict = field(default_factory=dict)  #: {reason: [names]}
-    chart: list = field(default_factory=list)    #: columns that indicate an ice chart, not a map of floes
+    chart: list = field(default_factory=list)    #: columns, or attributes of a grid, of an ice chart, not of floes
 
 
 def need(missing=MISSING):
@@ -114,7 +114,9 @@ def read(path, how):
     except RuntimeError as error:
         raise RunError(path, f"is not a map that GDAL can read ({first_line(error)})",
                        "name outlines (GeoJSON, shapefile, GeoPackage, ...) or an image of labels") from None
-    if source.GetLayerCount():
+    layers = [source.GetLayer(k) for k in range(source.GetLayerCount())]
+    # GDAL also takes the time of a grid in NetCDF for a layer
+    if any(layer.GetGeomType() != ogr.wkbNone for layer in layers) or layers and not source.RasterCount:
         return from_layer(path, source, how)
     source, name = grid_of(path, source, how)
     return from_image(path, source, how, name)
@@ -439,6 +441,10 @@ def from_image(path, source, how, name=None):
     if nodata is not None and nodata in how.water and nodata not in how.unseen and how.nodata is None:
         raise RunError(path, f"has {nodata:g} both for nodata and for water (--water)",
                        "say which it is: --nodata water, or --nodata unseen")
+    packing = band.GetScale() or 1.0, band.GetOffset() or 0.0
+    if packing != (1.0, 0.0):
+        raise RunError(path, "holds packed numbers (scale {:g}, offset {:g}), not labels".format(*packing),
+                       "classify the image first")
     empty = np.zeros(labels.shape, bool)
     if nodata is not None:
         empty = np.isnan(labels) if np.isnan(nodata) else labels == nodata
@@ -449,9 +455,19 @@ def from_image(path, source, how, name=None):
     if source.GetGCPCount() and place is None:
         raise RunError(path, "is placed by control points", "warp it first: gdalwarp -r near")
     reference = source.GetSpatialRef()
-    found = Map(path, reference.ExportToWkt() if reference else None, [], about=about_of(path, source))
+    found = Map(path, reference.ExportToWkt() if reference else None, [], about=about_of(path, source),
+                chart=chart_of(band))
     water = empty | np.isin(labels, how.water)
     return of_labels(found, labels, valid, water, place, how)
+
+
+def chart_of(band):
+    """Attributes of a grid [CF] that tell of ice concentration."""
+    said = {"units": band.GetUnitType(), **band.GetMetadata()}
+    return [f"{key} {said[key]}" for key, words in (("standard_name", ("fraction", "concentration")),
+                                                    ("long_name", ("fraction", "concentration")),
+                                                    ("units", ("%", "percent")))
+            if any(word in said.get(key, "").lower() for word in words)]
 
 
 def of_labels(found, labels, valid, water, place, how):

@@ -75,10 +75,9 @@ def change_lines(book):
     return ["changes:", *lines] if lines else ["changes: none"]
 
 
-def numbers(floes, rectangle, ground, refers_to, share):
-    """Statistics of all floes. rectangle: (x0, x1, y0, y1) along the axes; ground, refers_to: the area that the
-    concentration refers to, in m² and in words; share: the part of the rectangle that was imaged, or that lies in the
-    hull of the outlines."""
+def numbers(floes, rectangle, concentration, refers_to, share):
+    """Statistics of all floes. rectangle: (x0, x1, y0, y1) along the axes; refers_to: what the concentration refers to,
+    in words; share: the part of the rectangle that was imaged, or that lies in the hull of the outlines."""
     areas = np.array([f.polygon.area for f in floes])
     size = np.sqrt(4 * areas / np.pi)
     convex = sum(f.polygon.convex_hull.area <= f.polygon.area * (1 + 1e-9) for f in floes)
@@ -88,7 +87,7 @@ def numbers(floes, rectangle, ground, refers_to, share):
             ("least", "q10", "q25", "median", "q75", "q90", "largest"),
             np.quantile(size, (0, .1, .25, .5, .75, .9, 1)))),
         "size_spread": size.std() / size.mean(), "rectangle_m": list(rectangle), "imaged_share": share,
-        "concentration": areas.sum() / ground, "refers_to": refers_to, "convex": convex, "with_thickness": len(thick),
+        "concentration": concentration, "refers_to": refers_to, "convex": convex, "with_thickness": len(thick),
         "mean_thickness_m": thick.mean() if len(thick) else None, "distribution": distribution(size, areas),
     }
     return out

@@ -43,12 +43,13 @@ def geojson(candidates, place, numbers, path, force):
 
 
 def gpx(candidates, place, path, force):
-    """Write route points of the towing end, or of the body if its speed is prescribed. Raises RunError."""
+    """Write route points of the towing end, or of the body if its speed is prescribed, from its start on. Raises
+    RunError."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>',
              '<gpx version="1.1" creator="bergtow" xmlns="http://www.topografix.com/GPX/1/1">',
              f" <metadata><desc>{escape(writing.MARK)}</desc></metadata>"]
     for c in candidates:
-        points = place.degrees(c.points)
+        points = place.degrees([(c.track if c.tug is None else c.tug)[0], *c.points])
         lines += [f" <rte><name>{escape(c.label)}</name>", f"  <desc>{'body' if c.tug is None else 'vessel'}</desc>"]
         lines += [f"  <rtept lat={quoteattr(f'{lat:.7f}')} lon={quoteattr(f'{lon:.7f}')}/>" for lon, lat in points]
         lines.append(" </rte>")

@@ -72,8 +72,8 @@ def options(p):
     p.add_argument("--from", dest="start", metavar="X,Y", help="start (default: where the case has the body)")
     p.add_argument("--map", type=Path, metavar="FILE", help="the ice: outlines (.geojson) or a field (.h5) in place of "
                    "that of the case")
-    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="GeoJSON polygons of no-go "
-                   "areas: land, shoals, zones; may be repeated. Fixed floes of the case are no-go areas, too")
+    p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="polygons of no-go areas "
+                   "(GeoJSON, ...): land, shoals, zones; may be repeated. Fixed floes of the case are no-go areas, too")
     p.add_argument("--clearance", type=from_zero("m"), metavar="M", default=0.0,
                    help="distance to keep from them (default 0 m)")
     p.add_argument("--objective", choices=tuple(words.UNITS), default="work",
@@ -358,13 +358,20 @@ class Files:
 
 
 def estimate(runs, s, some, n):
-    """Seconds from the estimate of `bergtow check`: for the first candidate's tow with frames, for one without, and the
+    """By `bergtow check`: its warnings, and seconds for the first candidate's tow with frames, for one without, and the
     wall time of the n tows of all candidates."""
-    keys = situation.reading(s.values, s.field) | some[0].keys
-    replay, plain = (json.loads(checked(runs.program, s.case, runs.sets(i, keys), "--json"))["cost"]["core_time_s"]
-                     for i in (0, 1))
+    keys = some[0].keys if s.values["ice.outlines"] else situation.reading(s.values, s.field) | some[0].keys
+    found = [json.loads(checked(runs.program, s.case, runs.sets(i, keys), "--json")) for i in (0, 1)]
+    replay, plain = (one["cost"]["core_time_s"] for one in found)
     ways = sum(c.seconds for c in some) / some[0].seconds
-    return replay, plain, ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
+    whole = ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
+    return found[0]["warnings"], (replay, plain, whole)
+
+
+def elsewhere(s):
+    """Warnings of no-go files of which nothing meets the domain."""
+    return [{"code": "no_go_elsewhere", "text": f"{some['file']}: none of its no-go areas lies in the domain", "values":
+             some} for some in s.no_go_files if not some["in_domain"]]
 
 
 def first_tow(found, told, folders):
@@ -407,13 +414,15 @@ def perform(a):
                        f"{s.hull.width:.4g} m", "choose a goal farther away", CASE)
     if w["replan"]:
         refuse_looks(w, s)
+    for some in s.no_go_files:
+        print(words.no_go(some))
     last = began + 60 * a.budget
     runs = tows.Tows(case.resolve(), folder, "route", program, [], a.jobs, last, last)
     found = {"case": a.case.name, "title": s.values["run.title"] or a.case.stem, "status": "ok", "set": a.set,
              "objective": a.objective, "start": s.start, "goal": goal, "speeds": w["speeds"],
              "force_limit": w["limit"], "radius": w["radius"], "clearance": w["clearance"],
              "hull_width": s.hull.width,
-             "floes": len(s.ice.outlines), "drift": s.drift,
+             "floes": len(s.ice.outlines), "drift": s.drift, "no_go": s.no_go_files, "warnings": elsewhere(s),
              "map_errors": vars(w["errors"]) | {"assumed": w["assumed"]},
              "calibration": None, "verdict": None, "rounds": []}
     with locked(folder / "route") as runs.lock:
@@ -431,12 +440,13 @@ def perform(a):
                   "unreached": unreached}
         files = Files(folder, plan, some, s, goal, a.force)
         files.write_plan()
+        n = 1 if w["errors"].none else a.members
+        warnings, told = estimate(runs, s, some, n)
+        found["warnings"] += warnings
         files.write(found, picture=True)
-        print(words.plan(writing.plain(found)))
+        print("\n".join(words.warnings(found) + [words.plan(writing.plain(found))]))
         if plan.status == "fewer_routes":
             print("\nNo further alternative found: every other path runs within one width of these.")
-        n = 1 if w["errors"].none else a.members
-        told = estimate(runs, s, some, n)
         how = f"{len(some)} candidates, {n} member{'s' * (n > 1)} each: {len(some) * n} tows, {a.jobs} at a time"
         found["estimate_s"] = told[-1]
         if w["replan"]:

@@ -17,7 +17,7 @@ from bergtow.arguments import read
 from bergtow.case import Case
 from bergtow.errors import CASE, USAGE, BergtowError, Refused, RunError
 from bergtow.result.frames import lonlat_of, place as turned
-from bergtow.routing import planner
+from bergtow.routing import apart, planner
 from bergtow.simulation import Simulation
 from bergtow.study.case_file import files
 from bergtow.study.runs import MESSAGES, messages
@@ -28,6 +28,8 @@ import numpy as np
 FIXED = 2  # bt_simulation: a body permanently at rest
 GRAVITY = 9.81  # m/s2
 ORIGIN = "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, unless the ice is outlines in metres"
+BENT, HALVINGS = 1.0, 12  # m, of the edges of a no-go area; how often one is halved at most
+HEMISPHERE = 1e7  # m
 #: keys of the tow that each route sets itself
 OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
@@ -115,40 +117,73 @@ def goal(text, place):
 
 
 def no_go_file(path, place):
-    """Polygons [n, 2] in m of the case from GeoJSON, in degrees, or in metres if its crs is the program's own. Holes
-    count as land. Raises RunError."""
+    """Polygons [n, 2] in m of the case. Raises RunError, with CASE for what the file holds."""
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
-        features = found["features"] if found.get("type") == "FeatureCollection" else [found]
-        geometries = [f.get("geometry", f) for f in features]
-        if any(g is None or g["type"] not in ("Polygon", "MultiPolygon") for g in geometries):
-            raise ValueError("a geometry is not a polygon, or a feature has none")
-        polygons = [p for g in geometries for p in ([g["coordinates"]] if g["type"] == "Polygon" else g["coordinates"])]
-        rings = []
-        for k, polygon in enumerate(polygons):
-            ring = np.array([[float(x) for x in point[:2]] for point in polygon[0]] if polygon else [])
-            if ring.shape[1:] != (2,) or len(ring) < 3 or not np.isfinite(ring).all():
-                raise ValueError(f"polygon {k + 1} has no ring of three finite positions or more")
-            if len(np.unique(ring, axis=0)) < 3 or np.linalg.matrix_rank(ring - ring[0], 1e-9 * np.ptp(ring)) < 2:
-                raise ValueError(f"polygon {k + 1} has no area")
-            rings.append(ring)
-        if not rings:
-            raise ValueError("it holds none")
-        crs = found.get("crs", {}).get("properties", {}).get("name", "")
-    except OSError as error:
-        raise RunError(path, f"cannot be read ({error.strerror})", "name a GeoJSON file of polygons") from None
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        why = error if type(error) in (ValueError, json.JSONDecodeError) else "it is built otherwise"
-        raise RunError(path, f"is not a GeoJSON file of polygons ({why})", "write Polygon or MultiPolygon features, in "
-                       "degrees", CASE) from None
-    local = _library.limit("map_local_crs")
-    if crs not in ("", local) and not crs.upper().endswith("CRS84"):
-        raise RunError(path, f"its coordinates are {crs}", f"convert it with ogr2ogr -t_srs EPSG:4326, or give metres "
-                       f"east and north of x = y = 0 the crs {local}", CASE)
-    if crs != local and place.origin is None:
-        raise RunError(path, "is in degrees, but the map of this case has no place",
-                       f"{ORIGIN}, or give the file metres and the crs {local}", CASE)
-    return [place.map(ring) if crs == local else place.metres(ring) for ring in rings]
+        return no_go_areas(path, place)
+    except RunError as error:
+        if error.path == path and path.is_file():
+            error.status = CASE
+        raise
+
+
+def no_go_areas(path, place):
+    """Read and checked as `bergtow outlines` reads a map. Holes count as land. Raises RunError."""
+    from bergtow.maps import plane as map_plane
+    from bergtow.maps import read as map_read
+    found = map_read.read(path, map_read.Reading(stairs="keep"))
+    if found.seen is not None or found.skipped:
+        odd = [name for names in found.skipped.values() for name in names]
+        raise RunError(path, "is an image" if not odd else f"{odd[0]} is not a polygon", "give polygons alone")
+    if found.crs is None:
+        raise RunError(path, "names no coordinate reference system", "give it one (ogr2ogr -a_srs)")
+    crs = map_plane.system(path, found.crs, None, found.implied)
+    local = isinstance(crs, str)
+    if not local and place.origin is None:
+        raise RunError(path, "has places on the earth, but the map of this case has none",
+                       f"{ORIGIN}, or give the file metres and the crs {map_read.local_crs()}")
+    found.implied = False  # there is no --crs here to say otherwise
+    plane = map_plane.Plane.of(found, crs, None if local else tuple(place.degrees([(0, 0)])[0]), None)
+
+    def metres(xy):
+        return place.map(xy) if local else place.metres(plane.lonlat(xy))
+
+    polygons = []
+    for k, polygon in enumerate(p for s in found.shapes for p in getattr(s.geometry, "geoms", [s.geometry])):
+        ring = np.array(polygon.exterior.coords)
+        if not local and crs.is_geographic:
+            ring[:, 0] = np.unwrap(ring[:, 0], period=360)
+        xy = unbent(ring, metres)[:-1]
+        if np.linalg.matrix_rank(xy - xy[0], 1e-9 * np.ptp(xy - xy[0])) < 2:
+            raise RunError(path, f"polygon {k + 1} has no area", "correct it or remove it")
+        # one that holds the antipode, as Antarctica may, is drawn around everything else
+        if np.hypot(*xy.T).min() < HEMISPHERE or not apart.inside(np.zeros((1, 2)), xy)[0]:
+            polygons.append(xy)
+    if not local and crs.is_geographic and not any(map(near, polygons)):
+        swapped = np.concatenate([map_plane.vertices(s.geometry)[:, ::-1] for s in found.shapes])
+        if near(place.metres(swapped[np.abs(swapped[:, 1]) <= 90])):
+            raise RunError(path, "is far from the map of this case, and on it with latitude and longitude swapped",
+                           "write longitude first")
+    return polygons
+
+
+def near(xy):
+    """Does any position [n, 2], m, lie within reach of a map?"""
+    return bool(np.any(np.hypot(*xy.T) < _library.limit("map_farthest_m")))
+
+
+def unbent(ring, metres):
+    """A closed ring [n, 2] of a map, whose edges are straight there, in m of the case, with vertices added until each
+    edge keeps within BENT of a chord. metres(xy): the projection."""
+    xy = metres(ring)
+    for _ in range(HALVINGS):
+        middle = (ring[:-1] + ring[1:]) / 2
+        there = metres(middle)
+        bent = np.hypot(*(there - (xy[:-1] + xy[1:]) / 2).T) > BENT
+        if not bent.any():
+            break
+        at = np.flatnonzero(bent) + 1
+        ring, xy = np.insert(ring, at, middle[bent], axis=0), np.insert(xy, at, there[bent], axis=0)
+    return xy
 
 
 # ---- the case
@@ -243,6 +278,7 @@ class Situation:
     start: tuple          #: (x, y), m
     extent: tuple         #: (x0, y0, x1, y1), m
     no_go: list           #: polygons [n, 2], m: from --no-go, and fixed floes
+    no_go_files: list     #: [{"file", "polygons", "in_domain"}]: how many polygons it has, and how many meet the domain
     drift: tuple          #: mean velocity of the floes, m/s
     water: tuple          #: of the water, m/s
     ramp: float           #: tow.ramp, s
@@ -273,7 +309,8 @@ def field(program, case, folder):
 
 def reading(case, file):
     """{key: value} that make a case read its floes from a field file."""
-    return {"ice.field": str(file)} | ({"ice.outlines": "none"} if case["ice.outlines"] else {})
+    return {"ice.field": str(file)} | ({"ice.outlines": "none", "ice.outlines_crs": "file", "ice.origin_east": "none",
+                                        "ice.origin_north": "none"} if case["ice.outlines"] else {})
 
 
 def checked(values):
@@ -317,7 +354,10 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     checked(values)
     field_file = floes_of(program, case, values, folder)
     place = place_of(values, lambda: field_file)
-    areas = [polygon for file in no_go for polygon in no_go_file(file, place)]
+    x0, y0 = values["domain.x0"], values["domain.y0"]
+    x1, y1 = x0 + values["domain.length"], y0 + values["domain.width"]
+    domain = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    areas = {file: no_go_file(file, place) for file in no_go}
     with Simulation(Case(case, reading(values, field_file)), threads=1) as sim:
         body, motion, ice = sim.towed, sim.motions, sim.thicknesses > 0
         outlines = [sim.outline(i) for i in range(sim.n_bodies)]
@@ -333,7 +373,6 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     across = width or np.sum(np.hypot(*(np.roll(hull, -1, 0) - hull).T)) / np.pi
     density, kappa = values["ice.density"], values["ice.rafting.kappa"]
     rafting = 0.5 * kappa * density * (1 - density / values["water.density"]) * GRAVITY if kappa > 0 else np.inf
-    x0, y0 = values["domain.x0"], values["domain.y0"]
     return Situation(
         case=case, field=field_file, values=values, place=place,
         ice=planner.Ice(outlines=[outlines[i] for i in floes], thickness=thickness, density=density,
@@ -341,7 +380,10 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
         hull=planner.Hull(width=across, radius=radius, drag=skin + form * across), mass=mass,
         outline=turned(hull, (0, 0, -start[2])),
         start=tuple(map(float, start[:2])),
-        extent=(x0, y0, x0 + values["domain.length"], y0 + values["domain.width"]), no_go=areas + fixed,
+        extent=(x0, y0, x1, y1), no_go=[polygon for some in areas.values() for polygon in some] + fixed,
+        no_go_files=[{"file": str(file), "polygons": len(some),
+                      "in_domain": sum(apart.of(polygon, domain) == 0 for polygon in some)}
+                     for file, some in areas.items()],
         drift=tuple(map(float, drift)), water=water,
         ramp=Case(case, {"tow.ramp": ramp})["tow.ramp"] if ramp is not None else values["tow.ramp"],
         moving=floes)

@@ -45,6 +45,14 @@ def unreached(found):
         f"Left out: {r['label']}: {r['reason']}." for r in left if r["speed"] not in whole]
 
 
+def no_go(some):
+    return f"{some['file']}: {some['polygons']} no-go areas, {some['in_domain']} of them in the domain"
+
+
+def warnings(found):
+    return [f"warning: {w['text']}" for w in found["warnings"]]
+
+
 def percent(x):
     return "–" if x is None else f"{100 * x:+.1f} %"
 
@@ -152,7 +160,7 @@ def calibration(c):
 
 
 def text(found, markdown=False):
-    parts = [plan(found, markdown)]
+    parts = ["\n".join(warnings(found))] * bool(found["warnings"]) + [plan(found, markdown)]
     if found.get("verdict"):
         parts += [verified(found, markdown), meaning(found)]
     if found.get("rounds"):
