@@ -11,6 +11,7 @@ from scipy import stats
 
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
+from bergtow.errors import RunError
 from bergtow.result import answers
 from bergtow.result.run import Run
 from bergtow.study import analysis, bracket, capability
@@ -107,7 +108,7 @@ def test_the_direction_is_that_of_the_trials(counts, limit):
 
 def test_what_contradicts_the_bracket_is_reported():
     def found(counts):
-        return capability.found_of(capability.Condition("case", "the case", np.nan, {}, tried(counts)), 0.1)
+        return capability.found_of(capability.Condition("case", "the case", np.nan, {}, tried(counts)))
     hole = {0.2: (6, 6), 0.3875: (2, 4), 0.575: (0, 4), 0.7625: (0, 4), 0.95: (6, 6)}
     one = found(hole)
     assert not one["resolved"] and one["why"] == "perhaps not monotonic: at 0.575 0 of 4 make it"
@@ -138,7 +139,7 @@ class Told(Run):
     case = path = events = summary = None
 
     def __init__(self, x, y=None, case=None, passed=()):
-        self.case, self.path = case or {}, "told"
+        self.case, self.path = {"tow.speed": "1 m/s"} | (case or {}), "told"
         self.events = [{"kind": "waypoint", "subject": k + 1, "time_s": t} for k, t in enumerate(passed)]
         self.series = {"time": np.arange(float(len(x))), "body_x": np.asarray(x, dtype=float),
                        "body_y": np.zeros(len(x)) if y is None else np.asarray(y, dtype=float)}
@@ -156,9 +157,9 @@ def test_a_tow_that_has_come_to_rest_does_not_make_it():
     rests = Told(np.minimum(np.arange(101.0), 70))
     rests.summary["stalled_windows"] = 3
     one = capability.trial(rests, 1, 0.1)
-    assert one.speed == pytest.approx(0.7) and one.late == 0 and one.stood and not one.made(0.1)
+    assert one.speed == pytest.approx(0.7) and one.late == 0 and one.stood and not one.made
     paused = capability.trial(Told(np.concatenate([np.arange(50), np.full(20, 50), np.arange(50, 81)])), 1, 0.1)
-    assert paused.made(0.1) and paused.late == pytest.approx(1)
+    assert paused.made and paused.late == pytest.approx(1)
 
 
 def test_a_body_that_is_driven_back_makes_no_way(tmp_path):
@@ -175,7 +176,7 @@ def test_a_body_that_is_driven_back_makes_no_way(tmp_path):
                      domain__ends="open")
     with Run(run(tmp_path, drifts).dir) as r:
         one = capability.trial(r, 1, 0.01)
-        assert one.speed < -0.05 and not one.made(0.01)
+        assert one.speed < -0.05 and not one.made
 
 
 def test_a_tow_that_goes_back_makes_way_on_both_legs():
@@ -205,16 +206,32 @@ def test_a_stop_that_is_ordered_is_no_stop_in_the_ice(tmp_path):
         return capability.trial(run, 1, 0.4)
     ordered = np.interp(t, [0, 20, 220, 240], [0, 0.5, 0.5, 0])
     free, held = told(ordered), told(np.where(t > 180, 0, ordered))
-    assert free.speed == pytest.approx(0.5, rel=0.01) and free.late == pytest.approx(0.49, abs=0.01) and free.made(0.4)
-    assert held.late == 0 and not held.made(0.4)
+    assert free.speed == pytest.approx(0.5, rel=0.01) and free.late == pytest.approx(0.49, abs=0.01) and free.made
+    assert held.late == 0 and not held.made
     stops = changed(THRUST, ice__concentration=0.01, domain__length=30, tow__ramp=None, run__duration=60,
                     output__window_start=20, tow__speed=None,
                     tow__programme=[[0, 0], [5, 0.15], [40, 0.15], [42, 0]])
     with Run(run(tmp_path, stops).dir) as r:
         one = capability.trial(r, 1, 0.1)
-        assert one.late > 0.1 and one.made(0.1)
+        assert one.late > 0.1 and one.made
         assert r.made_good(50, 60) < 0.1
         assert r.ordered_speed == pytest.approx(np.interp(r["time"], [0, 5, 40, 42], [0, 0.15, 0.15, 0]))
+
+
+def test_a_tow_is_judged_by_a_speed_that_it_is_ordered_to_keep(tmp_path):
+    """Red when it is judged by a higher one, over the whole window; and by a tenth of the speed of another tow."""
+    stops = {"tow.programme": "[[0 s, 0.5 m/s], [20 s, 0.5 m/s], [30 s, 0 m/s]]"}
+    with pytest.raises(RunError):
+        capability.trial(Told(np.arange(101.0), case=stops), 1, 0.6)
+    for ordered in (0.04, 2.0):
+        told = Told(0.03 * np.arange(101.0), case={"tow.speed": f"{ordered} m/s"})
+        one = capability.trial(told, 1, None)
+        assert one.least == pytest.approx(ordered / 10) and one.made == (ordered < 0.3)
+    assert "tow.speed" in found_in(tmp_path, THRUST, "--speed", 0.2, code=2)
+    assert "tow.speed" in found_in(tmp_path, THRUST, "--speed", 0.1, "--for", "tow.speed=0.05,0.15", code=2)
+    assert "tow.speed" in found_in(tmp_path, THRUST, "--speed", 0.1, "--search", "tow.speed", "--from", 0.05, "--to",
+                                   0.15, code=2)
+    assert not (tmp_path / "out").exists()  # no run was made
 
 
 def found_in(folder, case, *more, code=0):
@@ -368,7 +385,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
         monkeypatch.setattr(runs, "make", lambda name, fields, sets: [failing(i) for i in fields])
         c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=12))
         search.find(c)
-        return c, capability.found_of(c, 0.1)
+        return c, capability.found_of(c)
     c, found = found_with(lambda i: case_runs.Message("diverged") if i == 2 else None)
     assert found["resolved"] and found["points"][0]["failed"] == 1 and found["points"][0]["fields"] == 11
     assert [t.field for t in c.trials[0.2]] == [1, 2, *range(4, 13)]
@@ -380,7 +397,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
     monkeypatch.setattr(runs, "end", 0.0)
     late = capability.Condition("late", "late", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2))
     search.find(late)
-    assert late.why == case_runs.SPENT.text and not capability.found_of(late, 0.1)["resolved"]
+    assert late.why == case_runs.SPENT.text and not capability.found_of(late)["resolved"]
 
 
 def test_a_budget_that_reaches_for_no_run_is_an_error(tmp_path):

@@ -53,6 +53,11 @@ def curve(found):
     return Table(head, rows)
 
 
+def kept(found):
+    """The speed to be kept, in words; a tow of an ordered speed of its own has a speed to keep of its own."""
+    return "a tenth of its tow.speed" if found["speed"] is None else f"{number(found['speed'])} m/s"
+
+
 def meaning(found):
     """The meaning of the words in the tables, and the cost of the study."""
     runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
@@ -63,7 +68,7 @@ def meaning(found):
     if any(None in p["speed"] for c in found["conditions"] for p in c["points"]):
         more += (" Where nothing tows the body to the end of the window, a field has no speed and no tow force; its "
                  "tension, the largest of a step, the start included, is among the others.")
-    return (f"A tow makes it in a field if it keeps {number(found['speed'])} m/s along the ordered tow, on average "
+    return (f"A tow makes it in a field if it keeps {kept(found)} along the ordered tow, on average "
             f"over the window (as far as it is ordered to be so fast there) and over the last quarter of that "
             f"time{line}. Stood still: tows that the ice held for a while. "
             f"A value makes it if more than {100 * found['share']:g} % of all tows do, and does not if fewer do, each "
@@ -134,7 +139,7 @@ def figure(found):
     parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
     between = [c for c in some if c["makes_it"] is not None and c["does_not"] is not None]
     for axes, name, label, unit, line in (
-            (grid[0, 0], "speed", "speed made good, m/s", 1.0, found["speed"]),
+            (grid[0, 0], "speed", "speed made good, m/s", 1.0, found["speed"] or 0.0),
             (grid[0, 1], "tension", f"largest line tension, {newton}", kilo, found["breaking_load"] if parts else 0.0)):
         for c, colour in zip(some, colours * len(some)):
             if c["points"]:
@@ -147,8 +152,9 @@ def figure(found):
         top = max(max(shown), min(2 * max(shown), max(bands[np.isfinite(bands)], default=0.0)))
         axes.set_ylim(min(shown) / unit, 1.06 * top / unit or 1.0)
         axes.grid(True)
-    grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
-                       label=f"to be kept: {number(found['speed'])} m/s")
+    if found["speed"] is not None:
+        grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
+                           label=f"to be kept: {kept(found)}")
     if parts:
         grid[0, 1].axhline(found["breaking_load"] / kilo, color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
                            label="breaking load")
