@@ -462,6 +462,34 @@ def test_its_block_for_a_report(tmp_path):
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3
 
 
+@pytest.mark.parametrize("search, unit, ends", [("tow.line.breaking_load", "N", (5e5, 3e6)),
+                                                ("ice.concentration", "", (0.3, 0.7))])
+def test_a_breaking_load_that_varies_is_drawn_as_the_tows_had_it(search, unit, ends):
+    """Red: one line for all, at the load of the case file; a panel over the values that have a speed alone, in N."""
+    def point(value, load):
+        there = load < 2e6
+        return {"value": value, "fields": 2, "made": 0, "parted": 0, "failed": 0, "stood_still": 0,
+                "breaking_load": load, "speed": [None if there else 0.5] * 2, "mean_speed": None if there else 0.5,
+                "mean_speed_95": [None, None], "tension": [min(load, 2e6)] * 2, "mean_tension": min(load, 2e6),
+                "mean_tension_95": [None, None], "tow_force": [None] * 2, "mean_tow_force": None}
+    loads = [ends] if unit else [(1.5e6, 1.5e6), (3e6, 3e6)]
+    found = {"case": "case.yml", "title": "", "search": search, "unit": unit, "range": list(ends), "for": "",
+             "for_unit": "", "speed": 0.3, "share": 0.5, "most_fields": 6, "breaking_load": None, "budget_min": 1,
+             "spent_min": 1, "grid_runs": 12, "conditions": [
+                 {"label": f"line {k}", "for": None, "makes_it": None, "does_not": None, "estimate": None, "runs": 4,
+                  "resolved": True, "why": "", "points": [point(v, load) for v, load in zip(ends, some)]}
+                 for k, some in enumerate(loads)]}
+    left, right = capability_text.figure(found).axes
+    drawn = [line for line in right.lines if line.get_label() == "breaking load"]
+    assert [tuple(line.get_ydata()) for line in drawn] == [tuple(x / 1e6 for x in some) for some in loads]
+    assert left.get_xlim() == right.get_xlim()
+    assert left.get_xlim()[0] < min(drawn[0].get_xdata()) < max(drawn[0].get_xdata()) < left.get_xlim()[1]
+    assert left.get_xlabel() == ("tow.line.breaking_load, MN" if unit else "concentration, %")
+    assert "parts" in capability_text.meaning(found)
+    found["conditions"][0]["points"][0]["breaking_load"] = None
+    capability_text.figure(found)
+
+
 def test_the_band_of_a_tow_that_is_driven_back_lies_about_its_curve():
     axes = Figure().add_subplot()
     c = {"label": "the case", "points": [

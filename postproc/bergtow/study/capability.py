@@ -5,9 +5,9 @@ which half of the tows no longer succeed.
     bergtow capability CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
     bergtow capability CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"   a sufficient vessel
 
-A tow in one field succeeds if it keeps `--speed` (by default a tenth of its tow.speed) along the ordered tow, on average
-over the window and over its last quarter, and no branch of its line parts. The last quarter counts because the mean of
-a tow that has come to rest in the ice only shows how long it has rested: without it the limit would depend on
+A tow in one field succeeds if it keeps `--speed` (by default a tenth of its tow.speed) along the ordered tow, on
+average over the window and over its last quarter, and no branch of its line parts. The last quarter counts because the
+mean of a tow that has come to rest in the ice only shows how long it has rested: without it the limit would depend on
 run.duration. Only those parts of the window count where tow.programme orders that speed, because no tow keeps it
 through an ordered stop. Rejected: windows with a body that stood still (stalled_windows), since a tow that stops and
 continues succeeds; they are counted separately. The case tows with a vessel (tow.mode thrust), which slows down and
@@ -55,6 +55,7 @@ class Trial:
     parted: bool
     tow_force: float  #: N, mean; NaN: adrift
     tension: float    #: N, largest step mean of the run, its start included
+    breaking_load: float = 0.0  #: N, of a branch of its line; 0: it never parts
     widths: float = np.nan  #: of the domain in body widths
     needed: float = np.nan  #: required by the ice, NaN if it requires none
 
@@ -96,7 +97,8 @@ def trial(run, number, least):
     speed, late, force = (*map(float, kept(run, least)), run.number("mean_tow_force_n")) if towed else (np.nan,) * 3
     return Trial(number, least, speed, late, run.number("stalled_windows") > 0,
                  any(e["kind"] == "line_broken" for e in run.events), force,
-                 float(np.fmax(*(run.number(f"{when}peak_line_tension_n") for when in ("", "start_")))), widths, needed)
+                 float(np.fmax(*(run.number(f"{when}peak_line_tension_n") for when in ("", "start_")))),
+                 run.value("tow.line.breaking_load", 0.0), widths, needed)
 
 
 @dataclass
@@ -212,7 +214,8 @@ def row_of(c, value):
     out = {"value": value, "fields": len(some), "made": sum(int(t.made) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
            "stood_still": sum(t.stood for t in some), "late_speed": [t.late for t in some],
-           "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value)}
+           "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value),
+           "breaking_load": some[0].breaking_load or None}
     for name in ("speed", "tow_force", "tension"):
         x = np.array([getattr(t, name) for t in some])
         out[name] = x.tolist()
@@ -386,7 +389,6 @@ def perform(a):
         print(file=search.say)
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
     across = (a.conditions or "").partition("=")[0].strip()
-    load = case_value(case, "tow.line.breaking_load", 0.0)
     # a key whose default follows from a varied key varies with it
     alike = compared.common(cases)
     title = case.get("run.title", "none")
@@ -395,7 +397,8 @@ def perform(a):
              "range": [start, end], "resolution": resolution, "for": across,
              "for_unit": case.get(across, "").partition(" ")[2],
              "speed": a.speed or STOPPED * case_value(alike, "tow.speed"), "share": a.share,
-             "most_fields": a.fields, "breaking_load": load if load > 0 else None, "budget_min": a.budget,
+             "most_fields": a.fields, "breaking_load": case_value(alike, "tow.line.breaking_load", 0.0) or None,
+             "budget_min": a.budget,
              "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid, "conditions": [found_of(c) for c in some]}
     if not any(any(c.trials.values()) for c in some):
         runs.tell_failed()
