@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """postproc/capability.py: the search of a limit on trials of known chance, and the curve against brute-force runs."""
+import argparse
 import json
 import subprocess
 from pathlib import Path
@@ -40,6 +41,7 @@ def test_how_many_trials_decide():
     assert [bracket.verdict(n, 0) for n in (5, 6)] == ["open", "yes"]
     assert [bracket.verdict(0, n) for n in (5, 6)] == ["open", "no"]
     assert bracket.verdict(11, 1) == "yes" and bracket.verdict(10, 1) == "open" == bracket.verdict(30, 30)
+    assert [bracket.least_trials(q) for q in (0.05, 0.3, 0.5, 0.7, 0.8, 0.95)] == [82, 12, 6, 12, 19, 82]
     assert bracket.verdict(40, 12) == "yes" and bracket.verdict(12, 40) == "no"
 
 
@@ -78,6 +80,16 @@ def test_the_bracket_holds_the_limit(scale, falls):
     assert missed <= 3
     assert np.mean(trials) < (45 if scale < 0.01 else 90)
     assert abs(np.mean(errors)) < 0.01 and np.std(errors) < 0.025
+
+
+@pytest.mark.parametrize("share, most", [(0.5, 12), (0.2, 38), (0.8, 38)])
+def test_the_fields_of_a_value_suffice_for_the_share(share, most):
+    """Red: twelve, which cannot decide a share of 80 % if all of them succeed."""
+    a = argparse.Namespace(search="ice.concentration", start=None, end=None, set=[], conditions=None, share=share,
+                           fields=None)
+    capability.check_options(a)
+    b = searched(bracket.Bracket(0.2, 0.95, 0.4, share, a.fields), lambda v: 1.0, np.random.default_rng(1))
+    assert a.fields == most and b.ends() == (0.95, None) and b.judged(0.2) == bracket.YES
 
 
 def test_ranges_without_a_limit_and_ends_that_are_open():
@@ -370,7 +382,8 @@ def test_what_is_refused(tmp_path):
     assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=3)
     assert "80 %: is not above 0 and at most" in found_in(tmp_path, THRUST, "--resolution", "80 %", code=2)  # read
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
-    assert "4 is not a whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
+    assert "6 fields" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
+    assert "19 fields" in found_in(tmp_path, THRUST, "--fields", 12, "--share", 0.8, code=2)
     assert "each field has its own seed" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
 
 

@@ -34,7 +34,7 @@ from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 import numpy as np
 
 BUDGET = 15.0            # min
-FIELDS = 12              # trials per value, at most
+FIELDS = 2               # trials per value at most / fewest that can decide
 POINTS, CURVE = 5, 4     # of the curve: values, and fields at each
 PARTS = 16               # range / resolution
 STOPPED = 0.1            # share of tow.speed: a slower tow has stopped
@@ -325,8 +325,8 @@ def options(p):
                    help=f"speed that a tow must keep (default: {STOPPED:g} of its tow.speed)")
     p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
                    "(default 0.5)")
-    p.add_argument("--fields", type=whole_from(6, 1000), default=FIELDS, metavar="N",
-                   help=f"fields of a value, at most (default {FIELDS})")
+    p.add_argument("--fields", type=whole_from(1, 1000), metavar="N", help="fields of a value, at most (default: "
+                   f"{FIELDS * bracket.least_trials()}; more where --share takes more to be decided)")
     p.add_argument("--points", type=whole_from(0, 100), default=POINTS, metavar="N",
                    help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
                    "search alone)")
@@ -340,6 +340,11 @@ def check_options(a):
             if a.search not in RANGES:
                 raise BergtowError(f"--search {a.search}: say its range with --from and --to", USAGE)
             setattr(a, name, RANGES[a.search][k])
+    least = bracket.least_trials(a.share)
+    a.fields = a.fields or FIELDS * least
+    if a.fields < least:
+        raise BergtowError(f"--fields {a.fields}: a share of {100 * a.share:g} % takes {least} fields at least to be "
+                           f"decided; give --fields {least} or more", USAGE)
     said = [text.partition("=")[0].strip() for text in (*a.set, a.conditions or "", a.search) if text]
     for key in said:
         if said.count(key) > 1:
