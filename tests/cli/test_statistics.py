@@ -490,6 +490,30 @@ def test_negative_forces_are_in_the_picture(tmp_path):
     assert "Lichey-Hellmer" in [t.get_text() for t in figure.legends[0].get_texts()]
 
 
+def test_the_band_on_a_logarithmic_axis_ends_at_the_bars(tmp_path):
+    """Red: an interval that includes zero at one value drew the band of its neighbour down below the picture."""
+    some = [made_up.member(np.full(30, x), {"ice.concentration": a}, c)
+            for c, (a, fields) in enumerate(((0.6, (50.0, 60.0, 70.0)), (0.85, (100.0, 3000.0, 5000.0))))
+            for x in fields]
+    axes = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
+    bars = [s[:, 1] for s in axes.containers[0][2][0].get_segments()]
+    band = axes.collections[0].get_paths()[0].vertices
+    at = [band[band[:, 0] == x, 1].min() for x in (0.6, 0.85)]
+    assert axes.get_yscale() == "log" and bars[1].min() < 0
+    assert at == pytest.approx([bars[0].min(), axes.get_ylim()[0]])
+
+
+def test_the_heading_counts_copies_apart(tmp_path):
+    """Red: members that are the same run as another were said to have failed or to wait."""
+    some = [made_up.member(np.full(30, 100.0 + a), {"ice.concentration": a}, c, state="water" if a == 0 else None,
+                           **({"status": made_up.FAILED} if a and r == 2 else {}))
+            for c, a in enumerate((0.0, 0.3)) for r in range(3)]
+    figure = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration")
+    [words] = [t.get_text() for t in figure.texts if "members" in t.get_text()]
+    assert [part for part in words.split(", ") if "another" in part] == ["2 the same run as another"]
+    assert "1 failed" in words
+
+
 @pytest.mark.slow
 def test_every_picture_of_a_grid(plain, tmp_path):
     names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
