@@ -582,6 +582,29 @@ def test_pictures_name_every_conversion(tmp_path):
     assert label("crushing") == "peak of a collision (N), each condition by its own impact.conversion"
 
 
+@pytest.mark.parametrize("tail, noted", [({"refused": "few"}, False), (
+    {"threshold": 3.0, "scale": 1.0, "shape": 0.0, "rate_per_hour": 100.0}, True)])
+def test_a_tail_is_explained_where_one_is_drawn(tmp_path, tail, noted):
+    some = [made_up.member(np.ones(30), {"ice.concentration": 0.2}, 0, peaks=(np.linspace(1, 29, 40),
+                                                                            np.linspace(1, 5, 40)))]
+    figure = plot_ensemble.draw_exceedance(Members(made_up.write(tmp_path / "a", some)), None, [tail])
+    assert any("dashed" in t.get_text() for t in figure.texts) == noted
+
+
+def test_the_notes_of_a_narrow_picture_are_within_it(tmp_path):
+    """Red: two refusals in one line, which left the picture on the right."""
+    some = [made_up.member(np.full(30, 100 * a + 10 * v + r), {"ice.concentration": a, "tow.speed": v}, 2 * i + j)
+            for i, a in enumerate((0.2, 0.5)) for j, v in enumerate((0.1, 0.2)) for r in range(4)]
+    e = Members(made_up.write(tmp_path / "a", some))
+    refused = {"refused": "16 values, needs 20 " + 4 * "and then some "}
+    ranks = {"ranks": {k: {"prcc": 0.5, "prcc_95": (0.3, 0.7)} for k in e.parameters}}
+    figure = plot_ensemble.draw_sensitivity(e, ranks | {"sobol": refused, "sobol_of_logarithm": refused})
+    figure.canvas.draw()
+    [note] = [t.get_window_extent() for t in figure.texts if "no Sobol" in t.get_text()]
+    label = figure.axes[0].xaxis.get_tightbbox()
+    assert 0 < note.x0 and max(note.x1, label.x1) < figure.bbox.width and 0 < note.y0 and note.y1 < label.y0
+
+
 # ---- with the program
 
 def flat_names(path):
