@@ -370,6 +370,8 @@ def test_what_is_refused(tmp_path):
     assert "say its range with --from and --to" in found_in(tmp_path, THRUST, "--search", "ice.friction", code=2)
     assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=3)
     assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=2)
+    for words in ("ice.thickness=1m,1m", "ice.thickness=1 m,100 cm", "ice.shape=voronoi,voronoi"):
+        assert "the same case" in found_in(tmp_path, THRUST, "--for", words, code=2)
     assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=2)
     for more in (("--for", "ice.concentration=0.5,0.6"), ("--set", "ice.concentration = 0.5"),
                  ("--for", "ice.thickness=1,2", "--set", "ice.thickness=1")):

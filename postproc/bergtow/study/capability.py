@@ -288,7 +288,11 @@ def conditions(a, binary, start, end, resolution):
     texts = [t.strip() for t in texts.split(",") if t.strip()]
     if not texts:
         raise RunError(a.case, f"--for {a.conditions}: no values", 'write it as "ice.thickness=0.5 m,1 m"', USAGE)
-    return [condition(f"c{k + 1}", f"{key} {text}", key, text) for k, text in enumerate(texts)]
+    out = [condition(f"c{k + 1}", f"{key} {text}", key, text) for k, text in enumerate(texts)]
+    for k, c in enumerate(out):
+        if same := next((other for other in out[:k] if other.cases == c.cases), None):
+            raise RunError(a.case, f"--for: {same.label} and {c.label} are the same case", "leave one out", USAGE)
+    return out
 
 
 def check(case, key):
