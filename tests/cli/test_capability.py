@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """postproc/capability.py: the search of a limit on trials of known chance, and the curve against brute-force runs."""
+import argparse
 import json
 import subprocess
 from pathlib import Path
@@ -11,6 +12,7 @@ from scipy import stats
 
 from harness import BERGTOW, TOW, changed, environment, run, script, write_case
 
+from bergtow.errors import RunError
 from bergtow.result import answers
 from bergtow.result.run import Run
 from bergtow.study import analysis, bracket, capability
@@ -39,6 +41,7 @@ def test_how_many_trials_decide():
     assert [bracket.verdict(n, 0) for n in (5, 6)] == ["open", "yes"]
     assert [bracket.verdict(0, n) for n in (5, 6)] == ["open", "no"]
     assert bracket.verdict(11, 1) == "yes" and bracket.verdict(10, 1) == "open" == bracket.verdict(30, 30)
+    assert [bracket.least_trials(q) for q in (0.05, 0.3, 0.5, 0.7, 0.8, 0.95)] == [82, 12, 6, 12, 19, 82]
     assert bracket.verdict(40, 12) == "yes" and bracket.verdict(12, 40) == "no"
 
 
@@ -79,6 +82,16 @@ def test_the_bracket_holds_the_limit(scale, falls):
     assert abs(np.mean(errors)) < 0.01 and np.std(errors) < 0.025
 
 
+@pytest.mark.parametrize("share, most", [(0.5, 12), (0.2, 38), (0.8, 38)])
+def test_the_fields_of_a_value_suffice_for_the_share(share, most):
+    """Red: twelve, which cannot decide a share of 80 % if all of them succeed."""
+    a = argparse.Namespace(search="ice.concentration", start=None, end=None, set=[], conditions=None, share=share,
+                           fields=None)
+    capability.check_options(a)
+    b = searched(bracket.Bracket(0.2, 0.95, 0.4, share, a.fields), lambda v: 1.0, np.random.default_rng(1))
+    assert a.fields == most and b.ends() == (0.95, None) and b.judged(0.2) == bracket.YES
+
+
 def test_ranges_without_a_limit_and_ends_that_are_open():
     rng = np.random.default_rng(4)
     all_make = searched(bracket.Bracket(0, 1, 0.1), lambda v: 1.0, rng)
@@ -107,7 +120,7 @@ def test_the_direction_is_that_of_the_trials(counts, limit):
 
 def test_what_contradicts_the_bracket_is_reported():
     def found(counts):
-        return capability.found_of(capability.Condition("case", "the case", np.nan, {}, tried(counts)), 0.1)
+        return capability.found_of(capability.Condition("case", "the case", np.nan, {}, tried(counts)))
     hole = {0.2: (6, 6), 0.3875: (2, 4), 0.575: (0, 4), 0.7625: (0, 4), 0.95: (6, 6)}
     one = found(hole)
     assert not one["resolved"] and one["why"] == "perhaps not monotonic: at 0.575 0 of 4 make it"
@@ -138,7 +151,7 @@ class Told(Run):
     case = path = events = summary = None
 
     def __init__(self, x, y=None, case=None, passed=()):
-        self.case, self.path = case or {}, "told"
+        self.case, self.path = {"tow.speed": "1 m/s"} | (case or {}), "told"
         self.events = [{"kind": "waypoint", "subject": k + 1, "time_s": t} for k, t in enumerate(passed)]
         self.series = {"time": np.arange(float(len(x))), "body_x": np.asarray(x, dtype=float),
                        "body_y": np.zeros(len(x)) if y is None else np.asarray(y, dtype=float)}
@@ -156,9 +169,9 @@ def test_a_tow_that_has_come_to_rest_does_not_make_it():
     rests = Told(np.minimum(np.arange(101.0), 70))
     rests.summary["stalled_windows"] = 3
     one = capability.trial(rests, 1, 0.1)
-    assert one.speed == pytest.approx(0.7) and one.late == 0 and one.stood and not one.made(0.1)
+    assert one.speed == pytest.approx(0.7) and one.late == 0 and one.stood and not one.made
     paused = capability.trial(Told(np.concatenate([np.arange(50), np.full(20, 50), np.arange(50, 81)])), 1, 0.1)
-    assert paused.made(0.1) and paused.late == pytest.approx(1)
+    assert paused.made and paused.late == pytest.approx(1)
 
 
 def test_a_body_that_is_driven_back_makes_no_way(tmp_path):
@@ -175,7 +188,7 @@ def test_a_body_that_is_driven_back_makes_no_way(tmp_path):
                      domain__ends="open")
     with Run(run(tmp_path, drifts).dir) as r:
         one = capability.trial(r, 1, 0.01)
-        assert one.speed < -0.05 and not one.made(0.01)
+        assert one.speed < -0.05 and not one.made
 
 
 def test_a_tow_that_goes_back_makes_way_on_both_legs():
@@ -205,16 +218,32 @@ def test_a_stop_that_is_ordered_is_no_stop_in_the_ice(tmp_path):
         return capability.trial(run, 1, 0.4)
     ordered = np.interp(t, [0, 20, 220, 240], [0, 0.5, 0.5, 0])
     free, held = told(ordered), told(np.where(t > 180, 0, ordered))
-    assert free.speed == pytest.approx(0.5, rel=0.01) and free.late == pytest.approx(0.49, abs=0.01) and free.made(0.4)
-    assert held.late == 0 and not held.made(0.4)
+    assert free.speed == pytest.approx(0.5, rel=0.01) and free.late == pytest.approx(0.49, abs=0.01) and free.made
+    assert held.late == 0 and not held.made
     stops = changed(THRUST, ice__concentration=0.01, domain__length=30, tow__ramp=None, run__duration=60,
                     output__window_start=20, tow__speed=None,
                     tow__programme=[[0, 0], [5, 0.15], [40, 0.15], [42, 0]])
     with Run(run(tmp_path, stops).dir) as r:
         one = capability.trial(r, 1, 0.1)
-        assert one.late > 0.1 and one.made(0.1)
+        assert one.late > 0.1 and one.made
         assert r.made_good(50, 60) < 0.1
         assert r.ordered_speed == pytest.approx(np.interp(r["time"], [0, 5, 40, 42], [0, 0.15, 0.15, 0]))
+
+
+def test_a_tow_is_judged_by_a_speed_that_it_is_ordered_to_keep(tmp_path):
+    """Red when it is judged by a higher one, over the whole window; and by a tenth of the speed of another tow."""
+    stops = {"tow.programme": "[[0 s, 0.5 m/s], [20 s, 0.5 m/s], [30 s, 0 m/s]]"}
+    with pytest.raises(RunError):
+        capability.trial(Told(np.arange(101.0), case=stops), 1, 0.6)
+    for ordered in (0.04, 2.0):
+        told = Told(0.03 * np.arange(101.0), case={"tow.speed": f"{ordered} m/s"})
+        one = capability.trial(told, 1, None)
+        assert one.least == pytest.approx(ordered / 10) and one.made == (ordered < 0.3)
+    assert "tow.speed" in found_in(tmp_path, THRUST, "--speed", 0.2, code=2)
+    assert "tow.speed" in found_in(tmp_path, THRUST, "--speed", 0.1, "--for", "tow.speed=0.05,0.15", code=2)
+    assert "tow.speed" in found_in(tmp_path, THRUST, "--speed", 0.1, "--search", "tow.speed", "--from", 0.05, "--to",
+                                   0.15, code=2)
+    assert not (tmp_path / "out").exists()  # no run was made
 
 
 def found_in(folder, case, *more, code=0):
@@ -341,6 +370,8 @@ def test_what_is_refused(tmp_path):
     assert "say its range with --from and --to" in found_in(tmp_path, THRUST, "--search", "ice.friction", code=2)
     assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=3)
     assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=2)
+    for words in ("ice.thickness=1m,1m", "ice.thickness=1 m,100 cm", "ice.shape=voronoi,voronoi"):
+        assert "the same case" in found_in(tmp_path, THRUST, "--for", words, code=2)
     assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=2)
     for more in (("--for", "ice.concentration=0.5,0.6"), ("--set", "ice.concentration = 0.5"),
                  ("--for", "ice.thickness=1,2", "--set", "ice.thickness=1")):
@@ -353,7 +384,8 @@ def test_what_is_refused(tmp_path):
     assert "the ice of this case is read, so that every field is the same" in found_in(tmp_path, case, code=3)
     assert "80 %: is not above 0 and at most" in found_in(tmp_path, THRUST, "--resolution", "80 %", code=2)  # read
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
-    assert "4 is not a whole number from 6 to 1000" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
+    assert "6 fields" in found_in(tmp_path, THRUST, "--fields", 4, code=2)
+    assert "19 fields" in found_in(tmp_path, THRUST, "--fields", 12, "--share", 0.8, code=2)
     assert "each field has its own seed" in found_in(tmp_path, THRUST, "--set", "ice.seed=3", code=2)
 
 
@@ -368,7 +400,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
         monkeypatch.setattr(runs, "make", lambda name, fields, sets: [failing(i) for i in fields])
         c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=12))
         search.find(c)
-        return c, capability.found_of(c, 0.1)
+        return c, capability.found_of(c)
     c, found = found_with(lambda i: case_runs.Message("diverged") if i == 2 else None)
     assert found["resolved"] and found["points"][0]["failed"] == 1 and found["points"][0]["fields"] == 11
     assert [t.field for t in c.trials[0.2]] == [1, 2, *range(4, 13)]
@@ -380,7 +412,7 @@ def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, mo
     monkeypatch.setattr(runs, "end", 0.0)
     late = capability.Condition("late", "late", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2))
     search.find(late)
-    assert late.why == case_runs.SPENT.text and not capability.found_of(late, 0.1)["resolved"]
+    assert late.why == case_runs.SPENT.text and not capability.found_of(late)["resolved"]
 
 
 def test_a_budget_that_reaches_for_no_run_is_an_error(tmp_path):
@@ -443,6 +475,34 @@ def test_its_block_for_a_report(tmp_path):
     assert len(block["figure"]().axes) == 2  # no limit, no panel of it
     assert "breaking load" not in [line.get_label() for line in axes[1].lines]  # far above
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3
+
+
+@pytest.mark.parametrize("search, unit, ends", [("tow.line.breaking_load", "N", (5e5, 3e6)),
+                                                ("ice.concentration", "", (0.3, 0.7))])
+def test_a_breaking_load_that_varies_is_drawn_as_the_tows_had_it(search, unit, ends):
+    """Red: one line for all, at the load of the case file; a panel over the values that have a speed alone, in N."""
+    def point(value, load):
+        there = load < 2e6
+        return {"value": value, "fields": 2, "made": 0, "parted": 0, "failed": 0, "stood_still": 0,
+                "breaking_load": load, "speed": [None if there else 0.5] * 2, "mean_speed": None if there else 0.5,
+                "mean_speed_95": [None, None], "tension": [min(load, 2e6)] * 2, "mean_tension": min(load, 2e6),
+                "mean_tension_95": [None, None], "tow_force": [None] * 2, "mean_tow_force": None}
+    loads = [ends] if unit else [(1.5e6, 1.5e6), (3e6, 3e6)]
+    found = {"case": "case.yml", "title": "", "search": search, "unit": unit, "range": list(ends), "for": "",
+             "for_unit": "", "speed": 0.3, "share": 0.5, "most_fields": 6, "breaking_load": None, "budget_min": 1,
+             "spent_min": 1, "grid_runs": 12, "conditions": [
+                 {"label": f"line {k}", "for": None, "makes_it": None, "does_not": None, "estimate": None, "runs": 4,
+                  "resolved": True, "why": "", "points": [point(v, load) for v, load in zip(ends, some)]}
+                 for k, some in enumerate(loads)]}
+    left, right = capability_text.figure(found).axes
+    drawn = [line for line in right.lines if line.get_label() == "breaking load"]
+    assert [tuple(line.get_ydata()) for line in drawn] == [tuple(x / 1e6 for x in some) for some in loads]
+    assert left.get_xlim() == right.get_xlim()
+    assert left.get_xlim()[0] < min(drawn[0].get_xdata()) < max(drawn[0].get_xdata()) < left.get_xlim()[1]
+    assert left.get_xlabel() == ("tow.line.breaking_load, MN" if unit else "concentration, %")
+    assert "parts" in capability_text.meaning(found)
+    found["conditions"][0]["points"][0]["breaking_load"] = None
+    capability_text.figure(found)
 
 
 def test_the_band_of_a_tow_that_is_driven_back_lies_about_its_curve():

@@ -848,6 +848,18 @@ def test_members_without_their_folders_parted_all_the_same(tmp_path):
     assert gone["conditions"][0]["resistance"]["mean"] == there["conditions"][0]["resistance"]["mean"]
 
 
+def test_return_levels_without_a_design_value_show_their_tails(tmp_path):
+    """Red: an axis up to the largest cluster, past which the dashed tail left the picture."""
+    level = {"fields": 4, "hours": 1.0, "units": "N", "label": "force", "conversion": "", "time_scale_s": 5.0,
+             "design": {"refused": "no level", "tow_hours": 0.1}, "over_threshold": {
+                 "maxima": np.array([140.0, 110.0, 60.0, 30.0]), "threshold": 24.0, "rate_per_hour": 60.0,
+                 "shape": 0.0, "scale": 24.0, "levels": [{"hours": 10.0}, {"hours": 468.0}]}}
+    e = Members(made_up.write(tmp_path / "a", [made_up.member(np.ones(30), {"ice.concentration": 0.2}, 0)]))
+    axes = plot_ensemble.draw_returns(e, [{"label": "one", "loads": {"force": level}}], "force").axes[0]
+    ends = [line.get_ydata()[-1] for line in axes.lines if line.get_marker() != "."]
+    assert max(ends) == pytest.approx(24 + 24 * np.log(60 * 468)) and max(ends) < axes.get_ylim()[1] < 1.2 * max(ends)
+
+
 def test_the_picture_of_return_levels(statement):
     folder, _, s = statement
     e = Members(folder)

@@ -194,8 +194,32 @@ def test_ice_that_pushes_the_body_ahead_is_shown(runs):
 def test_runs_of_other_conditions_are_refused(runs, tmp_path):
     thick = made_up(tmp_path / "thick", 0.7, 1e5, case=changed(BERG, ice__thickness=1.2))
     result = script("plot-resistance", *runs, thick, "-o", tmp_path / "r.png")
-    assert result.returncode == 4 and "thick: has other conditions" in result.stderr and ";" in result.stderr
+    assert result.returncode == 4 and "thick: " in result.stderr and "1.2 m" in result.stderr and ";" in result.stderr
     assert not (tmp_path / "r.png").exists()
+    points = [plot_resistance.read(run) for run in runs[:2]]
+    for p, scaled in zip(points, (1, 2)):
+        p.case = p.case | {"estimate.length_scale": f"{scaled}"}
+    with pytest.raises(RunError, match="estimate.length_scale is 1 there and 2 here"):
+        plot_resistance.check_alike(points)
+
+
+def test_tows_that_the_ice_slows_down_have_estimates_of_their_own(tmp_path):
+    """Red: refused, as one set of curves does not suit them."""
+    points = [plot_resistance.read(made_up(tmp_path / f"{k}", a, 1e5, case=changed(BERG, tow__speed=v)))
+              for k, (a, v) in enumerate(((0.1, 0.5), (0.5, 0.5), (0.5, 0.4), (0.95, 0.3)))]
+    assert plot_resistance.one_set_of_curves(points[:2]) and not plot_resistance.one_set_of_curves(points)
+    figure = plot_resistance.draw(points)
+    lines = {line.get_label(): line for line in reversed(figure.axes[0].lines)}
+    for name, e in points[0].estimates.items():
+        expected = [np.mean([p.estimates[name].force for p in some])
+                    for some in (points[:1], points[1:3], points[3:])]
+        line = lines[e.label + " (comes on top)" * e.on_top]
+        y = np.array(line.get_ydata(), dtype=float) * 1e3
+        drawn = np.isfinite(y)
+        assert list(line.get_xdata()) == [0.1, 0.5, 0.95] and np.allclose(y[drawn], np.array(expected)[drawn]), name
+    assert drawn.all()
+    assert any("0.3 to 0.5 m/s" in t.get_text() for t in figure.texts)
+    assert "as towed in 95 % ice" in plot_resistance.words(points).splitlines()[-1]
 
 
 def test_another_case_is_no_other_seed(runs, tmp_path, capsys):

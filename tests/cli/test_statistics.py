@@ -489,6 +489,30 @@ def test_negative_forces_are_in_the_picture(tmp_path):
     assert "Lichey-Hellmer" in [t.get_text() for t in figure.legends[0].get_texts()]
 
 
+def test_the_band_on_a_logarithmic_axis_ends_at_the_bars(tmp_path):
+    """Red: an interval that includes zero at one value drew the band of its neighbour down below the picture."""
+    some = [made_up.member(np.full(30, x), {"ice.concentration": a}, c)
+            for c, (a, fields) in enumerate(((0.6, (50.0, 60.0, 70.0)), (0.85, (100.0, 3000.0, 5000.0))))
+            for x in fields]
+    axes = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration").axes[0]
+    bars = [s[:, 1] for s in axes.containers[0][2][0].get_segments()]
+    band = axes.collections[0].get_paths()[0].vertices
+    at = [band[band[:, 0] == x, 1].min() for x in (0.6, 0.85)]
+    assert axes.get_yscale() == "log" and bars[1].min() < 0
+    assert at == pytest.approx([bars[0].min(), axes.get_ylim()[0]])
+
+
+def test_the_heading_counts_copies_apart(tmp_path):
+    """Red: members that are the same run as another were said to have failed or to wait."""
+    some = [made_up.member(np.full(30, 100.0 + a), {"ice.concentration": a}, c, state="water" if a == 0 else None,
+                           **({"status": made_up.FAILED} if a and r == 2 else {}))
+            for c, a in enumerate((0.0, 0.3)) for r in range(3)]
+    figure = plot_ensemble.draw_sweep(Members(made_up.write(tmp_path / "a", some)), "ice.concentration")
+    [words] = [t.get_text() for t in figure.texts if "members" in t.get_text()]
+    assert [part for part in words.split(", ") if "another" in part] == ["2 the same run as another"]
+    assert "1 failed" in words
+
+
 @pytest.mark.slow
 def test_every_picture_of_a_grid(plain, tmp_path):
     names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
@@ -555,6 +579,29 @@ def test_pictures_name_every_conversion(tmp_path):
         return plot_ensemble.draw_exceedance(e, None, tails).axes[0].get_xlabel()
     assert label("half-sine of 0.1 s") == "peak of a collision (N), half-sine of 0.1 s"
     assert label("crushing") == "peak of a collision (N), each condition by its own impact.conversion"
+
+
+@pytest.mark.parametrize("tail, noted", [({"refused": "few"}, False), (
+    {"threshold": 3.0, "scale": 1.0, "shape": 0.0, "rate_per_hour": 100.0}, True)])
+def test_a_tail_is_explained_where_one_is_drawn(tmp_path, tail, noted):
+    some = [made_up.member(np.ones(30), {"ice.concentration": 0.2}, 0, peaks=(np.linspace(1, 29, 40),
+                                                                            np.linspace(1, 5, 40)))]
+    figure = plot_ensemble.draw_exceedance(Members(made_up.write(tmp_path / "a", some)), None, [tail])
+    assert any("dashed" in t.get_text() for t in figure.texts) == noted
+
+
+def test_the_notes_of_a_narrow_picture_are_within_it(tmp_path):
+    """Red: two refusals in one line, which left the picture on the right."""
+    some = [made_up.member(np.full(30, 100 * a + 10 * v + r), {"ice.concentration": a, "tow.speed": v}, 2 * i + j)
+            for i, a in enumerate((0.2, 0.5)) for j, v in enumerate((0.1, 0.2)) for r in range(4)]
+    e = Members(made_up.write(tmp_path / "a", some))
+    refused = {"refused": "16 values, needs 20 " + 4 * "and then some "}
+    ranks = {"ranks": {k: {"prcc": 0.5, "prcc_95": (0.3, 0.7)} for k in e.parameters}}
+    figure = plot_ensemble.draw_sensitivity(e, ranks | {"sobol": refused, "sobol_of_logarithm": refused})
+    figure.canvas.draw()
+    [note] = [t.get_window_extent() for t in figure.texts if "no Sobol" in t.get_text()]
+    label = figure.axes[0].xaxis.get_tightbbox()
+    assert 0 < note.x0 and max(note.x1, label.x1) < figure.bbox.width and 0 < note.y0 and note.y1 < label.y0
 
 
 # ---- with the program

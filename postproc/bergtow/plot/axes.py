@@ -21,9 +21,11 @@ def headline(figure, e, subject):
     words = [f"{len(e.used)} members"]
     if doubtful:
         words.append(f"{doubtful} with warnings")
-    missing = e.n - len(e.used)
+    missing = e.n - len(e.used) - len(e.copies)
     if missing:
         words.append(f"{missing} failed, waiting or left out")
+    if e.copies:
+        words.append(f"{len(e.copies)} the same run as another")
     if without := e.without_bound(np.arange(e.n)):
         some = {e.condition[e.name.index(name)] for name in [*without.some, *without.ended]}
         words.append(f"at least these in {len(some)} of {len(np.unique(e.condition))} conditions: no load in "

@@ -13,6 +13,7 @@
 """
 import argparse
 import sys
+import textwrap
 from pathlib import Path
 
 from bergtow import arguments, writing
@@ -106,8 +107,15 @@ def draw_sensitivity(e, x):
         return None
     n = len(given) + 1
     figure, grid = style.subplots(1, n, figsize=(3.2 + 4.2 * n, 2.2 + 0.6 * len(names)), sharey=True, squeeze=False)
+    notes = ["black: 95 %", *(f"no Sobol indices of the {words}: {x[key]['refused']}"
+                              for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm"))
+                              if "refused" in x.get(key, {}))]
     width, height = figure.get_size_inches()
-    figure.subplots_adjust(left=1.7 / width, right=0.98, top=1 - 1.15 / height, bottom=0.85 / height, wspace=0.1)
+    lines = [line for note in notes for line in textwrap.wrap(note, int(13.5 * width))]  # letters of 9 points
+    height += 0.17 * (len(lines) - 1)
+    figure.set_size_inches(width, height)
+    figure.subplots_adjust(left=1.7 / width, right=1 - 0.25 / width, top=1 - 1.15 / height,
+                           bottom=(0.68 + 0.17 * len(lines)) / height, wspace=0.1)
     for axes, (words, s) in zip(grid[0], given):
         draw_indices(axes, names, s["indices"])
         axes.set_title(f"Sobol, of the {words}: R² {s['r2']:.2f}, Q² {s['q2']:.2f}", fontsize=10.5)
@@ -122,12 +130,7 @@ def draw_sensitivity(e, x):
     grid[0, 0].set_yticks(np.arange(len(names)), [short_key(k) for k in names])
     for ax in grid[0]:
         ax.grid(True, axis="x")
-    missing = [
-        f"no Sobol indices of the {words}: {x[key]['refused']}" for words, key in (("mean", "sobol"),
-                                                                                   ("logarithm", "sobol_of_logarithm"))
-        if "refused" in x.get(key, {})
-    ]
-    figure.text(0.3 / width, 0.08 / height, "; ".join(["black: 95 %", *missing]), fontsize=9, color=style.FAINT)
+    figure.text(0.3 / width, 0.08 / height, "\n".join(lines), fontsize=9, color=style.FAINT)
     headline(figure, e, "what the resistance depends on")
     return figure
 

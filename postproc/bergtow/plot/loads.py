@@ -34,7 +34,7 @@ def draw_exceedance(e, options, tails=None):
     some = [c for c in e.conditions() if len(c.finished)]
     figure, axes = style.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.08, right=0.66, top=0.86, bottom=0.14)
-    conversions, top, least = set(), 0.0, np.inf
+    conversions, top, least, notes = set(), 0.0, np.inf, []
     for colour, c in zip(CYCLE, some[::every(some)]):
         hits = [h for h in map(e.impacts, c.finished) if h]
         fields = [{"time": h[0], "peak": h[1], "start": h[2], "hours": h[3]} for h in hits]
@@ -53,18 +53,27 @@ def draw_exceedance(e, options, tails=None):
                                                                       tail["scale"])
             axes.plot(z, np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan), color=colour, linewidth=1,
                       dashes=(4, 2))
+            notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
     if not conversions:
         return None
     style.logarithmic(axes.xaxis, axes.yaxis)
     axes.set(xlim=(max(1e-4 * top, 0.7 * least), 3 * top), xlabel=f"peak of a collision (N), {by(conversions)}",
              ylabel="exceeded (per hour of tow)")
-    notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
     return finished(e, axes, notes, some, "how often a peak is exceeded")
 
 
 def tail(f, hours):
     """Levels at return times, from the tail fitted to peaks over a threshold."""
     return f["threshold"] + f["scale"] * stat_extreme.growth(f["shape"], np.maximum(f["rate_per_hour"] * hours, 1.0))
+
+
+def ends_of(x):
+    """(value, [further ends]) of a load at its longest return times: the design value and its interval; without one, as
+    in a tow shorter than the separation of clusters, the largest cluster and the end of the fitted tail."""
+    f, d = x["over_threshold"], x["design"]
+    if "refused" in d:
+        return max(f["maxima"]), [tail(f, max(level["hours"] for level in f["levels"]))]
+    return d["value"], [v for v in d["interval_95"] if np.isfinite(v)]
 
 
 def draw_return_line(axes, x, label, colour, factor, beside):
@@ -107,8 +116,7 @@ def draw_returns(e, conditions, name):
         return None
     shown, first = some[::every(some)], some[0]["loads"][name]
     designs = [d for d in (c["loads"][name]["design"] for c in shown) if "refused" not in d]
-    # no design value if a tow is shorter than the separation of clusters
-    values = [d["value"] for d in designs] or [max(c["loads"][name]["over_threshold"]["maxima"]) for c in shown]
+    values, ends = zip(*(ends_of(c["loads"][name]) for c in shown))
     factor, unit = style.scale([np.median(values)], first["units"])
     figure, axes = style.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.09, right=0.66, top=0.86, bottom=0.14)
@@ -122,8 +130,7 @@ def draw_returns(e, conditions, name):
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.8 * floor, 4 * max(values) / factor)
     else:
-        ends = [v / factor for d in designs for v in d["interval_95"] if np.isfinite(v)]
-        top = min(2.5 * max(values) / factor, 1.05 * max([*ends, max(values) / factor]))
+        top = min(2.5 * max(values), 1.05 * max([*values, *sum(ends, [])])) / factor
         axes.set_ylim(floor - 0.1 * (top - floor), top)
     axes.set_xlabel("return time (hours of tow)")
     axes.set_ylabel(f"{first['label']} ({unit}), {meaning([c['loads'][name] for c in shown])}")

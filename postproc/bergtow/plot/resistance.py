@@ -3,7 +3,9 @@
 words.
 
 Runs at the same concentration (with different seeds) are drawn individually, with their mean and its 95 % interval; the
-table gives their mean.
+table gives their mean. Estimates are curves for the speed and the width across the tow. Where a vessel or a line lets
+these differ between the tows of one case, the estimates are those of each tow. Rejected: curves at the ordered speed,
+which no such tow made good.
 """
 import sys
 from dataclasses import dataclass
@@ -21,7 +23,7 @@ from bergtow.table import quantity, scale, short
 
 import numpy as np
 
-SAME = 0.02  # relative difference allowed between the curves of runs in one picture
+SAME = 0.02  # relative difference allowed between the thickness or the curves of runs in one picture
 
 
 @dataclass
@@ -84,18 +86,23 @@ def curve(point, name):
     return np.array(curves["concentration"], dtype=float), np.array(curves[name], dtype=float)
 
 
+def one_set_of_curves(points):
+    """Do the curves of the first run suit all of them?"""
+    first = points[0]
+    # the actual floe size varies
+    return all(np.allclose(curve(first, name)[1], curve(other, name)[1], rtol=SAME, atol=0, equal_nan=True)
+               for other in points[1:] for name, e in first.of_ice.items()
+               if not e.uses_floe_size and name in other.of_ice)
+
+
 def check_alike(points):
-    """One set of curves must suit all runs. Raises RunError naming the first two that differ."""
+    """The runs must be of one case. Raises RunError naming the first two that differ."""
     first = points[0]
     for other in points[1:]:
-        # the actual floe size varies
-        for name in (n for n, e in first.of_ice.items() if not e.uses_floe_size and n in other.of_ice):
-            a, b = curve(first, name)[1], curve(other, name)[1]
-            if not np.array_equal(np.isnan(a), np.isnan(b)) or not np.allclose(a, b, rtol=SAME, atol=0, equal_nan=True):
-                raise RunError(
-                    other.path,
-                    f"has other conditions than {first.path} (thickness, width, speed or a key of estimate)",
-                    "draw them in separate pictures")
+        here, there = (p.conditions["thickness_m"] for p in (first, other))
+        if not np.isclose(here, there, rtol=SAME, atol=0):
+            raise RunError(other.path, f"has other ice than {first.path}: {there:.4g} m thick, and {here:.4g} m there",
+                           "draw them in separate pictures")
         key, here, there = next(compared.unlike(first.case, other.case, ("ice.concentration", )), (None, "", ""))
         if key:
             raise RunError(other.path,
@@ -193,21 +200,29 @@ def words(points):
                   f"tow{'s' if row['runs'] > 1 else ''}.", f"    Verdict: {verdict(row)}.",
                   f"    Estimates: {of(points[0].of_ice, row) or 'none is meant for this ice'}."]
     on_top = of({name: e for name, e in points[0].estimates.items() if e.on_top}, row)
-    return "\n".join(lines + ([f"Without ice: {on_top}."] if on_top else []))
+    at = "" if one_set_of_curves(points) else f", as towed in {100 * row['concentration']:.3g} % ice"
+    return "\n".join(lines + ([f"Without ice{at}: {on_top}."] if on_top else []))
+
+
+def estimated(points, name):
+    """(concentration [n], force [n] N, whether the estimate is meant there [n]): a curve, or the values of the tows."""
+    if one_set_of_curves(points):
+        a, force = curve(points[0], name)
+        low, high = np.array(points[0].conditions["curves"]["valid_range"][name], dtype=float)
+        return a, force, (a >= low) & (a <= high)
+    return (np.array(x) for x in zip(*((row["concentration"], row["forces"].get(name, np.nan),
+                                        row["valid"].get(name, False)) for row in rows(points))))
 
 
 def draw_estimates(axes, points, factor):
     """Draw curves: solid where an estimate is valid, thin and dotted elsewhere; a band for an estimate that gives a
     range."""
-    first = points[0]
-    valid = first.conditions["curves"]["valid_range"]
+    first, mark = points[0], None if one_set_of_curves(points) else "d"
     for k, (name, estimate) in enumerate(first.of_ice.items()):
         label, colour = estimate.label, style.ESTIMATES[k % len(style.ESTIMATES)]
-        a, force = curve(first, name)
-        low, high = np.array(valid[name], dtype=float)
-        inside = (a >= low) & (a <= high)
+        a, force, inside = estimated(points, name)
         force = force / factor
-        axes.plot(a, np.where(inside, force, np.nan), color=colour, linewidth=2, label=label)
+        axes.plot(a, np.where(inside, force, np.nan), color=colour, linewidth=2, marker=mark, markersize=4, label=label)
         axes.plot(a, force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5, label=label)
         spans = [p.estimates[name].numbers for p in points if name in p.estimates and p.estimates[name].force]
         spans = [s for s in spans if None not in (s["force_n"], s["low_n"], s["high_n"])]
@@ -215,10 +230,14 @@ def draw_estimates(axes, points, factor):
             down, up = (spans[0][k] / spans[0]["force_n"] for k in ("low_n", "high_n"))
             axes.fill_between(a, np.where(inside, force * down, np.nan), np.where(inside, force * up, np.nan),
                               color=colour, alpha=0.18, linewidth=0, zorder=1.2)
-    for estimate in first.estimates.values():
+    for name, estimate in first.estimates.items():
         if estimate.on_top:
-            axes.axhline(estimate.force / factor, color=style.FAINT, linewidth=1, dashes=(6, 3),
-                         label=f"{estimate.label} (comes on top)")
+            look = {"color": style.FAINT, "linewidth": 1, "dashes": (6, 3), "label": f"{estimate.label} (comes on top)"}
+            if mark:
+                a, force, _ = estimated(points, name)
+                axes.plot(a, force / factor, marker=mark, markersize=4, **look)
+            else:
+                axes.axhline(estimate.force / factor, **look)
 
 
 def limits(points, log):
@@ -262,6 +281,12 @@ def draw_runs(axes, points, factor):
                   color=style.REFERENCE, markersize=6, zorder=6, label="measured")
 
 
+def span(points, key):
+    """A number of the conditions of all runs in words."""
+    some = sorted(p.conditions[key] for p in points)
+    return " to ".join(dict.fromkeys(f"{v:.3g}" for v in (some[0], some[-1])))
+
+
 def write_around(figure, points, lost):
     """Write heading and notes. lost: legends of curves outside the axes."""
     e = points[0].conditions
@@ -273,9 +298,11 @@ def write_around(figure, points, lost):
         fontsize=13.5,
         fontweight="bold")
     figure.text(0.02, 0.94,
-                f"{e['thickness_m']:.3g} m of ice, body {e['width_m']:.3g} m across, {e['speed_along_m_s']:.3g} m/s "
-                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}", va="top", color=style.FAINT)
+                f"{span(points, 'thickness_m')} m of ice, body {span(points, 'width_m')} m across, "
+                f"{span(points, 'speed_along_m_s')} m/s through the ice; {len(points)} "
+                f"run{'s' if len(points) > 1 else ''}", va="top", color=style.FAINT)
     notes = ["dotted: outside the range", "the estimate is meant for", "band: its range, where it has one"]
+    notes += [] if one_set_of_curves(points) else ["estimates: those of each tow"]
     notes += ["out of the picture:", *lost] if lost else []
     if e["length_scale"] != 1:
         notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")

@@ -86,8 +86,10 @@ def draw_fields(axes, e, some, key, factor, log_x):
         draw_members(axes, e, c.finished[order], at, y[order] / factor)
     centre = np.array([y.mean() for y in means])
     if np.isfinite(band).all() and len(x) > 1:
-        axes.fill_between(x, band[:, 0] / factor, band[:, 1] / factor, color=style.ICE, alpha=0.13, linewidth=0,
-                          zorder=2)
+        # a lower end that a logarithmic axis cannot show would draw those of its neighbours down with it
+        floor = axes.get_ylim()[0] if axes.get_yscale() == "log" else -np.inf
+        axes.fill_between(x, np.maximum(band[:, 0] / factor, floor), band[:, 1] / factor, color=style.ICE, alpha=0.13,
+                          linewidth=0, zorder=2)
     axes.plot(x, centre / factor, color=style.ICE, linewidth=1.4, zorder=4)
     half_bar = np.nan_to_num(np.abs(band - centre[:, None])).T / factor
     axes.errorbar(x, centre / factor, yerr=half_bar, fmt="s", color=style.ICE, markersize=5, capsize=3, linewidth=1.3,
@@ -182,6 +184,9 @@ def draw_sweep(e, key):
     figure, grid = style.subplots(rows, columns, figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2), squeeze=False,
                                   sharex=True, sharey=True)
     extra, lost = {}, {}
+    if log_y:
+        style.logarithmic(*(axes.yaxis for axes in grid.flat))
+    grid.flat[0].set_ylim(low / factor, high / factor)
     for axes, (words, some) in zip(grid.flat, shown):
         draw_fields(axes, e, some, key, factor, log_x)
         if key == "ice.concentration":
@@ -193,9 +198,6 @@ def draw_sweep(e, key):
         if log_x:
             style.logarithmic(axes.xaxis)
             axes.set_xticks(np.unique(values), [f"{v:g}" for v in np.unique(values)])
-        if log_y:
-            style.logarithmic(axes.yaxis)
-    grid.flat[0].set_ylim(low / factor, high / factor)
     if not log_x:
         style.times(grid.flat[0].xaxis, reading(key, e.units[key])[0])
         margin = 0.06 * (values.max() - values.min())

@@ -195,10 +195,8 @@ def _capability(found):
     for c in found["conditions"]:
         at = _limit(found, c) + (f" ({found['doubt']})" if found.get("doubt") else "")
         name = "" if not found["for"] else f", {capability_text.condition(found, c)}"
-        yield (f"{key} at which half of the tows no longer keep {number(found['speed'])} m/s{name}"
-               if found["share"] == 0.5 else
-               f"{key} at which {100 * (1 - found['share']):g} % of the tows no longer keep "
-               f"{number(found['speed'])} m/s{name}", at)
+        part = "half" if found["share"] == 0.5 else f"{100 * (1 - found['share']):g} %"
+        yield f"{key} at which {part} of the tows no longer keep {capability_text.kept(found)}{name}", at
 
 
 def _convergence(found, e):

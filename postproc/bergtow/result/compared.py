@@ -92,7 +92,8 @@ def unlike(a, b, but=()):
     """(key, its text in a, in b) of differences that make b a different case: keys that both have, except `but`."""
     physical = _physical((a, b))
     for key, value in a.items():
-        if (physical(key) or key == "run.dt") and key not in but and key in b and _differ(value, b[key]):
+        counts = physical(key) or key.startswith(("run.dt", "estimate."))
+        if counts and key not in but and key in b and _differ(value, b[key]):
             yield key, value, b[key]
 
 

@@ -44,6 +44,14 @@ def verdict(good, bad, share=0.5, level=LEVEL):
     return NO if log_evidence(bad, good, 1 - share) >= -np.log(level) else OPEN
 
 
+def least_trials(share=0.5):
+    """The fewest trials that can decide, whichever side they are on: 6 for a share of one half, 82 for 95 %."""
+    n = 1
+    while verdict(n, 0, share) != YES or verdict(0, n, share) != NO:
+        n += 1
+    return n
+
+
 @dataclass
 class Point:
     """Trials at one value."""

@@ -5,9 +5,9 @@ which half of the tows no longer succeed.
     bergtow capability CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
     bergtow capability CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"   a sufficient vessel
 
-A tow in one field succeeds if it keeps `--speed` (by default a tenth of tow.speed) along the ordered tow, on average
-over the window and over its last quarter, and no branch of its line parts. The last quarter counts because the mean of
-a tow that has come to rest in the ice only shows how long it has rested: without it the limit would depend on
+A tow in one field succeeds if it keeps `--speed` (by default a tenth of its tow.speed) along the ordered tow, on
+average over the window and over its last quarter, and no branch of its line parts. The last quarter counts because the
+mean of a tow that has come to rest in the ice only shows how long it has rested: without it the limit would depend on
 run.duration. Only those parts of the window count where tow.programme orders that speed, because no tow keeps it
 through an ordered stop. Rejected: windows with a body that stood still (stalled_windows), since a tow that stops and
 continues succeeds; they are counted separately. The case tows with a vessel (tow.mode thrust), which slows down and
@@ -34,7 +34,7 @@ from bergtow.study.runs import SPENT, CaseRuns, checked, locked
 import numpy as np
 
 BUDGET = 15.0            # min
-FIELDS = 12              # trials per value, at most
+FIELDS = 2               # trials per value at most / fewest that can decide
 POINTS, CURVE = 5, 4     # of the curve: values, and fields at each
 PARTS = 16               # range / resolution
 STOPPED = 0.1            # share of tow.speed: a slower tow has stopped
@@ -48,27 +48,31 @@ class Trial:
     """The result of one run."""
 
     field: int
+    least: float      #: m/s, to be kept
     speed: float      #: m/s, mean over the parts of the window where the speed is ordered; NaN: adrift
     late: float       #: the same over the last quarter of these
     stood: bool       #: it stood still for some time, held by the ice
     parted: bool
     tow_force: float  #: N, mean; NaN: adrift
     tension: float    #: N, largest step mean of the run, its start included
+    breaking_load: float = 0.0  #: N, of a branch of its line; 0: it never parts
     widths: float = np.nan  #: of the domain in body widths
     needed: float = np.nan  #: required by the ice, NaN if it requires none
 
-    def made(self, least):
-        return min(self.speed, self.late) >= least and not self.parted
+    @property
+    def made(self):
+        return min(self.speed, self.late) >= self.least and not self.parted
 
 
 def kept(run, least):
     """Speeds made good, m/s, over the part of the window in which at least this speed is ordered, and over the last
-    quarter of that part; over the whole window if it is never ordered."""
+    quarter of that part. Raises RunError if there is none."""
     time, (start, end) = run["time"], run.window
     fast = run.ordered_speed >= least * (1 - 1e-9)
     counts = fast[1:] & fast[:-1]
     if not np.any(counts & (time[1:] > start) & (time[:-1] < end)):
-        counts[:] = True
+        raise RunError(run.path, f"the tow is never ordered to keep {least:.3g} m/s in its window",
+                       "ask for a lower --speed, or move output.window_start", USAGE)
     clock, way = (np.append(0.0, np.cumsum(np.diff(x) * counts)) for x in (time, run.way))
     first, last = np.interp([start, end], time, clock)
     since = np.array([first, last - LATE * (last - first)])
@@ -76,7 +80,7 @@ def kept(run, least):
 
 
 def trial(run, number, least):
-    """The trial of a finished run. Raises RunError."""
+    """The trial of a finished run. least: m/s, None for a tenth of its tow.speed. Raises RunError."""
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer", CASE)
     if np.sum(within(run["time"], *run.window)) < 2:
@@ -88,11 +92,13 @@ def trial(run, number, least):
     widths, needed = np.array([domain.get(k) for k in ("body_widths", "body_widths_needed")], dtype=float).tolist()
     # a body that is adrift before the end of the window has no speed and no tow force, but it has the tension that
     # parted its line
+    least = least or STOPPED * run.value("tow.speed")
     towed = run.adrift >= run.window[1]
     speed, late, force = (*map(float, kept(run, least)), run.number("mean_tow_force_n")) if towed else (np.nan,) * 3
-    return Trial(number, speed, late, run.number("stalled_windows") > 0,
+    return Trial(number, least, speed, late, run.number("stalled_windows") > 0,
                  any(e["kind"] == "line_broken" for e in run.events), force,
-                 float(np.fmax(*(run.number(f"{when}peak_line_tension_n") for when in ("", "start_")))), widths, needed)
+                 float(np.fmax(*(run.number(f"{when}peak_line_tension_n") for when in ("", "start_")))),
+                 run.value("tow.line.breaking_load", 0.0), widths, needed)
 
 
 @dataclass
@@ -109,7 +115,7 @@ class Condition:
     wider: dict = field(default_factory=dict)    #: domain.width by value, as text, None if that of the case will do
     alike: set = field(default_factory=set)      #: values whose ice the seed does not change: their fields are one run
     why: str = ""     #: why the search ended early
-    case: dict = field(default_factory=dict)     #: {key: text} of the case with the value of --for
+    cases: list = field(default_factory=list)    #: {key: text} of the cases at the ends of the range
 
 
 @dataclass
@@ -119,7 +125,7 @@ class Search:
     runs: CaseRuns
     key: str
     unit: str         #: of its values, SI
-    least: float      #: m/s
+    least: float      #: m/s, as in trial()
     say: object       #: stream for the progress, None for no output
     widen: bool = True
 
@@ -161,7 +167,7 @@ class Search:
                 continue
             with Run(self.runs.path(name, i)) as run:
                 some.append(trial(run, i + 1, self.least))
-            good = int(some[-1].made(self.least))
+            good = int(some[-1].made)
             point.good, point.bad = point.good + good, point.bad + 1 - good
         if self.say:
             print(f"\r{c.label}, {self.key} {value:.4g}: {point.good} of {point.n} make it\x1b[K", end="",
@@ -202,13 +208,14 @@ class Search:
 # ---- results
 
 
-def row_of(c, value, least):
+def row_of(c, value):
     """The numbers of a value of a condition."""
     some = c.trials[value][:1] if value in c.alike else c.trials[value]
-    out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
+    out = {"value": value, "fields": len(some), "made": sum(int(t.made) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
            "stood_still": sum(t.stood for t in some), "late_speed": [t.late for t in some],
-           "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value)}
+           "body_widths": some[0].widths, "body_widths_needed": some[0].needed, "wider": c.wider.get(value),
+           "breaking_load": some[0].breaking_load or None}
     for name in ("speed", "tow_force", "tension"):
         x = np.array([getattr(t, name) for t in some])
         out[name] = x.tolist()
@@ -234,7 +241,7 @@ def failures(s):
                  and not s.more(p.value) and s.decidable(p, 0)), "")
 
 
-def found_of(c, least):
+def found_of(c):
     """The limit of a condition, and its curve."""
     s = c.search
     yes, no = s.ends()
@@ -248,7 +255,7 @@ def found_of(c, least):
     return {"label": c.label, "for": c.number, "makes_it": yes, "does_not": no,
             "estimate": np.nan if s.against() else s.estimate(), "resolved": sure or not why, "why": why,
             "runs": sum(len(t) for t in c.trials.values()) + sum(len(f) for f in c.failed.values()),
-            "points": [row_of(c, v, least) for v in sorted(c.trials) if c.trials[v]]}
+            "points": [row_of(c, v) for v in sorted(c.trials) if c.trials[v]]}
 
 
 # ---- command line
@@ -268,20 +275,23 @@ def with_number(binary, case, sets, key, text):
     return found, value
 
 
-def conditions(a, binary, given, start, end, resolution):
+def conditions(a, binary, start, end, resolution):
     """The conditions of --for, or only the case."""
-    def search():
-        return bracket.Bracket(start, end, resolution, a.share, a.fields)
+    def condition(name, label, key="", text=""):
+        cases = [with_number(binary, a.case, [*a.set, *([f"{key}={text}"] if key else [])], a.search, end)[0]
+                 for end in (a.start, a.end)]
+        return Condition(name, label, case_value(cases[0], key), {key: text} if key else {},
+                         bracket.Bracket(start, end, resolution, a.share, a.fields), cases=cases)
     if not a.conditions:
-        return [Condition("case", "the case", np.nan, {}, search())]
+        return [condition("case", "the case")]
     key, _, texts = a.conditions.partition("=")
     texts = [t.strip() for t in texts.split(",") if t.strip()]
     if not texts:
         raise RunError(a.case, f"--for {a.conditions}: no values", 'write it as "ice.thickness=0.5 m,1 m"', USAGE)
-    out = []
-    for k, text in enumerate(texts):
-        case = resolved(binary, a.case, [*given, f"{key}={text}"])
-        out.append(Condition(f"c{k + 1}", f"{key} {text}", case_value(case, key), {key: text}, search(), case=case))
+    out = [condition(f"c{k + 1}", f"{key} {text}", key, text) for k, text in enumerate(texts)]
+    for k, c in enumerate(out):
+        if same := next((other for other in out[:k] if other.cases == c.cases), None):
+            raise RunError(a.case, f"--for: {same.label} and {c.label} are the same case", "leave one out", USAGE)
     return out
 
 
@@ -316,11 +326,11 @@ def options(p):
                    f"1/{PARTS} of the range)")
     p.add_argument("--for", dest="conditions", metavar="KEY=V,V", help="search under each of these values")
     p.add_argument("--speed", type=measure("m/s"), metavar="V",
-                   help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
+                   help=f"speed that a tow must keep (default: {STOPPED:g} of its tow.speed)")
     p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
                    "(default 0.5)")
-    p.add_argument("--fields", type=whole_from(6, 1000), default=FIELDS, metavar="N",
-                   help=f"fields of a value, at most (default {FIELDS})")
+    p.add_argument("--fields", type=whole_from(1, 1000), metavar="N", help="fields of a value, at most (default: "
+                   f"{FIELDS * bracket.least_trials()}; more where --share takes more to be decided)")
     p.add_argument("--points", type=whole_from(0, 100), default=POINTS, metavar="N",
                    help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
                    "search alone)")
@@ -334,6 +344,11 @@ def check_options(a):
             if a.search not in RANGES:
                 raise BergtowError(f"--search {a.search}: say its range with --from and --to", USAGE)
             setattr(a, name, RANGES[a.search][k])
+    least = bracket.least_trials(a.share)
+    a.fields = a.fields or FIELDS * least
+    if a.fields < least:
+        raise BergtowError(f"--fields {a.fields}: a share of {100 * a.share:g} % takes {least} fields at least to be "
+                           f"decided; give --fields {least} or more", USAGE)
     said = [text.partition("=")[0].strip() for text in (*a.set, a.conditions or "", a.search) if text]
     for key in said:
         if said.count(key) > 1:
@@ -347,11 +362,10 @@ def perform(a):
     began, binary = time.monotonic(), program_path()
     case = resolved(binary, a.case, a.set)
     check(case, a.search)
-    ends = [with_number(binary, a.case, a.set, a.search, text) for text in (a.start, a.end)]
-    start, end = (value for _, value in ends)
+    start, end = (with_number(binary, a.case, a.set, a.search, text)[1] for text in (a.start, a.end))
     if start == end:
         raise RunError(a.search, "the range has no extent", "give --from and --to two values", USAGE)
-    unit, least = case.get(a.search, "").partition(" ")[2], a.speed or STOPPED * case_value(case, "tow.speed")
+    unit = case.get(a.search, "").partition(" ")[2]
     resolution = abs(end - start) / PARTS
     if a.resolution:
         try:
@@ -361,13 +375,18 @@ def perform(a):
         if not 0 < resolution <= abs(end - start):
             raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
                            f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
+    some = conditions(a, binary, start, end, resolution)
+    cases = [end for c in some for end in c.cases]
+    ordered = min(case_value(end, "tow.speed") for end in cases)
+    if a.speed and a.speed > ordered * (1 + 1e-9):
+        raise RunError(f"--speed {a.speed:g} m/s", f"no tow can keep it that is ordered {ordered:.4g} m/s (tow.speed)",
+                       "ask for that speed or less", USAGE)
     last = began + 60 * a.budget
     runs = CaseRuns(a.case.resolve(), folder, "capability", binary, a.set, a.jobs, last, last)
     replaced = [text.split("=")[0].strip() for text in (*a.set, a.conditions or "", a.search)]
     layers = files(a.case)
     keep = a.keep_width or domain_width.stays({name: section(layers, name) for name in ("domain", "ice")}, replaced)
-    search = Search(runs, a.search, unit, least, sys.stderr if sys.stderr.isatty() else None, not keep)
-    some = conditions(a, binary, a.set, start, end, resolution)
+    search = Search(runs, a.search, unit, a.speed, sys.stderr if sys.stderr.isatty() else None, not keep)
     with locked(folder / "capability") as runs.lock:
         for k, c in enumerate(some):
             runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)
@@ -379,17 +398,17 @@ def perform(a):
         print(file=search.say)
     grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
     across = (a.conditions or "").partition("=")[0].strip()
-    load = case_value(case, "tow.line.breaking_load", 0.0)
     # a key whose default follows from a varied key varies with it
-    alike = compared.common([case, *(c for c, _ in ends), *(c.case for c in some if c.case)])
+    alike = compared.common(cases)
     title = case.get("run.title", "none")
     found = {"case": a.case.name, "values": {k: v for k, v in alike.items() if k not in (a.search, across)},
              "title": "" if title == "none" else title, "set": a.set, "search": a.search, "unit": unit,
              "range": [start, end], "resolution": resolution, "for": across,
              "for_unit": case.get(across, "").partition(" ")[2],
-             "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
-             "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
-             "conditions": [found_of(c, least) for c in some]}
+             "speed": a.speed or STOPPED * case_value(alike, "tow.speed"), "share": a.share,
+             "most_fields": a.fields, "breaking_load": case_value(alike, "tow.line.breaking_load", 0.0) or None,
+             "budget_min": a.budget,
+             "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid, "conditions": [found_of(c) for c in some]}
     if not any(any(c.trials.values()) for c in some):
         runs.tell_failed()
         raise RunError(folder, "the budget is not enough for a run", "raise --budget; the same call continues", SIGNAL)

@@ -53,17 +53,27 @@ def curve(found):
     return Table(head, rows)
 
 
+def breaking_loads(found):
+    """The breaking load at each value of each condition, N; None or 0 where the line never parts."""
+    return [[p.get("breaking_load", found["breaking_load"]) for p in c["points"]] for c in found["conditions"]]
+
+
+def kept(found):
+    """The speed to be kept, in words; a tow of an ordered speed of its own has a speed to keep of its own."""
+    return "a tenth of its tow.speed" if found["speed"] is None else f"{number(found['speed'])} m/s"
+
+
 def meaning(found):
     """The meaning of the words in the tables, and the cost of the study."""
     runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
         p["failed"] for c in found["conditions"] for p in c["points"])
-    line = ", and no branch of its line parts" if found["breaking_load"] else ""
+    line = ", and no branch of its line parts" if any(map(any, breaking_loads(found))) else ""
     more = (f" {failed} runs failed: other fields were run, and a value counts as decided where none of those that "
             "failed could have changed it.") if failed else ""
     if any(None in p["speed"] for c in found["conditions"] for p in c["points"]):
         more += (" Where nothing tows the body to the end of the window, a field has no speed and no tow force; its "
                  "tension, the largest of a step, the start included, is among the others.")
-    return (f"A tow makes it in a field if it keeps {number(found['speed'])} m/s along the ordered tow, on average "
+    return (f"A tow makes it in a field if it keeps {kept(found)} along the ordered tow, on average "
             f"over the window (as far as it is ordered to be so fast there) and over the last quarter of that "
             f"time{line}. Stood still: tows that the ice held for a while. "
             f"A value makes it if more than {100 * found['share']:g} % of all tows do, and does not if fewer do, each "
@@ -120,6 +130,9 @@ def figure(found):
 
     colours = style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT
     some, (factor, read_in) = found["conditions"], reading(found["search"], found["unit"])
+    if found["unit"] == "N":
+        times, read_in = scale(found["range"], "N")
+        factor = 1 / times
     across = all(c["for"] is not None for c in some) and sum(
         c["estimate"] is not None or None not in (c["makes_it"], c["does_not"]) for c in some) > 1
     fig, grid = style.subplots(1, 3 if across else 2, figsize=(12.6 if across else 8.8, 4.4), squeeze=False)
@@ -131,11 +144,12 @@ def figure(found):
     largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
     kilo, newton = scale(largest, "N")
     parted = any(None in p["speed"] for c in some for p in c["points"])
-    parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
+    loads = np.array(sum(breaking_loads(found), []), dtype=float)
+    loads = loads[loads < FAR_LOAD * max(largest, default=0.0)]
     between = [c for c in some if c["makes_it"] is not None and c["does_not"] is not None]
     for axes, name, label, unit, line in (
-            (grid[0, 0], "speed", "speed made good, m/s", 1.0, found["speed"]),
-            (grid[0, 1], "tension", f"largest line tension, {newton}", kilo, found["breaking_load"] if parts else 0.0)):
+            (grid[0, 0], "speed", "speed made good, m/s", 1.0, found["speed"] or 0.0),
+            (grid[0, 1], "tension", f"largest line tension, {newton}", kilo, max(loads, default=0.0))):
         for c, colour in zip(some, colours * len(some)):
             if c["points"]:
                 _curve(axes, c, name, colour, factor, unit)
@@ -146,13 +160,23 @@ def figure(found):
         bands = np.array([p[f"mean_{name}_95"][1] for c in some for p in c["points"]], dtype=float)
         top = max(max(shown), min(2 * max(shown), max(bands[np.isfinite(bands)], default=0.0)))
         axes.set_ylim(min(shown) / unit, 1.06 * top / unit or 1.0)
+        # also over values without a speed, whose line parted
+        margin = 0.04 * factor * abs(np.subtract(*found["range"]))
+        axes.set_xlim(min(found["range"]) * factor - margin, max(found["range"]) * factor + margin)
         axes.grid(True)
-    grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
-                       label=f"to be kept: {number(found['speed'])} m/s")
-    if parts:
-        grid[0, 1].axhline(found["breaking_load"] / kilo, color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
-                           label="breaking load")
-        grid[0, 1].legend()
+    if found["speed"] is not None:
+        grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
+                           label=f"to be kept: {kept(found)}")
+    if len(loads):
+        dashed = {"linewidth": 1, "linestyle": (0, (4, 3)), "label": "breaking load"}
+        if found["breaking_load"]:
+            grid[0, 1].axhline(found["breaking_load"] / kilo, color=style.INK, **dashed)
+        else:
+            for c, of_values, colour in zip(some, breaking_loads(found), colours * len(some)):
+                grid[0, 1].plot([factor * p["value"] for p in c["points"]],
+                                np.array(of_values, dtype=float) / kilo, color=colour, **dashed)
+        handles, labels, _ = style.legend_of(grid[0, 1])
+        grid[0, 1].legend(handles, labels)
     grid[0, 0].legend()
     if across:
         axes, x = grid[0, 2], [c["for"] for c in some]
