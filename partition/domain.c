@@ -39,8 +39,8 @@ static void need(const bt_world *world, int32_t x, int32_t y)
     const int64_t p = bt_division_place(world, x, y);
     if (p < 0 || domain->under[p] || domain->undivided) return;
     fprintf(stderr,
-            "bergtow: step %lld: rank %d has a large body near floes that the ranks do not exchange; please report this "
-            "case, and run it on one rank\n",
+            "bergtow: step %lld: rank %d has a large body near floes that the ranks do not exchange; please report "
+            "this case, and run it on one rank\n",
             (long long)world->step, domain->comm->rank);
     bt_comm_abort(BT_ERR_NUMERIC);
 }
