@@ -762,7 +762,7 @@ def test_the_estimate_of_the_tows(monkeypatch):
     def candidate(seconds):
         return SimpleNamespace(name="straight", seconds=seconds, keys={})
     some = [candidate(100.0), candidate(150.0)]
-    s = SimpleNamespace(values={"ice.outlines": ""}, field="ice.h5", case="case.yml")
+    s = SimpleNamespace(values={"ice.outlines": "", "ice.field": "ice.h5"}, field="ice.h5", case="case.yml")
     runs = SimpleNamespace(program="bergtow", jobs=2, sets=lambda i, keys: [i])
     monkeypatch.setattr(route, "checked", lambda program, case, sets, words: json.dumps(
         {"cost": {"core_time_s": 3 - sets[0]}, "warnings": [sets[0]]}))
@@ -873,7 +873,7 @@ def no_go(folder, ring, crs=None, place=HERE):
     (folder / "zone.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [
         {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [np.array(ring).tolist()]}}
     ]} | ({"crs": {"type": "name", "properties": {"name": crs}}} if crs else {})))
-    return situation.no_go_file(folder / "zone.geojson", place)
+    return [piece for pieces in situation.no_go_file(folder / "zone.geojson", place) for piece in pieces]
 
 
 def polar(ring):
@@ -886,10 +886,10 @@ def test_no_go_areas_are_read_as_outlines_are(tmp_path):
     wanted = HERE.metres(ZONE[:-1])
     for ring, crs in (ZONE, None), (polar(ZONE), "EPSG:3413"):
         found, = no_go(tmp_path, ring, crs)
-        assert np.allclose(found, wanted, atol=1e-2)
+        assert len(found) == len(wanted) and apart.to_edges(found, wanted).max() < 1e-2
     west = situation.Place(True, tuple(np.radians([-20, 76.5])))
     found, = no_go(tmp_path, np.array(ZONE) + [320, 0], None, west)  # longitudes from 0 to 360
-    assert np.allclose(found, wanted, atol=1e-3)
+    assert len(found) == len(wanted) and apart.to_edges(found, wanted).max() < 1e-3
     for ring in np.array(ZONE)[:, ::-1], polar(ZONE):
         with pytest.raises(RunError):
             no_go(tmp_path, ring)
@@ -914,6 +914,25 @@ def test_land_about_the_antipode_is_not_about_the_case(tmp_path):
     assert no_go(tmp_path, cap(-65, -90)) == []
     arctic, = no_go(tmp_path, cap(65, 90))
     assert apart.inside(np.zeros((1, 2)), arctic)[0]
+    # a continent that holds the antipode and comes nearer than a quarter of the earth
+    eurasia = [[-10, 36], [30, 70], [100, 78], [180, 68], [140, 40], [105, 0], [75, 10], [50, 15], [20, -35], [-10, 36]]
+    weddell, prydz = (situation.Place(True, tuple(np.radians(at))) for at in ((-45, -65), (-60, -67)))
+    assert no_go(tmp_path, eurasia, place=weddell) == [] and no_go(tmp_path, eurasia, place=prydz) == []
+
+
+def test_no_go_areas_around_a_pole(tmp_path):
+    """Red: a ring around the pole has no area on a map of degrees."""
+    near = situation.Place(True, tuple(np.radians([0, 89.9])))
+    ring = [[0, 88], [90, 88], [180, 88], [-90, 88], [0, 88]]
+    found, = no_go(tmp_path, ring, place=near)
+    at = near.metres([[lon, lat] for lon in (45, 200, -80) for lat in (89.9, 88.6, 86.9)])
+    assert apart.inside(at, found).tolist() == [True, True, False] * 3
+
+
+def test_a_no_go_file_of_all_land_is_not_taken_for_swapped(tmp_path):
+    """Mumbai mirrors 19 E 72.8 N. Red: one vertex on the map with latitude first refuses the file."""
+    case = situation.Place(True, tuple(np.radians([19, 72.8])))
+    assert no_go(tmp_path, [[72.8, 19], [80, 10], [78, 30], [72.8, 19]], place=case) == []
 
 
 def test_a_plan_tells_of_its_no_go_files_and_warnings(tmp_path):

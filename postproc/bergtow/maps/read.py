@@ -63,6 +63,8 @@ class Reading:
     unseen: tuple = ()      #: values of an image that mark areas that were not observed
     footprint: tuple = None #: corners of the imaged area, in columns and rows for an image
     stairs: str = "undo"    #: or "keep"
+    bare: bool = False      #: outlines alone: a column of thicknesses is not read
+    choose: str = "choose one of them with --layer" #: remedy where a file has several layers
 
 
 @dataclass
@@ -144,7 +146,7 @@ def from_layer(path, source, how):
     refuse_unused(path, how, ("water", "band", "pixel", "nodata", "unseen", "footprint"), "outlines")
     names = [source.GetLayer(k).GetName() for k in range(source.GetLayerCount())]
     if how.layer is None and len(names) > 1 or how.layer is not None and how.layer not in names:
-        raise RunError(path, f"holds the layers {', '.join(names)}", "choose one of them with --layer")
+        raise RunError(path, f"holds the layers {', '.join(names)}", how.choose)
     layer = source.GetLayerByName(how.layer or names[0])
     columns = [layer.GetLayerDefn().GetFieldDefn(k).GetName() for k in range(layer.GetLayerDefn().GetFieldCount())]
     if how.thickness and how.thickness not in columns:
@@ -156,7 +158,7 @@ def from_layer(path, source, how):
     try:
         if how.where:
             layer.SetAttributeFilter(how.where)
-        name = how.thickness or thickness_column(layer, columns)
+        name = how.thickness or (None if how.bare else thickness_column(layer, columns))
         column = columns.index(name) if name else None  # GDAL takes a name for that of any column that differs in case
         if not how.thickness:
             near = _library.library().bt_outline_near_thickness

@@ -365,6 +365,8 @@ def estimate(runs, s, some, n):
     replay, plain = (one["cost"]["core_time_s"] for one in found)
     ways = sum(c.seconds for c in some) / some[0].seconds
     whole = ways * (plain * -(-n // runs.jobs) + (replay - plain) / min(n, runs.jobs))
+    if not s.values["ice.outlines"] and not s.values["ice.field"]:  # it was made for the plan: its keys have an effect
+        found = [json.loads(checked(runs.program, s.case, runs.sets(0, some[0].keys), "--json"))]
     return found[0]["warnings"], (replay, plain, whole)
 
 

@@ -29,7 +29,7 @@ FIXED = 2  # bt_simulation: a body permanently at rest
 GRAVITY = 9.81  # m/s2
 ORIGIN = "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, unless the ice is outlines in metres"
 BENT, HALVINGS = 1.0, 12  # m, of the edges of a no-go area; how often one is halved at most
-HEMISPHERE = 1e7  # m
+AROUND = 3  # reaches of a map: no-go areas are cut off so far from the origin of the case
 #: keys of the tow that each route sets itself
 OWN = ("waypoints", "turn_radius", "programme", "direction", "ramp")
 
@@ -117,7 +117,10 @@ def goal(text, place):
 
 
 def no_go_file(path, place):
-    """Polygons [n, 2] in m of the case. Raises RunError, with CASE for what the file holds."""
+    """For each polygon of a file its pieces [n, 2] around the case, m. Raises RunError, with CASE for what the file
+    holds."""
+    if not path.exists():
+        raise RunError(path, "no such file", "name a file of polygons")
     try:
         return no_go_areas(path, place)
     except RunError as error:
@@ -130,7 +133,10 @@ def no_go_areas(path, place):
     """Read and checked as `bergtow outlines` reads a map. Holes count as land. Raises RunError."""
     from bergtow.maps import plane as map_plane
     from bergtow.maps import read as map_read
-    found = map_read.read(path, map_read.Reading(stairs="keep"))
+    from shapely.geometry import Polygon
+    from shapely.validation import make_valid
+    found = map_read.read(path, map_read.Reading(stairs="keep", bare=True,
+                                                 choose="write one of them to a file of its own (ogr2ogr)"))
     if found.seen is not None or found.skipped:
         odd = [name for names in found.skipped.values() for name in names]
         raise RunError(path, "is an image" if not odd else f"{odd[0]} is not a polygon", "give polygons alone")
@@ -143,6 +149,7 @@ def no_go_areas(path, place):
                        f"{ORIGIN}, or give the file metres and the crs {map_read.local_crs()}")
     found.implied = False  # there is no --crs here to say otherwise
     plane = map_plane.Plane.of(found, crs, None if local else tuple(place.degrees([(0, 0)])[0]), None)
+    around = None if local else around_case(crs, place)
 
     def metres(xy):
         return place.map(xy) if local else place.metres(plane.lonlat(xy))
@@ -150,25 +157,51 @@ def no_go_areas(path, place):
     polygons = []
     for k, polygon in enumerate(p for s in found.shapes for p in getattr(s.geometry, "geoms", [s.geometry])):
         ring = np.array(polygon.exterior.coords)
-        if not local and crs.is_geographic:
-            ring[:, 0] = np.unwrap(ring[:, 0], period=360)
-        xy = unbent(ring, metres)[:-1]
-        if np.linalg.matrix_rank(xy - xy[0], 1e-9 * np.ptp(xy - xy[0])) < 2:
+        whole = Polygon(ring if local or not crs.is_geographic else unwrapped(ring))
+        if not whole.area > 0:
             raise RunError(path, f"polygon {k + 1} has no area", "correct it or remove it")
-        # one that holds the antipode, as Antarctica may, is drawn around everything else
-        if np.hypot(*xy.T).min() < HEMISPHERE or not apart.inside(np.zeros((1, 2)), xy)[0]:
-            polygons.append(xy)
-    if not local and crs.is_geographic and not any(map(near, polygons)):
+        parts = make_valid(whole).intersection(around) if around else whole
+        polygons.append([unbent(np.array(part.exterior.coords), metres)[:-1] for part in
+                         getattr(parts, "geoms", [parts]) if part.geom_type == "Polygon" and part.area > 0])
+    if not local and crs.is_geographic and not any(polygons):
         swapped = np.concatenate([map_plane.vertices(s.geometry)[:, ::-1] for s in found.shapes])
-        if near(place.metres(swapped[np.abs(swapped[:, 1]) <= 90])):
+        reach = _library.limit("map_farthest_m")
+        if np.all(np.abs(swapped[:, 1]) <= 90) and np.all(np.hypot(*place.metres(swapped).T) < reach):
             raise RunError(path, "is far from the map of this case, and on it with latitude and longitude swapped",
                            "write longitude first")
     return polygons
 
 
-def near(xy):
-    """Does any position [n, 2], m, lie within reach of a map?"""
-    return bool(np.any(np.hypot(*xy.T) < _library.limit("map_farthest_m")))
+def around_case(crs, place):
+    """The surroundings of a case in the coordinates of a map, as a polygon. Projected as a whole, a continent may lie
+    around the case: it holds the antipode."""
+    import pyproj
+    from shapely.geometry import Polygon, box
+    from shapely.ops import unary_union
+    (lon, lat), = place.degrees([(0, 0)])
+    reach = AROUND * _library.limit("map_farthest_m")
+    if not crs.is_geographic:
+        x, y = pyproj.Transformer.from_crs("OGC:CRS84", crs, always_xy=True).transform(lon, lat)
+        half = 10 * reach  # Mercator's metres are that long at 84 degrees
+        return box(x - half, y - half, x + half, y + half) if np.isfinite(x + y) else Polygon()
+    high = np.degrees(reach / 6.37e6)
+    farthest = abs(lat) + high
+    wide = high / np.cos(np.radians(farthest)) if farthest < 90 else 180
+    if wide >= 180:
+        return box(-1e3, max(lat - high, -90), 1e3, min(lat + high, 90))
+    return unary_union([box(lon + turn - wide, lat - high, lon + turn + wide, lat + high)
+                        for turn in range(-720, 721, 360)])
+
+
+def unwrapped(ring):
+    """A closed ring [n, 2] in degrees whose longitudes do not jump; one around a pole is closed along its longitude."""
+    way = np.diff(ring[:, 0])
+    way -= np.where(np.abs(way) < 359.9, 360 * np.round(way / 360), 0)
+    ring = np.column_stack([ring[0, 0] + np.r_[0, np.cumsum(way)], ring[:, 1]])
+    if abs(ring[-1, 0] - ring[0, 0]) < 180:
+        return ring
+    pole = np.copysign(90, ring[:, 1].mean())
+    return np.r_[ring, [[ring[-1, 0], pole], [ring[0, 0], pole], ring[0]]]
 
 
 def unbent(ring, metres):
@@ -380,9 +413,10 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
         hull=planner.Hull(width=across, radius=radius, drag=skin + form * across), mass=mass,
         outline=turned(hull, (0, 0, -start[2])),
         start=tuple(map(float, start[:2])),
-        extent=(x0, y0, x1, y1), no_go=[polygon for some in areas.values() for polygon in some] + fixed,
+        extent=(x0, y0, x1, y1),
+        no_go=[piece for some in areas.values() for pieces in some for piece in pieces] + fixed,
         no_go_files=[{"file": str(file), "polygons": len(some),
-                      "in_domain": sum(apart.of(polygon, domain) == 0 for polygon in some)}
+                      "in_domain": sum(any(apart.of(piece, domain) == 0 for piece in pieces) for pieces in some)}
                      for file, some in areas.items()],
         drift=tuple(map(float, drift)), water=water,
         ramp=Case(case, {"tow.ramp": ramp})["tow.ramp"] if ramp is not None else values["tow.ramp"],

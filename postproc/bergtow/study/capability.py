@@ -372,7 +372,7 @@ def perform(a):
             resolution = read(a.resolution, unit or "%")
         except BergtowError as error:
             raise BergtowError(f"--resolution {error}", USAGE) from None
-        if not 0 < resolution <= abs(end - start):
+        if not 0 < resolution <= (1 + 1e-9) * abs(end - start):  # 0.7 - 0.3 is less than 0.4
             raise RunError(f"--resolution {a.resolution}", "is not above 0 and at most the range",
                            f"give a part of {abs(end - start):.4g} {unit}".rstrip(), USAGE)
     some = conditions(a, binary, start, end, resolution)
