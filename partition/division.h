@@ -78,8 +78,8 @@ int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y);
 /// Must the field be divided, even where one rank alone would be faster?
 bool bt_division_is_forced(const bt_world *world);
 
-/// Time by which a divided field is faster than one rank with all cells, s a step, modelled; work: of a step on all
-/// ranks, s.
+/// Time that dividing the field saves in each step against one rank with all cells, s, modelled; negative where one
+/// rank is faster. work: of a step on all ranks, s.
 double bt_division_gain(const bt_world *world, double work);
 
 /// Rank that owns cell (x, y) of the map; −1 outside.

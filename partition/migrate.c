@@ -197,6 +197,16 @@ static bool near_large(const bt_world *world, bt_idx i, double reach)
     return false;
 }
 
+/// Does a rank hold the bodies of cell (x, y)?
+static bool holds(const bt_world *world, int rank, int32_t x, int32_t y)
+{
+    int sharer[BT_MAX_SHARERS];
+    const int n = bt_division_sharers(world, x, y, sharer);
+    bool held = false;
+    for (int h = 0; h < n; h++) held = held || sharer[h] == rank;
+    return held;
+}
+
 /// A cell whose floes a rank asks for.
 typedef struct wish {
     int32_t cell[2];
@@ -216,14 +226,10 @@ static void ask_around(const bt_world *world, const bool *needs, const int rings
                 const int64_t p = bt_division_place(world, x, y);
                 if (p < 0 || asked[p]) continue;
                 asked[p] = 1;
-                int holder[BT_MAX_SHARERS];
-                const int n = bt_division_sharers(world, x, y, holder);
-                bool held = false;
-                for (int h = 0; h < n; h++) held = held || holder[h] == domain->comm->rank;
                 const wish w = {.cell = {domain->low_x + (int32_t)(p % domain->n_x),
                                          domain->low_y + (int32_t)(p / domain->n_x)},
                                 .rank = domain->comm->rank};
-                if (!held) add(outgoing, domain->owner[p], &w, sizeof w);
+                if (!holds(world, w.rank, x, y)) add(outgoing, domain->owner[p], &w, sizeof w);
             }
     }
     free(asked);
@@ -235,12 +241,9 @@ static void pack_near_large(const bt_world *world, const bool *got, double reach
     const bt_cells *cells = world->cells;
     for (bt_idx k = 0; k < cells->n - 1; k++) {
         const bt_cell *cell = &cells->cell[k];
-        int holder[BT_MAX_SHARERS];
         if (!cell->own || cell->first == cell->end || got[k]) continue;
-        const int n = bt_division_sharers(world, cell->x, cell->y, holder);
-        bool held = false;
-        for (int h = 0; h < n; h++) held = held || holder[h] == 0;
-        for (bt_idx i = cell->first; !held && i < cell->end; i++)
+        if (holds(world, 0, cell->x, cell->y)) continue;
+        for (bt_idx i = cell->first; i < cell->end; i++)
             if (near_large(world, i, reach)) pack(&world->bodies, i, outgoing, 0);
     }
 }

@@ -3,10 +3,11 @@
 //
 // Balance. The heaviest part must lose weight, but its neighbours may be full themselves. So a search from neighbour to
 // neighbour finds the nearest parts lighter than a share, and one vertex is shifted along every link of the path there
-// (diffusion along a shortest path). The weight of a part is what it has above its share of that kind in which this is
-// most. A shift is accepted only if every part on its path then weighs less than the heaviest did: the sorted weights
-// decrease, so it terminates. Rejected: moving vertices only from a part to a lighter
-// neighbour; with some ten cells per part it stops with slopes of one cell per part over the whole field.
+// (diffusion along a shortest path). With several kinds of work, parts are compared by their excess: the weight above
+// the share, of the kind in which it is largest. A shift is accepted only if the excess of every part on its path is
+// then less than that of the heaviest was: the sorted excesses decrease, so it terminates. Rejected: moving vertices
+// only from a part to a lighter neighbour; with some ten cells per part it stops with slopes of one cell per part over
+// the whole field.
 // Cut. A vertex moves to the neighbouring part with which it has more edges, as long as that stays within the limit
 // (the greedy pass of Karypis & Kumar 1998).
 #include "partition/cut.h"
@@ -62,7 +63,7 @@ static void shift(parts *lists, int v, int b)
     list_add(lists, v);
 }
 
-// The kind of which a part has most above its share.
+// The kind with the largest excess.
 static int worst_kind(const parts *lists, bt_cut_work load)
 {
     int worst = 0;
@@ -71,19 +72,19 @@ static int worst_kind(const parts *lists, bt_cut_work load)
     return worst;
 }
 
-// What a load has above its share of its worst kind.
-static int64_t above(const parts *lists, bt_cut_work load)
+// The excess of a load.
+static int64_t excess(const parts *lists, bt_cut_work load)
 {
     const int k = worst_kind(lists, load);
     return load.of[k] - lists->share.of[k];
 }
 
 // The same of part a, with `times` the weight of vertex v added.
-static int64_t above_with(const parts *lists, int a, int v, int times)
+static int64_t excess_with(const parts *lists, int a, int v, int times)
 {
     bt_cut_work load = lists->load[a];
     bt_cut_add(&load, lists->g->weight[v], times);
-    return above(lists, load);
+    return excess(lists, load);
 }
 
 // Vertex of a with work of a kind to give to its neighbour b, −1 if none: preferably one that brings a within the slack
@@ -105,7 +106,8 @@ static int vertex_to_give(const parts *lists, int kind, int a, int b, bool end, 
             else if (lists->part[u] == a) gain -= graph->edge[e];
         }
         if (!touches) continue;
-        int fit = (above_with(lists, a, v, -1) <= lists->slack) + (!end || above_with(lists, b, v, 1) <= lists->slack);
+        int fit = (excess_with(lists, a, v, -1) <= lists->slack) +
+                  (!end || excess_with(lists, b, v, 1) <= lists->slack);
         if (nearest) fit = 0, gain = -llabs(lists->load[a].of[kind] - w - lists->share.of[kind] - lists->slack);
         if (best < 0 || fit > best_fit || (fit == best_fit && (gain > best_gain || (gain == best_gain && v < best))))
             best = v, best_fit = fit, best_gain = gain;
@@ -118,7 +120,7 @@ static bool shift_along(parts *lists, int kind, int heavy, int end, bool nearest
 {
     int n_way = 0, *way = bt_alloc((size_t)lists->n, sizeof *way), *given = bt_alloc((size_t)lists->n, sizeof *given);
     for (int a = end; a != heavy; a = lists->from[a]) way[n_way++] = a;
-    const int64_t before = above(lists, lists->load[heavy]);
+    const int64_t before = excess(lists, lists->load[heavy]);
     int a = heavy, n_given = 0;
     bool good = true;
     for (int i = n_way - 1; good && i >= 0; i--) {
@@ -127,10 +129,10 @@ static bool shift_along(parts *lists, int kind, int heavy, int end, bool nearest
         if (!good) break;
         given[n_given++] = v;
         shift(lists, v, way[i]);
-        good = above(lists, lists->load[a]) < before && lists->count[a] > 0;
+        good = excess(lists, lists->load[a]) < before && lists->count[a] > 0;
         a = way[i];
     }
-    good = good && above(lists, lists->load[end]) < before;
+    good = good && excess(lists, lists->load[end]) < before;
     for (int i = n_given - 1; !good && i >= 0; i--) shift(lists, given[i], i ? way[n_way - i] : heavy);
     for (int i = 0; good && i < n_way; i++) lists->stuck[way[i]] = false;
     free(way);
@@ -170,8 +172,8 @@ static void balance(parts *lists)
     for (int64_t i = 0; i < (int64_t)SHIFTS * lists->n; i++) {
         int heavy = -1;
         for (int a = 0; a < lists->n; a++)
-            if (above(lists, lists->load[a]) > lists->slack && lists->count[a] > 1 && !lists->stuck[a] &&
-                (heavy < 0 || above(lists, lists->load[a]) > above(lists, lists->load[heavy])))
+            if (excess(lists, lists->load[a]) > lists->slack && lists->count[a] > 1 && !lists->stuck[a] &&
+                (heavy < 0 || excess(lists, lists->load[a]) > excess(lists, lists->load[heavy])))
                 heavy = a;
         if (heavy < 0) return;
         lists->stuck[heavy] = !relieve(lists, heavy);
@@ -189,7 +191,7 @@ static int better_part(parts *lists, int v)
     int64_t most = lists->link[a];
     for (int e = first; e < last; e++) {
         int b = lists->part[graph->to[e]];
-        if (b == a || above_with(lists, b, v, 1) > lists->slack) continue;
+        if (b == a || excess_with(lists, b, v, 1) > lists->slack) continue;
         if (lists->link[b] > most || (lists->link[b] == most && best >= 0 && b < best)) best = b, most = lists->link[b];
     }
     for (int e = first; e < last; e++) lists->link[lists->part[graph->to[e]]] = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bounding boxes of polygons, and what is wrong with the vertices of one.
+// Bounding boxes of polygons, and checks of their vertices.
 #ifndef BT_BOX_H
 #define BT_BOX_H
 

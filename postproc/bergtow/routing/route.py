@@ -371,7 +371,7 @@ def estimate(runs, s, some, n):
 
 
 def elsewhere(s):
-    """Warnings of no-go files of which nothing meets the domain."""
+    """Warnings of no-go files with no area in the domain."""
     return [{"code": "no_go_elsewhere", "text": f"{some['file']}: none of its no-go areas lies in the domain", "values":
              some} for some in s.no_go_files if not some["in_domain"]]
 
