@@ -296,6 +296,34 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     }
 }
 
+/// The force at the depth at which the work of the ice is this energy, by Newton's method. Where the contact length
+/// grows with the depth, E is convex, and all iterates after the first are too deep: the force is not too small.
+static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double energy)
+{
+    enum { ITERATIONS = 30 };
+    const double PRECISION = 1e-4; // of the depth
+    const bt_contact *contact = &cell->contacts[j];
+    if (cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0) return INFINITY;
+    const bt_manifold manifold = {.a = contact->a, .b = contact->b, .nx = contact->nx, .ny = contact->ny};
+    const uint16_t *part = cell->search.pairs[contact->pair].part;
+    const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), slop = world->par.slop,
+                 *own = world->par.law_own[BT_LAW_CRUSHING];
+    const double line = own[BT_CRUSH_PRESSURE] * h, least = own[BT_CRUSH_LEAST] * h;
+    double gap = INFINITY, area[2];
+    for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
+    const double first = bt_law_patch(world, part, &manifold, gap + slop, &area[0]).length;
+    double way = bt_max(2 * slop, LEAST_WAY * world->par.size), force = 0;
+    for (int k = 0; k < ITERATIONS; k++) {
+        const double length[2] = {first, bt_law_patch(world, part, &manifold, gap + way, &area[1]).length};
+        const double mean = resistance_of(length, area, least, line, slop, way).mean;
+        force = line * bt_max(least, bt_max(length[0], length[1]));
+        const double next = bt_max(2 * slop, way - (way * mean - energy) / force);
+        if (!(fabs(next - way) > PRECISION * way)) break;
+        way = next;
+    }
+    return force;
+}
+
 // --- growth ----------------------------------------------------------------------------------------------------------
 
 static bool gives_way(const bt_contact *contact, const bt_limit *limit, int i)
@@ -357,6 +385,7 @@ const bt_law bt_crush_law = {.name = "crushing",
                              .n_totals = sizeof totals / sizeof *totals,
                              .applies = applies,
                              .bound = bound,
+                             .bears = bears,
                              .keeps = keeps,
                              .gives_way = gives_way,
                              .give_way = give_way,

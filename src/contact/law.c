@@ -108,6 +108,19 @@ void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
     }
 }
 
+double bt_laws_bear(const bt_world *world, const bt_cell *cell, bt_idx j, double energy)
+{
+    if (!bt_laws_on(&world->par)) return INFINITY;
+    const bt_contact *contact = &cell->contacts[j];
+    double most = 0;
+    for (int i = 0; i < contact->n; i++) most += cell->laws->limits[j].cap[i] / world->par.dt;
+    for (int law = 0; law < BT_LAWS; law++)
+        if (bt_laws[law]->bears && bt_law_on(&world->par, law) &&
+            bt_laws[law]->applies(world, contact->a, contact->b))
+            most = bt_min(most, bt_laws[law]->bears(world, cell, j, energy));
+    return most;
+}
+
 // --- growth ----------------------------------------------------------------------------------------------------------
 
 /// The sums of a law's numbers; those of added laws precede them.

@@ -122,6 +122,9 @@ typedef struct bt_law {
     void (*bound)(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
     /// Update the record to the poses; false drops it.
     bool (*keeps)(const bt_world *world, bt_memory *memory);
+    /// The most that contact j bears until its bodies have lost this energy of their approach, J; N. NULL = what the
+    /// bounds of the step say
+    double (*bears)(const bt_world *world, const bt_cell *cell, bt_idx j, double energy);
     /// Is point i of the contact at the bound of this law?
     bool (*gives_way)(const bt_contact *contact, const bt_limit *limit, int i);
     /// Called if it is and still approaches; limits[j].grown[i] has been set.
@@ -171,6 +174,10 @@ void bt_laws_reserve(bt_cell *cell);
 
 /// Set the bounds of contact j of the cell, which was made from this manifold of the pair.
 void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
+
+/// The most that contact j of the cell bears until its bodies have lost this energy of their approach, J; N, INFINITY
+/// where no law limits it. After the solve, before poses move.
+double bt_laws_bear(const bt_world *world, const bt_cell *cell, bt_idx j, double energy);
 
 /// Collective. After the solve: update the records, and write work, numbers and depths to stats.
 void bt_laws_grow(bt_world *world);

@@ -8,6 +8,7 @@
 
 #include "base/elementary.h"
 #include "base/inside.h"
+#include "contact/law.h"
 #include "contact/row.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
@@ -52,6 +53,7 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
         .approach = collision.approach,
         .rest = collision.rest,
         .mass = collision.mass,
+        .most = bt_collision_bears(world, cell, j, &collision),
         .thickness = bodies->mass[other] > 0 ? bodies->mass[other] / (impacts->sheet * bodies->area[other])
                                              : impacts->body_height,
         .corner = bt_contact_corner_of(world, contact, cell->search.pairs[contact->pair].part,
@@ -136,9 +138,12 @@ static bt_body_contact *collect_body_contacts(const bt_world *world, const bt_im
 
 bt_impact_rule bt_impact_rule_of(const bt_case *input)
 {
+    bt_params laws = {0};
+    bt_laws_setup(input, &laws);
     return (bt_impact_rule){.conversion = input->impact.conversion, .duration = input->impact.duration,
                             .pressure = input->impact.pressure, .real_corner = input->impact.corner == BT_CORNER_REAL,
-                            .corner_angle = input->impact.corner_angle, .least_speed = input->impact.least_speed};
+                            .corner_angle = input->impact.corner_angle, .least_speed = input->impact.least_speed,
+                            .limited = bt_laws_on(&laws)};
 }
 
 bt_impacts *bt_impacts_create(const bt_case *input, const bt_world *world)
@@ -172,7 +177,7 @@ void bt_impacts_free(bt_impacts *impacts)
 
 // --- force of a collision --------------------------------------------------------------------------------------------
 
-void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact)
+void bt_impact_convert(const bt_impact_rule *rule, double most, bt_impact *impact)
 {
     // as the limit of impact.corner_angle: where two flush edges meet, the angle is half a turn but for rounding
     if (!rule->real_corner || !(impact->corner > 0 && impact->corner < 179 * BT_PI / 180))
@@ -187,15 +192,20 @@ void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact)
         impact->mean = impact->impulse / rule->duration;
         impact->peak = 0.5 * BT_PI * impact->mean;
     }
+    if (impact->peak > most) {
+        const double longer = impact->peak / most;
+        impact->peak = most, impact->mean /= longer, impact->duration *= longer;
+    }
 }
 
 void bt_impact_describe(const bt_impact_rule *rule, char out[160])
 {
+    const char *most = rule->limited ? ", at most what the ice bears" : "";
     if (rule->conversion == BT_IMPACT_CRUSHING)
-        snprintf(out, 160, "crushing of %s%g deg at %g kPa",
+        snprintf(out, 160, "crushing of %s%g deg at %g kPa%s",
                  rule->real_corner ? "the real corner, without one of " : "a corner of ",
-                 rule->corner_angle * 180 / BT_PI, rule->pressure / 1e3);
-    else snprintf(out, 160, "half-sine of %g s", rule->duration);
+                 rule->corner_angle * 180 / BT_PI, rule->pressure / 1e3, most);
+    else snprintf(out, 160, "half-sine of %g s%s", rule->duration, most);
 }
 
 // --- events over steps -----------------------------------------------------------------------------------------------
@@ -206,7 +216,7 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
     bt_impact *impact = &impacts->closed[impacts->n_closed++];
     *impact = o->so_far;
     impact->panel = bt_panels_at(&impacts->panels, impact->x, impact->y);
-    bt_impact_convert(&impacts->rule, impact);
+    bt_impact_convert(&impacts->rule, o->most, impact);
 }
 
 /// Add contacts `contact[n]` of one floe in this step to its event; o: its open event, or empty. True if there is an
@@ -214,11 +224,11 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
 static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t n, double time, bt_impact_open *o,
                    bool *begun)
 {
-    double sum = 0, approach = 0, rest = 0;
+    double sum = 0, approach = 0, rest = 0, bears = 0;
     int64_t most = 0;
     for (int64_t i = 0; i < n; i++) {
         sum += contact[i].collision;
-        if (contact[i].collision > 0) approach = bt_max(approach, contact[i].approach);
+        if (contact[i].collision > 0) approach = bt_max(approach, contact[i].approach), bears += contact[i].most;
         rest = bt_max(rest, contact[i].rest);
         if (contact[i].collision > contact[most].collision) most = i;
     }
@@ -232,6 +242,7 @@ static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t 
     bt_impact *impact = &o->so_far;
     impact->impulse += sum;
     o->rest = rest;
+    o->most = bt_max(o->most, bears);
     if (contact[most].collision > o->largest) {
         o->largest = contact[most].collision;
         impact->x = contact[most].x, impact->y = contact[most].y;
@@ -384,4 +395,11 @@ bt_collision bt_contact_collision(const bt_world *world, const bt_contact *conta
     if (collision.impulse > 0 && collision.rest > 0)
         collision.whole *= collision.approach / (collision.approach - collision.rest);
     return collision;
+}
+
+double bt_collision_bears(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision)
+{
+    if (!(collision->impulse > 0)) return INFINITY;
+    const double stopped = bt_min(collision->approach, collision->whole / collision->mass);
+    return bt_laws_bear(world, cell, j, 0.5 * collision->mass * stopped * stopped);
 }

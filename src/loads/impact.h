@@ -31,6 +31,10 @@
 //   crushing    a corner of angle φ is crushed at pressure p over thickness h: F = k x, k = 2 p h tan(φ/2), so
 //               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then, without the rebound
 // In the second v_n is the approach that the contact itself removes, min(approach, λ / m_e): neighbours may share it.
+// Where contact laws limit what the ice bears (contact/law.h), the peak is at most that: for ice that is crushed, the
+// force at the depth where the work of crushing is ½ m_e v_n². Then peak and mean are less, and the duration is longer,
+// by the same factor. Rejected: this force in place of the conversion. Flush edges bear all of it at the first touch,
+// p h times their length, however slow the approach: real ice gives way elastically first.
 //
 // Counts, and their start: src/output/impact_count.h, src/loads/panel.h.
 //
@@ -53,6 +57,7 @@ typedef struct bt_body_contact {
     double approach;      ///< −v1 if the contact closes, otherwise 0, m/s
     double rest;          ///< −v2 if it still closes, otherwise 0, m/s
     double mass;          ///< m_e, kg
+    double most;          ///< force that the contact laws let it bear as a collision, N; may be INFINITY
     double thickness;     ///< of the ice that is crushed, m
     double corner;        ///< interior angle of the corner in contact, rad; NaN if it has none
     double px[2], py[2], point[2]; ///< contact points, m, body frame, and the normal impulse of each, N s
@@ -78,6 +83,7 @@ typedef struct bt_impact_open {
     bt_impact so_far;
     double rest;          ///< approach that the last step left, m/s
     double largest;       ///< largest λ_c of one manifold so far, which gives place, mass and corner, N s
+    double most;          ///< force that the contact laws let the contacts of one step bear, the largest so far, N
 } bt_impact_open;
 
 /// Parameters of the conversion.
@@ -88,6 +94,7 @@ typedef struct bt_impact_rule {
     bool real_corner;     ///< use the angle of the floe's or hull's corner if there is one
     double corner_angle;  ///< φ otherwise, rad
     double least_speed;   ///< slower approaches are quasi-static, m/s
+    bool limited;         ///< by contact laws
 } bt_impact_rule;
 
 /// State of this part: on rank 0 everything; on other ranks only rule, panels' geometry and scratch.
@@ -110,8 +117,9 @@ typedef struct bt_impacts {
 } bt_impacts;
 
 bt_impact_rule bt_impact_rule_of(const bt_case *input);
-/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
-void bt_impact_convert(const bt_impact_rule *rule, bt_impact *impact);
+/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner, and the most that
+/// the contact laws let the ice bear, N.
+void bt_impact_convert(const bt_impact_rule *rule, double most, bt_impact *impact);
 
 /// Create it for the towed body of the world; NULL if the case does not ask for collisions, or there is no body.
 bt_impacts *bt_impacts_create(const bt_case *input, const bt_world *world);
@@ -141,6 +149,10 @@ typedef struct bt_collision {
 
 /// The collision part of a contact with a normal impulse above 0, after the solve and before poses move.
 bt_collision bt_contact_collision(const bt_world *world, const bt_contact *contact);
+
+/// The most that the contact laws let contact j of the cell bear in this collision of it, N; INFINITY where none limits
+/// it.
+double bt_collision_bears(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision);
 
 typedef struct bt_contact_corner {
     double angle;     ///< interior, rad; NaN if there is none

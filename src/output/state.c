@@ -553,6 +553,21 @@ static bool same_constants(const bt_params *now, const bt_params *then, bool ste
            now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
 }
 
+/// Collisions that may continue. A row of version 0.1.0 ends before `most`.
+static bt_impact_open *load_open(bt_snapshot *snap, int64_t *n)
+{
+    const bt_item *item = bt_snapshot_find(snap, "impacts/open");
+    const int width = item && item->width == OPEN_WIDTH - 1 ? OPEN_WIDTH - 1 : OPEN_WIDTH;
+    double *rows = bt_snapshot_copy(snap, "impacts/open", BT_ITEM_F64, width, n);
+    bt_impact_open *open = bt_alloc((size_t)*n, sizeof *open);
+    for (int64_t k = 0; k < *n; k++) {
+        open[k].most = INFINITY;
+        memcpy(&open[k], rows + k * width, (size_t)width * sizeof *rows);
+    }
+    free(rows);
+    return open;
+}
+
 bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap, bt_errors *err)
 {
     const bt_params made = world->par;
@@ -569,7 +584,7 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
         bt_snapshot_take_rows(snap, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), world->undisturbed);
     if (world->impacts && comm->rank == 0) {
         free(world->impacts->open);
-        world->impacts->open = bt_snapshot_copy(snap, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &world->impacts->n_open);
+        world->impacts->open = load_open(snap, &world->impacts->n_open);
     }
     bt_events_free(&world->events);
     world->events.n = -1;

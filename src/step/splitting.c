@@ -111,12 +111,14 @@ static bool is_collision(const bt_world *world, const bt_collision *collision)
 }
 
 /// Peak force of a collision, N, as if none of it were left to the next step.
-static double peak_of(const bt_world *world, const bt_contact *contact, const bt_collision *collision, double corner)
+static double peak_of(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_collision *collision,
+                      double corner)
 {
+    const bt_contact *contact = &cell->contacts[j];
     bt_impact impact = {.impulse = collision->whole, .approach = collision->approach, .mass = collision->mass,
                         .corner = corner,
                         .thickness = bt_crush_thickness(&world->bodies, contact->a, contact->b)};
-    bt_impact_convert(&world->splitting->rule, &impact);
+    bt_impact_convert(&world->splitting->rule, bt_collision_bears(world, cell, j, collision), &impact);
     return impact.peak;
 }
 
@@ -145,7 +147,7 @@ static pressing pressing_of(const bt_world *world, const bt_cell *cell, bt_idx j
             world, contact, cell->search.pairs[contact->pair].part, cell->gaps[j].feature[p.at]);
         const double half = 0.5 * corner.angle, wedge = half < WEDGE ? bt_split_wedge(half, contact->mu) : 0;
         if (sharp && corner.of >= 0 && wedge > 0) p.opening[1 - corner.of] = 1 / wedge;
-        if (hit) p.peak = peak_of(world, contact, &collision, corner.angle);
+        if (hit) p.peak = peak_of(world, cell, j, &collision, corner.angle);
     }
     p.force = bt_max(0, (hit ? total - collision.impulse : total) / world->par.dt);
     return p;

@@ -13,6 +13,7 @@ import h5py
 import pytest
 
 from harness import SIGNAL, Run, changed, quick
+from made_up_ensemble import edited
 from resuming import assert_same_result, check_readable, done, killed_after, started, uninterrupted
 from test_window import LINE as WINDOW
 
@@ -37,6 +38,19 @@ def test_on_other_ranks(whole, before, after, steps):
     done(after, "resume", name, "--quiet", "--threads", 1, cwd=folder)
     assert_same_result(path, folder / name)
     assert Run(folder / name, None).summary["ranks"] == after
+
+
+def test_a_checkpoint_of_version_0_1_0(whole):
+    """A collision under way had no limit by contact laws, the last number of its row."""
+    folder, path, _ = whole
+    done(1, "run", "case.yml", "-o", "earlier", "--quiet", "--threads", 1, "--steps", 88, cwd=folder)
+    with edited(folder / "earlier/checkpoint.h5") as f:
+        rows = f["impacts/open"][:, :-1]
+        assert len(rows) > 0
+        del f["impacts/open"]
+        f["impacts/open"] = rows
+    done(1, "resume", "earlier", "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / "earlier")
 
 
 def test_the_window(tmp_path):
