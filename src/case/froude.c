@@ -131,8 +131,7 @@ bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err)
         return BT_ERR_CASE;
     }
     // EA and strength of a rope grow with d², those of the twin with L³: the twin has their numbers, not the name.
-    input->tow.line.type = BT_ROPE_NUMBERS;
-    input->tow.line.diameter = 0;
+    if (ratio != 1) input->tow.line.type = BT_ROPE_NUMBERS, input->tow.line.diameter = 0;
     // A default without effect that was scaled would look like a value that somebody gave.
     for (bool more = true; more;) { // one default may follow from another
         more = false;

@@ -93,6 +93,14 @@ def test_the_twin_of_a_case_without_a_body_is_a_case(tmp_path):
     assert r.returncode == DONE and "no effect" not in r.stdout, r.stderr
 
 
+@pytest.mark.parametrize("ratio, names", [(1, True), (4, False)])
+def test_a_named_line_and_its_twin(tmp_path, ratio, names):
+    """A rope of L times the diameter is no twin; the case itself in SI units, L = 1, keeps name and diameter."""
+    case = changed(TOW, tow__mode="line", tow__line_length=4, tow__line={"type": "polypropylene", "diameter": "1 mm"})
+    line = yaml.safe_load(call("check", write_case(tmp_path, case), "--scale", ratio).stdout)["tow"]["line"]
+    assert (line["type"], line["diameter"]) == (("polypropylene", "0.001 m") if names else ("numbers", "0 m"))
+
+
 def test_floes_given_by_hand_take_their_room(tmp_path):
     """The concentration refers to the region without them, and so does the number of floes that is expected."""
     slab = {"shape": "rectangle", "length": 6, "width": 7.5, "x": 11, "y": 0}
