@@ -742,7 +742,7 @@ MUTANTS = {
         ("impacts->collision_y = s * hit[0] + c * hit[1];", "impacts->collision_y = s * hit[0] - c * hit[1];",
          "frame of the force"),
         ("(double)(world->step + 1) * world->par.dt", "(double)world->step * world->par.dt", "time of a collision"),
-        ("contact->point[k] / impacts->dt,\n                           share * fx", "contact->point[k], share * fx",
+        ("contact->point[k] / impacts->dt, share * fx", "contact->point[k], share * fx",
          "panel load without the step"),
     ]),
     "src/output/observe.c": (OBSERVE, [

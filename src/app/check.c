@@ -21,6 +21,7 @@ static bt_check_ice ice_of_case(const bt_case *input)
                           .made = bt_case_floes_made(input),
                           .size = bt_case_mean_size(input),
                           .thickness = input->ice.thickness,
+                          .volume = input->ice.thickness * BT_PI / 4 * bt_case_size_moment(input, 2),
                           .concentration = input->ice.concentration};
 }
 
@@ -30,30 +31,18 @@ static bt_check_ice ice_of_field(const bt_case *input, const bt_field *field)
     for (bt_idx i = 0; i < field->n; i++) {
         ice.size += sqrt(4 * field->area[i] / BT_PI) / field->n;
         ice.thickness += field->thickness[i] / field->n;
+        ice.volume += field->area[i] * field->thickness[i] / field->n;
     }
     return ice;
-}
-
-/// Take the floes given by hand into the means; they have been counted.
-static void include_by_hand(const bt_case *input, bt_check_ice *ice)
-{
-    if (input->n_floes == 0) return;
-    const double others = ice->count - input->n_floes;
-    double size = others > 0 ? others * ice->size : 0, thickness = others > 0 ? others * ice->thickness : 0;
-    for (bt_idx i = 0; i < input->n_floes; i++) {
-        double v[2 * BT_MAX_VERTICES];
-        const int n = bt_case_floe_outline(&input->floes[i], v);
-        size += n ? sqrt(4 * bt_shape_moments(n, v).area / BT_PI) : 0;
-        thickness += input->floes[i].thickness;
-    }
-    ice->size = size / ice->count, ice->thickness = thickness / ice->count;
 }
 
 /// The ice of the field that was read, or the expected ice of the field to be generated, and the floes given by hand.
 static bt_check_ice ice_of(const bt_case *input, const bt_field *field)
 {
     bt_check_ice ice = bt_case_reads_field(input) ? ice_of_field(input, field) : ice_of_case(input);
-    include_by_hand(input, &ice);
+    const bt_hand_means by_hand = bt_case_hand_means(input);
+    if (ice.count == input->n_floes && by_hand.size > 0)
+        ice.size = by_hand.size, ice.thickness = by_hand.thickness, ice.volume = by_hand.volume;
     ice.corners = bt_cost_corners(input, field, ice.count);
     ice.split = (double)field->outlines.split, ice.parts = (double)field->outlines.parts;
     return ice;

@@ -144,8 +144,7 @@ static void ice(sink *to, const bt_checked *c)
         word(to, NULL, NULL, box ? " (read from the outlines)" : " (read from the field file)");
     number(to, "ice.mean_size_m", "mean floe", "size %.4g m", where(any, ice->size));
     number(to, "ice.mean_thickness_m", NULL, ", thickness %.4g m", where(any, ice->thickness));
-    number(to, "ice.mean_mass_kg", NULL, ", mass about %.4g kg",
-           where(any, input->ice.density * ice->thickness * BT_PI / 4 * ice->size * ice->size));
+    number(to, "ice.mean_mass_kg", NULL, ", mass about %.4g kg", where(any, input->ice.density * ice->volume));
     for (int law = 0; !to->json && any && law < BT_LAWS; law++) {
         char *line = bt_laws[law]->check ? bt_laws[law]->check(input, ice->thickness, ice->size) : NULL;
         end_line(to);

@@ -10,7 +10,8 @@
 #include "field/lead.h"
 
 typedef struct bt_check_ice {
-    double count, size, thickness, concentration; ///< number, mean diameter m, mean thickness m, area fraction
+    double count, concentration; ///< number, area fraction
+    double size, thickness, volume; ///< means of the floes of the field, or else of those given by hand, m, m, m³
     double corners; ///< of all floes
     double split, parts; ///< floes that are not convex, and their convex parts
     double made;         ///< floes to be generated

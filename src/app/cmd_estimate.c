@@ -60,13 +60,14 @@ static void print_table(const options *opt, const bt_case *input, const bt_estim
 
 /// Ice drifts with wind and water as it does at the start, where neither changes; else with the water, and so does
 /// loose ice between walls, which begins at rest.
-static void order_speeds(const bt_case *input, bt_estimate_input *in)
+static void order_speeds(const bt_case *input, const bt_field *field, bt_estimate_input *in)
 {
     bt_estimate_input ordered;
     double ice[2], body[2];
     const bool walls = input->domain.ends == BT_BOUND_WALL || input->domain.sides == BT_BOUND_WALL;
     if (bt_environment_changes(input) || (walls && in->concentration < BT_BOUND_CONCENTRATION - BT_MADE_OFF)) return;
-    bt_setup_drift(input, 2 * in->floe_radius, in->thickness, in->concentration, ice, body);
+    const double size = field->n > 0 ? bt_field_mean_size(field) : bt_case_mean_size(input);
+    bt_setup_drift(input, size, in->thickness, in->concentration, ice, body);
     bt_estimate_ordered(input, ice, &ordered);
     in->speed = ordered.speed;
     in->along = in->ordered = ordered.along;
@@ -94,7 +95,7 @@ int bt_cmd_estimate(int argc, char **argv)
             in.concentration = field.concentration;
             bt_estimate_field(&field, &in.thickness, &in.floe_radius);
         }
-        order_speeds(&input, &in);
+        order_speeds(&input, &field, &in);
         if (opt.json) {
             bt_json json = {0};
             bt_json_open(&json, NULL, '{');

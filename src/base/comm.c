@@ -211,6 +211,7 @@ bt_status bt_comm_start(int *argc, char ***argv)
     MPI_Comm_set_errhandler(world.mpi, handler);
     MPI_Errhandler_free(&handler);
     count_here(&world);
+    world.divides = bt_comm_any(&world, world.divides); // launchers do not pass variables on to other machines
     if (!foreign) watch_exits();
     bt_leave_by(bt_comm_abort);
     return BT_OK;

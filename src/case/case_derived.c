@@ -171,6 +171,22 @@ double bt_case_made_area(const bt_case *input)
     return bt_max(0, input->ice.concentration * area);
 }
 
+bt_hand_means bt_case_hand_means(const bt_case *input)
+{
+    bt_hand_means mean = {0};
+    double v[2 * BT_MAX_VERTICES];
+    int64_t count = 0;
+    for (bt_idx i = 0; i < input->n_floes; i++) {
+        const int n = bt_case_floe_outline(&input->floes[i], v);
+        if (!n || input->floes[i].fixed) continue;
+        const double area = bt_shape_moments(n, v).area, thickness = input->floes[i].thickness;
+        mean.size += sqrt(4 * area / BT_PI), mean.thickness += thickness, mean.volume += area * thickness;
+        count++;
+    }
+    if (count == 0) return mean;
+    return (bt_hand_means){mean.size / (double)count, mean.thickness / (double)count, mean.volume / (double)count};
+}
+
 double bt_case_area_by_hand(const bt_case *input)
 {
     double area = 0, v[2 * BT_MAX_VERTICES];

@@ -7,16 +7,15 @@
 
 static const double REST_SPEED = 0.01; // of the reference speed, assumed; in the basin 1e-3 m/s of 0.13 m/s
 
-static double size_of(int n, const double *v) { return n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0; }
-
 void bt_case_fill_size(bt_case *input)
 {
     if (!isnan(input->ice.size) || input->domain.frame == BT_FRAME_BASIN) return;
     if (bt_case_makes_ice(input) || bt_case_reads_field(input)) return; // the case must give it
-    double v[2 * BT_MAX_VERTICES], sum = 0;
-    for (bt_idx i = 0; i < input->n_floes; i++) sum += size_of(bt_case_floe_outline(&input->floes[i], v), v);
-    const double body = size_of(bt_case_waterline(input, v), v);
-    input->ice.size = sum > 0 ? sum / input->n_floes : body > 0 ? body : 1; // without bodies it has no effect
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(input, v);
+    const double body = n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0,
+                 by_hand = bt_case_hand_means(input).size;
+    input->ice.size = by_hand > 0 ? by_hand : body > 0 ? body : 1; // without bodies it has no effect
 }
 
 void bt_case_fill_scene(bt_case *input)

@@ -361,12 +361,15 @@ static void remember(bt_world *world, bt_cell *cell, bt_idx j, bt_sum *number)
     if (deepest == 0) return;
     const uint32_t *feature = cell->gaps[j].feature;
     bt_memory memory = bt_law_names(world, &cell->search.pairs[contact->pair], BT_LAW_CRUSHING);
-    // First points that are crushed or touch; then crushed points not found, with old depths; then the rest.
+    // First points that are crushed or touch; then crushed points not found, with old depths, the deeper one first (the
+    // order of a record follows the numbering of corners); then the rest.
     for (int i = 0; i < contact->n; i++)
         if (limit->rise->depth[i] > 0 || cell->gaps[j].gap[i] <= 0)
             keep_depth(&memory, feature[i], limit->rise->depth[i], false);
-    for (int i = 0; at >= 0 && i < cell->laws->memory[at].n_points; i++) {
-        const bt_memory *before = &cell->laws->memory[at];
+    const bt_memory *before = at >= 0 ? &cell->laws->memory[at] : NULL;
+    const int deeper = before && before->n_points > 1 && before->value[1] > before->value[0];
+    for (int k = 0; before && k < before->n_points; k++) {
+        const int i = deeper ? 1 - k : k;
         if (before->value[i] > 0) keep_depth(&memory, before->feature[i], before->value[i], true);
     }
     for (int i = 0; i < contact->n; i++) keep_depth(&memory, feature[i], limit->rise->depth[i], false);

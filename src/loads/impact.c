@@ -215,7 +215,6 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
     BT_MAKE_ROOM(impacts->closed, impacts->n_closed, impacts->cap_closed, 64);
     bt_impact *impact = &impacts->closed[impacts->n_closed++];
     *impact = o->so_far;
-    impact->panel = bt_panels_at(&impacts->panels, impact->x, impact->y);
     bt_impact_convert(&impacts->rule, o->most, impact);
 }
 
@@ -246,6 +245,7 @@ static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t 
     if (contact[most].collision > o->largest) {
         o->largest = contact[most].collision;
         impact->x = contact[most].x, impact->y = contact[most].y;
+        impact->panel = bt_panels_at(&impacts->panels, impact->x, impact->y, contact[most].nx, contact[most].ny);
         impact->mass = contact[most].mass, impact->thickness = contact[most].thickness,
         impact->corner = contact[most].corner;
     }
@@ -301,8 +301,8 @@ static void add_loads(bt_impacts *impacts, double c, double s)
         for (int k = 0; k < 2; k++) {
             if (!(contact->point[k] > 0)) continue;
             const double share = contact->point[k] / contact->normal / impacts->dt;
-            bt_panels_load(&impacts->panels, contact->px[k], contact->py[k], contact->point[k] / impacts->dt,
-                           share * fx, share * fy);
+            bt_panels_load(&impacts->panels, &(bt_point_load){contact->px[k], contact->py[k], contact->nx, contact->ny,
+                                                              contact->point[k] / impacts->dt, share * fx, share * fy});
         }
     }
     impacts->collision_x = c * hit[0] - s * hit[1];

@@ -15,19 +15,21 @@ static const double *vertex(const bt_panels *panels, int i)
     return panels->outline + 2 * (i < panels->n_vertices ? i : i - panels->n_vertices);
 }
 
-/// Length along the waterline of the point nearest to (x, y), m.
-static double nearest(const bt_panels *panels, double x, double y)
+/// Length along the waterline of the point nearest to (x, y), m, and not quite at the end of an edge: a panel may end
+/// there. Of edges equally near, the one that the load presses on most squarely.
+static double nearest(const bt_panels *panels, double x, double y, double nx, double ny)
 {
-    double best = INFINITY, at = 0;
+    const double END = 1e-9; // of an edge, and of the waterline
+    const double same = END * panels->arc[panels->n_vertices];
+    double best = INFINITY, fit = 0, at = 0;
     for (int i = 0; i < panels->n_vertices; i++) {
         const double *a = vertex(panels, i), *b = vertex(panels, i + 1);
         const double ex = b[0] - a[0], ey = b[1] - a[1], length = panels->arc[i + 1] - panels->arc[i];
-        const double t = bt_min(1, bt_max(0, ((x - a[0]) * ex + (y - a[1]) * ey) / (ex * ex + ey * ey)));
-        const double dx = x - a[0] - t * ex, dy = y - a[1] - t * ey, d = dx * dx + dy * dy;
-        if (d < best) {
-            best = d;
-            at = panels->arc[i] + t * length;
-        }
+        const double t = bt_min(1 - END, bt_max(END, ((x - a[0]) * ex + (y - a[1]) * ey) / (ex * ex + ey * ey)));
+        const double d = bt_hypot(x - a[0] - t * ex, y - a[1] - t * ey), square = (ex * ny - ey * nx) / length;
+        if (d > best + same || (d > best - same && !(square > fit))) continue;
+        best = bt_min(best, d), fit = square;
+        at = panels->arc[i] + t * length;
     }
     return at;
 }
@@ -67,11 +69,11 @@ void bt_panels_free(bt_panels *panels)
     *panels = (bt_panels){0};
 }
 
-int bt_panels_at(const bt_panels *panels, double x, double y)
+int bt_panels_at(const bt_panels *panels, double x, double y, double nx, double ny)
 {
     // Panel 0 begins half a panel before the bow.
     const double around = panels->arc[panels->n_vertices];
-    double s = (nearest(panels, x, y) - panels->bow) / around * panels->n + 0.5;
+    double s = (nearest(panels, x, y, nx, ny) - panels->bow) / around * panels->n + 0.5;
     s -= panels->n * floor(s / panels->n);
     const int k = (int)s;
     return k < panels->n ? k : 0;
@@ -98,12 +100,12 @@ void bt_panels_clear(bt_panels *panels)
     for (int k = 0; k < panels->n; k++) panels->panel[k].fx = panels->panel[k].fy = panels->panel[k].normal = 0;
 }
 
-void bt_panels_load(bt_panels *panels, double x, double y, double normal, double fx, double fy)
+void bt_panels_load(bt_panels *panels, const bt_point_load *load)
 {
-    bt_panel *panel = &panels->panel[bt_panels_at(panels, x, y)];
-    panel->normal += normal;
-    panel->fx += fx;
-    panel->fy += fy;
+    bt_panel *panel = &panels->panel[bt_panels_at(panels, load->x, load->y, load->nx, load->ny)];
+    panel->normal += load->normal;
+    panel->fx += load->fx;
+    panel->fy += load->fy;
 }
 
 // --- blocks of steps -------------------------------------------------------------------------------------------------

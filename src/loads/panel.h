@@ -3,8 +3,8 @@
 //
 // The waterline is walked in the order of its vertices (from the body's own +x towards +y). Panel 0 is centred where
 // the body's x axis leaves it, so that a tow along that axis presses on panel 0 and its neighbours. A contact point
-// belongs to the panel of the nearest point of the waterline. The load of a step is impulse / Δt, for quasi-static
-// loads and collisions alike. Vectors are in the body's frame.
+// belongs to the panel of the nearest point of the waterline; at a corner, to that of the edge it presses on. The load
+// of a step is impulse / Δt, for quasi-static loads and collisions alike. Vectors are in the body's frame.
 #ifndef BT_PANEL_H
 #define BT_PANEL_H
 
@@ -28,8 +28,9 @@ typedef struct bt_panels {
 void bt_panels_init(bt_panels *panels, int n, int n_vertices, const double *outline);
 void bt_panels_free(bt_panels *panels);
 
-/// Panel of the point (x, y), m, body frame.
-int bt_panels_at(const bt_panels *panels, double x, double y);
+/// Panel of the point (x, y), m, body frame. At a corner, where two edges are equally near, it lies on the edge that a
+/// load in the direction (nx, ny) presses on more squarely.
+int bt_panels_at(const bt_panels *panels, double x, double y, double nx, double ny);
 
 /// The point of the waterline at panel coordinate s (panel k: s = k to k + 1), m; normal: outward unit normal there (or
 /// NULL).
@@ -38,8 +39,13 @@ void bt_panels_point(const bt_panels *panels, double s, double xy[2], double nor
 /// Begin a step: no load.
 void bt_panels_clear(bt_panels *panels);
 
-/// Add a normal force (N) and the force vector (N, body frame) at a point (m, body frame).
-void bt_panels_load(bt_panels *panels, double x, double y, double normal, double fx, double fy);
+/// Load of one contact point: place, m, direction (nx, ny) of its normal force, that force, N, and with friction, N; in
+/// the body frame.
+typedef struct bt_point_load {
+    double x, y, nx, ny, normal, fx, fy;
+} bt_point_load;
+
+void bt_panels_load(bt_panels *panels, const bt_point_load *load);
 
 // --- blocks of steps -------------------------------------------------------------------------------------------------
 

@@ -553,8 +553,8 @@ static bool same_constants(const bt_params *now, const bt_params *then, bool ste
            now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
 }
 
-/// Collisions that may continue. A row of version 0.1.0 ends before `most`.
-static bt_impact_open *load_open(bt_snapshot *snap, int64_t *n)
+/// Collisions that may continue. A row of version 0.1.0 ends before `most`, and does not name the panel.
+static bt_impact_open *load_open(bt_snapshot *snap, const bt_panels *panels, int64_t *n)
 {
     const bt_item *item = bt_snapshot_find(snap, "impacts/open");
     const int width = item && item->width == OPEN_WIDTH - 1 ? OPEN_WIDTH - 1 : OPEN_WIDTH;
@@ -563,6 +563,7 @@ static bt_impact_open *load_open(bt_snapshot *snap, int64_t *n)
     for (int64_t k = 0; k < *n; k++) {
         open[k].most = INFINITY;
         memcpy(&open[k], rows + k * width, (size_t)width * sizeof *rows);
+        if (width < OPEN_WIDTH) open[k].so_far.panel = bt_panels_at(panels, open[k].so_far.x, open[k].so_far.y, 0, 0);
     }
     free(rows);
     return open;
@@ -584,7 +585,7 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
         bt_snapshot_take_rows(snap, "undisturbed", undisturbed_rows, BT_N_OF(undisturbed_rows), world->undisturbed);
     if (world->impacts && comm->rank == 0) {
         free(world->impacts->open);
-        world->impacts->open = load_open(snap, &world->impacts->n_open);
+        world->impacts->open = load_open(snap, &world->impacts->panels, &world->impacts->n_open);
     }
     bt_events_free(&world->events);
     world->events.n = -1;

@@ -471,13 +471,8 @@ static void create_splitting(const bt_case *input, bt_world *world, const bt_ros
 
 bt_status bt_setup_world(const bt_case *input, const bt_field *field, bt_world **out, bt_roster *roster, bt_errors *err)
 {
-    double sum = 0, v[2 * BT_MAX_VERTICES];
-    double size = field->n ? bt_field_mean_size(field) : input->ice.size;
-    if (!field->n && input->n_floes) {
-        for (bt_idx i = 0; i < input->n_floes; i++)
-            sum += sqrt(4 * bt_shape_moments(bt_case_floe_outline(&input->floes[i], v), v).area / BT_PI);
-        size = sum / input->n_floes;
-    }
+    const double by_hand = bt_case_hand_means(input).size,
+                 size = field->n ? bt_field_mean_size(field) : by_hand > 0 ? by_hand : input->ice.size;
     if (!bt_setup_check_field(input, field, err)) return BT_ERR_CASE;
     bt_params par = bt_setup_params(input, size);
     bt_world *world = bt_world_create(&par);

@@ -101,6 +101,41 @@ def test_a_named_line_and_its_twin(tmp_path, ratio, names):
     assert (line["type"], line["diameter"]) == (("polypropylene", "0.001 m") if names else ("numbers", "0 m"))
 
 
+def numbers_of(folder, case):
+    return json.loads(call("check", write_case(folder, case), "--json").stdout)
+
+
+QUAY = {"shape": "rectangle", "length": 400, "width": 80, "x": 0, "y": 340, "fixed": True}
+
+
+def test_a_quay_is_no_floe(tmp_path):
+    """The mean floe, by which overlaps are judged and which drifts with the wind, is one of those that can move."""
+    case = {"run": {"dt": 0.5, "duration": 5}, "domain": {"length": 800, "width": 800, "x0": -400, "ends": "open",
+                                                           "sides": "open"},
+            "ice": {"concentration": 0, "thickness": 1, "size": 5},
+            "body": {"shape": "square", "length": 4, "x": 0, "y": 0, "draft": 2},
+            "tow": {"mode": "speed", "speed": 0.05, "ramp": 0}, "air": {"wind_x": 5},
+            "floes": [{"shape": "square", "length": 3, "x": x, "y": 0} for x in (8, 11.1)]}
+    quay = changed(case, floes=[*case["floes"], QUAY])
+    alone, beside = (numbers_of(tmp_path, one) for one in (case, quay))
+    assert beside["ice"]["floes"] == 3
+    for key in "mean_size_m", "mean_thickness_m", "mean_mass_kg":
+        assert beside["ice"][key] == alone["ice"][key]
+    assert alone["ice"]["mean_size_m"] == pytest.approx(np.sqrt(4 / np.pi) * 3)
+    one, two = (run(tmp_path, c, name=n).summary["mean_size_m"] for c, n in ((case, "one"), (quay, "two")))
+    assert one == two
+    quay["floes"][1]["x"] = 10.94  # 0.06 m: 2 % of a floe
+    r = call("run", write_case(tmp_path, quay), "-o", tmp_path / "refused", "--quiet")
+    assert r.returncode == CASE and "overlap by up to 0.06 m" in r.stderr
+
+
+def test_the_mean_mass_is_that_of_the_floes(tmp_path):
+    """E[d²] of a lognormal law is (1 + spread²) times the square of the mean."""
+    case = changed(TOW, ice__size=1.5, ice__size_law="lognormal", ice__size_spread=0.9)
+    ice = numbers_of(tmp_path, case)["ice"]
+    assert ice["mean_mass_kg"] == pytest.approx(np.pi / 4 * 1.5 ** 2 * 1.81 * 910 * ice["mean_thickness_m"], rel=0.01)
+
+
 def test_floes_given_by_hand_take_their_room(tmp_path):
     """The concentration refers to the region without them, and so does the number of floes that is expected."""
     slab = {"shape": "rectangle", "length": 6, "width": 7.5, "x": 11, "y": 0}

@@ -291,6 +291,13 @@ def test_ice_that_the_wind_drives_along_is_not_met_at_the_speed_of_the_tow(tmp_p
     assert before["ordered_speed_m_s"] == before["speed_along_m_s"]
 
 
+def test_undisturbed_ice_drifts_as_the_mean_floe(tmp_path):
+    """Not as one of the mean size weighted by area, which is twice as large and more slowly driven."""
+    alike, mixed = (estimate(tmp_path, changed(DRIVEN, ice__size_law="lognormal", ice__size_spread=spread))
+                    for spread in (0.01, 0.9))
+    assert mixed["speed_along_m_s"] == pytest.approx(alike["speed_along_m_s"], rel=1e-6)
+
+
 def test_a_run_goes_on_with_the_drift_that_it_had(tmp_path):
     """Red when the way of undisturbed ice, or its velocity, is not in the checkpoint."""
     case = changed(DRIVEN, domain__ends="periodic", ice__start="rest", run__duration=200)

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, environment, quick, run, write_case
+from harness import BERGTOW, DONE, PRESS, TOW, VALIDATE, Run, changed, differing, environment, quick, run, write_case
 from resuming import assert_same_result, done
 from test_ranks_output import mpirun
 
@@ -243,6 +243,19 @@ def test_one_large_body_runs_on_after_another_has_stopped(tmp_path):
             "floes": [{"shape": "disc", "length": 9, "x": 10, "y": -16.1, "vx": 4, "vy": 0, "thickness": 0.5}],
             "body": {"shape": "disc", "x": 5, "y": 18, "length": 2, "draft": 0.5, "vx": 20, "vy": 0, "drag": still}}
     assert_same(run(tmp_path, case, "--threads", 1, "--quiet"), many(tmp_path, 3, 1))
+
+
+def test_one_rank_that_is_told_to_divide_tells_all(tmp_path):
+    """Launchers pass no variables on to other machines. Red: the ranks wait for each other."""
+    case = changed(TOW, run__duration=1)
+    one = run(tmp_path, case, "--threads", 1, "--quiet")
+    forget = '[ "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}" = 0 ] || unset BERGTOW_DIVIDE; exec "$0" "$@"'
+    result = mpirun(2, "run", "case.yml", "-o", "two", "--threads", 1, "--quiet", program=("sh", "-c", forget, BERGTOW),
+                    cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    two = Run(tmp_path / "two", result)
+    assert_same(one, two)
+    assert two.summary["undivided_steps"] == 0
 
 
 def test_a_wrong_division_is_refused(tmp_path):

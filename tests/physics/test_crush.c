@@ -261,6 +261,35 @@ TEST(a_corner_out_of_sight_is_not_forgotten)
     }
 }
 
+/// A third corner is crushed: of the two old depths the deeper stays, whichever comes first in the record.
+TEST(the_deeper_of_two_old_depths_stays)
+{
+    for (int deep = 0; deep < 2; deep++) {
+        bt_params p = params(1e-3);
+        bt_world *w = bt_world_create(&p);
+        double v[8];
+        scene_square(1, v);
+        add_floe(w, 4, v, -0.5 * sqrt(2), 0, 0.25 * BT_PI, 2, 0.1);
+        scene_wall(w, 0, -50, 5, 50, 0);
+        for (int s = 0; s < 5; s++) bt_world_step(w);
+        bt_cell *t = NULL;
+        contact_with_last(w, &t);
+        assert_int_equal(t->laws->n_memory, 1);
+        bt_memory *memory = &t->laws->memory[0];
+        memory->n_points = 2;
+        for (int i = 0; i < 2; i++)
+            memory->feature[i] = (uint32_t)(1000 + i), memory->value[i] = i == deep ? 0.3 : 0.001;
+        bt_world_step(w);
+        const bt_idx j = contact_with_last(w, &t);
+        memory = &t->laws->memory[0];
+        assert_int_equal(memory->n_points, 2);
+        assert_int_equal(memory->feature[0], t->gaps[j].feature[0]);
+        assert_int_equal(memory->feature[1], 1000 + deep);
+        CHECK_CLOSE(memory->value[1], 0.3, 0);
+        bt_world_free(w);
+    }
+}
+
 static void drive(bt_world *w, double vx, double vy, int steps, double *overlap)
 {
     for (int s = 0; s < steps; s++) {

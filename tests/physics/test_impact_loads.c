@@ -402,17 +402,35 @@ TEST(panels_of_a_square)
     } at[] = {{5.1, 0, 0},    {5, 0.49, 0}, {5, -0.49, 0},   {5, 0.51, 1}, {5, -0.51, 39}, {4.9, 4.4, 4},
               {0.1, 5.2, 10}, {-5, 0, 20},  {-5.3, 0.6, 19}, {0, -5, 30},  {9, 9, 5}};
     for (size_t i = 0; i < sizeof at / sizeof *at; i++)
-        assert_int_equal(bt_panels_at(&p, at[i].x, at[i].y), at[i].panel);
+        assert_int_equal(bt_panels_at(&p, at[i].x, at[i].y, 0, 0), at[i].panel);
     for (int k = 0; k < 40; k++) {
         double xy[2], n[2];
         bt_panels_point(&p, k + 0.5, xy, n);
-        assert_int_equal(bt_panels_at(&p, xy[0], xy[1]), k);
+        assert_int_equal(bt_panels_at(&p, xy[0], xy[1], 0, 0), k);
         CHECK_CLOSE(n[0] * xy[0] + n[1] * xy[1], 5, 1e-12);
     }
     double xy[2];
     bt_panels_point(&p, 0.5, xy, NULL);
     CHECK_CLOSE(xy[0], 5, 1e-12);
     CHECK_CLOSE(xy[1], 0, 1e-12);
+    bt_panels_free(&p);
+}
+
+/// 36 panels of a square end at its corners: a load on a corner counts for the side it presses on, on the left as on
+/// the right.
+TEST(a_corner_belongs_to_the_side_pressed_on)
+{
+    double v[8];
+    scene_square(10, v);
+    bt_panels p;
+    bt_panels_init(&p, 36, 4, v);
+    const struct {
+        double x, y, nx, ny;
+        int panel;
+    } at[] = {{5, 5, -1, 0, 4},  {5.01, 5.002, -1, 0.01, 4}, {5, 5, 0, -1, 5},   {5, -5, -1, 0, 32},
+              {5, -5, 0, 1, 31}, {-5, 5, 1, 0, 14},          {-5, 5, 0, -1, 13}, {-5, -5, 0, 1, 23}};
+    for (size_t i = 0; i < sizeof at / sizeof *at; i++)
+        assert_int_equal(bt_panels_at(&p, at[i].x, at[i].y, at[i].nx, at[i].ny), at[i].panel);
     bt_panels_free(&p);
 }
 
