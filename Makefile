@@ -299,8 +299,8 @@ deps-long: ## install what make test-long needs
 test-long: deps-long ## tests that take minutes: intervals over fields, long tows, finer steps, kills, faults, soak
 	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=asan all
-	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
-	BERGTOW=build/release/bergtow $(PYTEST) -m slow tests/parallel tests/cli
+	@failed=; for tests in "-m slow tests/parallel tests/cli" "-s tests/long"; do \
+	    BERGTOW=build/release/bergtow $(PYTEST) $$tests || failed=1; done; [ ! "$$failed" ]
 	@! command -v clang-14 >/dev/null || $(AGAIN) tsan
 
 # FLAGS='-j 2 --only solve': tests/mutate.py --help

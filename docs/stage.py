@@ -84,6 +84,11 @@ The package `bergtow` of postproc/. How to install it, and examples: [the librar
 
 .. autodata:: bergtow.Force
    :no-value:
+
+.. automodule:: bergtow.towing
+   :members:
+   :undoc-members:
+   :imported-members:
 ```
 """)
     gallery(reference)

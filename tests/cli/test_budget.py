@@ -428,7 +428,7 @@ def test_a_study_end_to_end(small):
     minutes = f"{(seconds['end_s'] - seconds['start_s']) / 60:.3g} min"
     assert f"largest tow force of a tow, within {minutes}, as the moving mean over 1 s" in text
     block = analysis.chapter("budget", answers.read("budget", folder / "out"))
-    assert written(block["parts"], True).startswith("| part |") and len(block["figure"]().axes) == 2
+    assert "\n| part |" in written(block["parts"], True) and len(block["figure"]().axes) == 2
     case = Run(member).case
     row = {"name": "dt", "judged": "none", "interval_95": [-0.1, 0.2], "from": float(case["run.dt"].split()[0])}
     def with_it(row, values):

@@ -337,7 +337,9 @@ HEADINGS = ["Answer", "Limits of operation", "Method", "Model and its limits", "
 
 @pytest.mark.slow
 def test_the_answer_comes_first_and_all_else_in_order(page, made):
-    assert [h.text for h in page.find_elements("tag name", "h2")] == HEADINGS
+    chapters = [h.text for h in page.find_elements("tag name", "h2")]
+    tables = ["Load cases", "What the tow force is made of", "What is assumed", "Speeds"]
+    assert chapters == HEADINGS[:1] + tables + [h for h in HEADINGS[1:] if h != "Uncertainty budget"]
     assert page.requests == [(made / "report.html").resolve().as_uri()] and complaints(page) == []
     assert page.find_element("tag name", "h1").text == f"{TITLE}: ice concentration 20 to 40 %"
     block = page.find_element("css selector", "table.block").text

@@ -352,7 +352,7 @@ def test_uninstall_leaves_what_is_not_ours(tmp_path):
     make("install", f"PREFIX={tmp_path}")
     subprocess.run([tmp_path / "bin/bergtow", "converge", "--help"], stdout=subprocess.DEVNULL, check=True,
                    env={k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"})
-    assert (tmp_path / "share/bergtow/postproc/__pycache__").exists()  # what Python adds goes, too
+    assert (tmp_path / "share/bergtow/postproc/bergtow/__pycache__").exists()  # what Python adds goes, too
     make("install", f"PREFIX={tmp_path}")  # over an older one
     assert {"bin/bergtow", "lib/libbergtow.so.0", "share/man/man1/bergtow.1"} <= everything(tmp_path) - before
     make("uninstall", f"PREFIX={tmp_path}")

@@ -113,7 +113,7 @@ def test_outlines_without_end(tmp_path):
     refusal(tmp_path, changed(SMALL, ice={"outlines": "deep.json"}), "deep.json", "JSON")
     (tmp_path / "many.json").write_text("[]," * 40000001)
     refusal(tmp_path, changed(SMALL, ice={"outlines": "many.json"}), "many.json: holds 40000001 lists",
-            "at most 40000000", "simplify")
+            "more than the limit of 40000000", "simplify")
 
 
 def test_values_of_a_study(tmp_path):

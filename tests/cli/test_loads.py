@@ -587,10 +587,11 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     found = script("statistics", tmp_path / "a", "--resamples", 1).stdout
     assert "no upper bound" not in found
     above = "above the breaking load of the line"
-    assert f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the line tension, which" in found
+    design = f"WARNING: The design tension is {above}: concentration 90 % (2.00 MN of the tension of the first branch"
+    assert f"{design}, which" in found
     # in the start
-    assert f"step, which decides when a line parts, is {above} (2.00 MN of the line tension, which reaches 1010 " \
-           "MN)" in found
+    assert f"step, which decides when a line parts, is {above} (2.00 MN of the tension of the first branch, which " \
+           "reaches 1010 MN)" in found
 
 
 def test_too_little_is_reported_and_not_guessed(tmp_path):

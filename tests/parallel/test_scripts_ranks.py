@@ -28,7 +28,8 @@ def test_a_study_on_one_rank_is_that_without_mpirun(tmp_path):
     write_case(tmp_path, CASE)
     result = mpirun(1, "design", "case.yml", "-o", "out", "--concentrations", "0.2,0.3", "--fields", 5, cwd=tmp_path,
                     timeout=150)
-    assert result.returncode == DONE and not ours(result), result.stderr
+    complaints = [line for line in ours(result) if line.startswith("bergtow: ")]  # the rest tells of progress
+    assert result.returncode == DONE and not complaints, result.stderr
     assert {"report.html", "report.pdf", "replay.html"} <= {p.name for p in (tmp_path / "out").iterdir()}
     again = subprocess.run([BERGTOW, "ensemble", "out/design.yml", "-o", "again"], cwd=tmp_path, capture_output=True,
                            text=True, timeout=150, env=environment())
