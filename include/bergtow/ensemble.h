@@ -36,10 +36,11 @@
 #ifndef BERGTOW_ENSEMBLE_H
 #define BERGTOW_ENSEMBLE_H
 
-#include "bergtow/comm.h"
 #include "bergtow/study.h"
 
 BT_BEGIN_C
+
+struct bt_comm;
 
 enum {
     BT_MAX_ATTEMPTS = 20,     ///< most attempts of a member whose process dies each time
@@ -79,7 +80,7 @@ typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_memb
 /// study, a file that it names has changed, its members would be the same run, the study needs more ranks than there
 /// are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (stopped: another call resumes, or other processes work
 /// on the rest); the worst status of a failed member if all others are done.
-bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
+bt_status bt_ensemble_run(const struct bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                           bt_errors *err);
 
 /// State of a member by its marker files; for soundness see ensemble_record.h. *why: text of failed.txt without its

@@ -6,7 +6,6 @@
 
 #include "bergtow/base.h"
 #include "bergtow/case.h"
-#include "bergtow/comm.h"
 
 BT_BEGIN_C
 
@@ -129,7 +128,8 @@ double bt_field_mean_size(const bt_field *field);
 double bt_field_thickness(const bt_case *input, bt_idx i);
 
 /// Collective. Send the field of rank 0 to all ranks; `field` must be initialised.
-void bt_field_share(const bt_comm *comm, bt_field *field);
+struct bt_comm;
+void bt_field_share(const struct bt_comm *comm, bt_field *field);
 
 /// Name of the case's domain.frame.
 const char *bt_field_frame(const bt_case *input);

@@ -7,9 +7,10 @@
 
 #include "bergtow/base.h"
 #include "bergtow/case.h"
-#include "bergtow/comm.h"
 
 BT_BEGIN_C
+
+struct bt_comm;
 
 typedef struct bt_run_options {
     const char *dir;          ///< output folder
@@ -41,16 +42,16 @@ typedef struct bt_run_options {
 /// BT_ERR_CASE, BT_ERR_IO, BT_ERR_NUMERIC, BT_ERR_SIGNAL (a signal at any rank, the stop file, max_wall, see
 /// src/run/halt.h: all results so far are on disk, marked as stopped, and can be resumed). Ranks that have
 /// different cases are refused (BT_ERR_CASE).
-bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err);
+bt_status bt_run(const struct bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err);
 
 /// Collective. Resume the run in options->dir from its last checkpoint (src/output/checkpoint.h), or from its case if
 /// it was killed before the first. A finished run is left as it is: BT_OK, with a line on stdout unless quiet. Errors
 /// as for bt_run, and BT_ERR_CASE for a rejected checkpoint.
-bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *options, bt_errors *err);
+bt_status bt_run_resume(const struct bt_comm *comm, const bt_run_options *options, bt_errors *err);
 
 /// Collective. Number of OpenMP threads of this rank of comm: `asked` if above 0, else run.threads of the case, else
 /// OMP_NUM_THREADS, else its available cores; cores also available to other ranks are divided among them.
-int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked);
+int bt_run_threads(const struct bt_comm *comm, const bt_case *input, int asked);
 
 BT_END_C
 

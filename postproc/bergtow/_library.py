@@ -95,6 +95,7 @@ APPLIED_FORCE = ctypes.CFUNCTYPE(c_int, POINTER(Applied), c_void_p)
 _SIGNATURES = {
     "bt_version": (c_char_p,),
     "bt_last_error": (c_char_p,),
+    "bt_outline_crosses": (c_bool, c_int, POINTER(c_double)),
     "bt_simulation_create": (Status, POINTER(c_void_p), POINTER(Options)),
     "bt_simulation_resume": (Status, POINTER(c_void_p), POINTER(Options)),
     "bt_simulation_step": (Status, c_void_p, c_int64),

@@ -73,11 +73,6 @@ def _call(command: str, *words: str | os.PathLike[str]) -> str:
     return text.getvalue()
 
 
-def _write(data: bytes, path: Path) -> None:
-    with written(path, force=True) as new:
-        new.write_bytes(data)
-
-
 class Picture:
     """A picture: notebooks display it, save() writes it."""
 
@@ -93,16 +88,13 @@ class Picture:
                 self._kept[kind] = path.read_bytes()
         return self._kept[kind]
 
-    def save(self, file: str | os.PathLike[str]) -> Path:
+    def save(self, file: str | os.PathLike[str], *, replace: bool = False) -> Path:
         """Write the picture to a file that ends in .png, .pdf or .svg, with its folder if that is missing, and return
-        its path. A .png is the picture as displayed; the other formats are drawn again from the current contents of the
-        result folder."""
+        its path. A .png is the picture as displayed; the other formats are drawn from the contents that the result
+        folder has when they are first asked for. replace: overwrite a file even if bergtow did not make it."""
         path = Path(file)
-        kind = path.suffix.lstrip(".")
-        if kind in self._kept:
-            _write(self._kept[kind], path)
-        else:
-            self._draw(path)
+        with written(path, force=replace) as new:
+            new.write_bytes(self._data(path.suffix.lstrip(".")))
         return path
 
     def _repr_png_(self) -> bytes:
@@ -157,7 +149,7 @@ def plot_ensemble(ensemble: Of, **options: Any) -> dict[str, Picture]:
             kind = path.suffix.lower().lstrip(".")
             if kind not in drawn:
                 drawn[kind] = draw_all(kind)
-            _write(drawn[kind][name], path)
+            path.write_bytes(drawn[kind][name])
         return Picture(draw)
 
     return {name: of(name) for name in drawn["png"]}

@@ -27,6 +27,15 @@ static void check_numbers(const bt_contact_law *law, const char *name, bt_errors
                               law->numbers[k].name, law->numbers[k].state ? "count" : "remember");
 }
 
+/// Has number k of the law the name of its work, or of an earlier number?
+static bool is_named_before(const bt_contact_law *law, int k, const char *work)
+{
+    const char *name = law->numbers[k].name;
+    bool found = !strcmp(name, work);
+    for (int j = 0; j < k; j++) found = found || !strcmp(name, law->numbers[j].name);
+    return found;
+}
+
 /// Check the series of the law: its work and its numbers.
 static void check_series(const bt_contact_law *law, const char *name, bt_errors *err)
 {
@@ -39,6 +48,8 @@ static void check_series(const bt_contact_law *law, const char *name, bt_errors 
             strlen(number->description) < 8)
             bt_errors_add(err, "contact law %s: its number %d needs name, units (\"1\" for a plain number) and a "
                           "description", name, k + 1);
+        else if (is_named_before(law, k, work))
+            bt_errors_add(err, "contact law %s: two of its series are named %s; rename one number", name, number->name);
         else bt_series_may_be(number->name, 1, err);
     }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The store of an ice field: floes as polygons in their own frames, one pose each.
+#include "bergtow/comm.h"
 #include "bergtow/field.h"
 
 #include <math.h>

@@ -87,7 +87,7 @@ static void registry_check(const char *name, int more, bt_errors *err)
                       "whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
 }
 
-bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
+static bt_status add_series(const bt_quantity *quantity, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = quantity->name ? quantity->name : "";
@@ -112,6 +112,12 @@ bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
     return BT_OK;
 }
 
+bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
+{
+    bt_n_added(); // series of laws registered before, which are made when first needed, have their names
+    return add_series(quantity, err);
+}
+
 // --- of force laws ---------------------------------------------------------------------------------------------------
 
 /// Is its force one of the program's own series?
@@ -131,7 +137,7 @@ static void add_quantity(const bt_force_series *of)
     const bt_quantity quantity = {.name = name, .units = "N", .description = text, .label = of->name,
                                   .keep = BT_KEEP_MEAN, .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE,
                                   .of_world = bt_force_of, .context = of->name};
-    if (bt_quantity_register(&quantity, &err) != BT_OK) bt_errors_print(&err);
+    if (add_series(&quantity, &err) != BT_OK) bt_errors_print(&err);
     bt_errors_free(&err);
 }
 
@@ -189,7 +195,7 @@ static void add_number(const bt_quantity *like, int law, int k)
     bt_quantity quantity = *like;
     quantity.applies = BT_APPLIES_ALWAYS, quantity.role = BT_ROLE_NONE, quantity.of_world = number,
     quantity.context = &place[law][k];
-    if (bt_quantity_register(&quantity, &err) != BT_OK) bt_errors_print(&err);
+    if (add_series(&quantity, &err) != BT_OK) bt_errors_print(&err);
     bt_errors_free(&err);
 }
 

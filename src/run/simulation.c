@@ -37,6 +37,7 @@ struct bt_simulation {
     bt_run_start m;
     bt_status status;         ///< of the last step
     char *why;                ///< reason of a failure, or NULL
+    int n_series;             ///< known when it began; its samples have no others
     bool *moved;              ///< [bodies] moved by hand since the last step; NULL = none
     bool alone;               ///< no applied force in any step
 };
@@ -140,6 +141,7 @@ static bt_status begin(bt_simulation *sim, bt_errors *err)
 {
     const bt_status status = bt_running_begin(&sim->r, bt_comm_world(), &sim->c, &sim->o, &sim->m, err);
     if (status != BT_OK) bt_running_close(&sim->r, status, err);
+    sim->n_series = bt_n_series();
     return status;
 }
 
@@ -414,14 +416,14 @@ bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, doub
 
 bt_status bt_simulation_quantity(const bt_simulation *sim, const char *name, double *value)
 {
-    const bt_quantity *quantity = bt_series_find(name);
     *value = NAN;
-    if (!quantity) {
+    if (!bt_series_find(name)) {
         bt_errors err = {0};
         bt_errors_add(&err, "%s: there is no series of this name; see bergtow --list-quantities", name);
         return reported(BT_ERR_USAGE, &err);
     }
-    if (sim->r.w->step > sim->r.first_step) *value = bt_sample_value(&sim->r.sample, quantity);
+    for (int k = 0; k < sim->n_series && sim->r.w->step > sim->r.first_step; k++)
+        if (!strcmp(bt_series(k)->name, name)) *value = bt_sample_value(&sim->r.sample, bt_series(k));
     return BT_OK;
 }
 

@@ -175,7 +175,8 @@ def test_each_header_stands_alone(prefix, tmp_path, compiler):
         # twice, for the guard; and the functions have to have the names of C
         source.write_text(f'#include "bergtow/{name}"\n' * 2)
         result = subprocess.run([*compiler.split(), "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only",
-                                 *flags(prefix, "--cflags"), *mpi, source], capture_output=True, text=True)
+                                 *flags(prefix, "--cflags"), *(mpi if name == "comm.h" else []), source],
+                                capture_output=True, text=True)
         assert result.returncode == 0, f"{name}: {result.stderr}"
 
 

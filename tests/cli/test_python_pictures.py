@@ -70,6 +70,11 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path, monkeypatch):
     shutil.rmtree(tmp_path / "out")
     for path in tmp_path / "kept.png", tmp_path / "new/kept.png":
         assert picture.save(path).read_bytes() == picture._repr_png_()
+    (tmp_path / "theirs.png").write_text("not ours")
+    with pytest.raises(bergtow.BergtowError, match="theirs.png: already exists and was not made by bergtow"):
+        picture.save(tmp_path / "theirs.png")
+    assert (tmp_path / "theirs.png").read_text() == "not ours"
+    assert picture.save(tmp_path / "theirs.png", replace=True).read_bytes() == picture._repr_png_()
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="pipe.png: already exists and is not a file"):
         picture.save(tmp_path / "pipe.png")

@@ -633,6 +633,9 @@ def test_why_there_is_no_route(start, goal, more, status):
 def test_numbers_that_are_refused(more, said):
     with pytest.raises(BergtowError, match=said):
         plan(NONE, BERG, (50, 300), (900, 300), **({"extent": (0, 0, 1000, 600)} | more))
+    bow_tie = [(400, 400), (600, 600), (600, 400), (400, 600)]
+    with pytest.raises(BergtowError, match="floe 1: an outline whose edges cross"):
+        plan(Ice([box(0, 0, 1, 1), bow_tie], [1.0, 1.0]), BERG, (50, 300), (900, 300), extent=(0, 0, 1000, 600))
     with pytest.raises(BergtowError, match="thickness"):
         plan(Ice([box(0, 0, 1, 1)], [0.0]), BERG, (50, 300), (900, 300), extent=(0, 0, 1000, 600))
 

@@ -326,6 +326,13 @@ def test_the_tables_of_lines_and_vessels():
     assert math.isnan(vessels["ahts-157"].free_speed)
     assert towing.lightest_line(2.5e6).name == "hmpe-64" and towing.lightest_line(1e9) is None
     assert towing.lightest_line(2.5e6, material="steel wire").name == "wire-6x36-60"
+    for load in 0, -5, math.nan:
+        with pytest.raises(BergtowError, match="is not above zero"):
+            towing.lightest_line(load)
+        with pytest.raises(BergtowError, match="is not above zero"):
+            towing.smallest_vessel(load)
+    with pytest.raises(BergtowError, match="no line is of 'steel wre'; give one of HMPE, chain"):
+        towing.lightest_line(1e6, material="steel wre")
     assert towing.smallest_vessel(1.1e6).name == "ahts-157"
     assert towing.smallest_vessel(1.1e6, known=("free_speed", )).name == "ahts-180"
 

@@ -23,6 +23,8 @@ static void watch(const bt_law_contact *t, double load[2], double given[2])
     fender_bound(t, load, given);
 }
 
+static double two(const bt_world *world, const void *context) { return (void)world, (void)context, 2; }
+
 static const double sheet = 50, soft = 30, stiff = 400; // kg/m², N, N/m
 
 /// The hull: a slab from x = 0.71 on that stands still, and is what is towed.
@@ -167,13 +169,20 @@ TEST(what_will_not_do_is_refused)
     static const bt_law_key furlong[] = {{"load", "furlong", "0", "[0, 1]", "a load of something"}};
     static const bt_contact_number lonely[] = {{"bits", "1", "something that nothing counts", true}};
     static const bt_contact_number taken[] = {{"contacts", "1", "a series that is there", false}},
-                                   nameless[] = {{NULL, "1", "a number without a name", false}};
+                                   nameless[] = {{NULL, "1", "a number without a name", false}},
+                                   twice[] = {{"grip", "1", "a number of the test", false},
+                                              {"grip", "N", "another number of the test", false}},
+                                   work[] = {{"soft_work", "1", "a number of the test", false}};
     const struct { bt_contact_law law; const char *says;
     } bad[] = {
         {{.name = "twin", .doc = "a law with a number that is there", .on = fender_on, .bound = fender_bound,
           .remember = fender_remember, .numbers = taken, .n_numbers = 1}, "contacts: a series of this name exists"},
         {{.name = "blank", .doc = "a law with a number without a name", .on = fender_on, .bound = fender_bound,
           .remember = fender_remember, .numbers = nameless, .n_numbers = 1}, "its number 1 needs name"},
+        {{.name = "soft", .doc = "a law with two numbers of one name", .on = fender_on, .bound = fender_bound,
+          .remember = fender_remember, .numbers = twice, .n_numbers = 2}, "two of its series are named grip"},
+        {{.name = "soft", .doc = "a law with a number called its work", .on = fender_on, .bound = fender_bound,
+          .remember = fender_remember, .numbers = work, .n_numbers = 1}, "two of its series are named soft_work"},
         {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
         {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
         {{.name = "Big", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "lower-case letters"},
@@ -214,5 +223,11 @@ int main(void)
     bt_contact_law watched = fender_law;
     watched.bound = watch;
     if (bt_contact_register(&watched, &err) != BT_OK) bt_errors_print(&err);
+    bt_errors_free(&err);
+    // Its series are made when first needed, and have their names before that.
+    const bt_quantity of_fender = {.name = fender_law.numbers[0].name, .units = "1", .of_world = two,
+                                   .description = "a quantity with the name of a number of the law"};
+    if (bt_quantity_register(&of_fender, &err) != BT_ERR_USAGE) return 1;
+    bt_errors_free(&err);
     return run_all_tests(NULL, NULL);
 }

@@ -163,6 +163,9 @@ class _Task:
                  start_heading: Union[float, None] = None, goal_heading: Union[float, None] = None) -> None:
         t = self.task = _library.RouteTask()
         self.floes, self.first = _rings("floe", ice.outlines)
+        for k, ring in enumerate(np.split(self.floes, self.first[1:-1]) if len(ice.outlines) else ()):
+            if _library.library().bt_outline_crosses(len(ring), _pointer(ring)):
+                raise _refuse(f"floe {k}", "an outline whose edges cross or touch", "give a simple polygon")
         self.thickness = np.ascontiguousarray(np.broadcast_to(np.asarray(ice.thickness, float), len(ice.outlines)))
         if not ((self.thickness > 0) & np.isfinite(self.thickness)).all():
             raise _refuse("thickness", "a floe of none", "give every floe one above 0 m")

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar, Union
 
 from ..errors import CASE, IO, BergtowError
+from ._given import above_zero
 from .stability import GRAVITY
 from .vessel import STANDARD_GRAVITY
 
@@ -137,14 +138,20 @@ def find_vessel(name: str, library: PathLike = None) -> Vessel:
 
 
 def lightest_line(needed_breaking: float, library: PathLike = None, material: str | None = None) -> Line | None:
-    """The line of least mass with at least this breaking load, N; None if there is none."""
+    """The line of least mass with at least this breaking load, N; None if there is none. Raises BergtowError for a load
+    that is not above 0, and for a material of which no line is known."""
+    above_zero(needed_breaking=needed_breaking)
+    known = sorted({x.material for x in lines(library).values()})
+    if material is not None and material not in known:
+        raise BergtowError(f"material: no line is of {material!r}; give one of {', '.join(known)}")
     fit = [x for x in lines(library).values() if x.breaking >= needed_breaking and material in (None, x.material)]
     return min(fit, key=lambda x: x.mass, default=None)
 
 
 def smallest_vessel(needed_bollard_pull: float, library: PathLike = None, known: tuple[str, ...] = ()) -> Vessel | None:
     """The vessel of least bollard pull that has at least this pull, N, and for which these members are known, such as
-    "free_speed"; None if there is none."""
+    "free_speed"; None if there is none. Raises BergtowError for a pull that is not above 0."""
+    above_zero(needed_bollard_pull=needed_bollard_pull)
     fit = [x for x in vessels(library).values()
            if x.bollard_pull >= needed_bollard_pull and not any(math.isnan(getattr(x, member)) for member in known)]
     return min(fit, key=lambda x: x.bollard_pull, default=None)
