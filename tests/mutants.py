@@ -835,11 +835,11 @@ MUTANTS = {
          "the last branch, not the strongest"),
     ]),
     "src/output/history.c": (["unit/test_summary", "unit/test_record", "scenes:restitution,rafting"], [
-        ("TOTAL(F64, max_overlap, MAX, overlap,", "TOTAL(F64, max_overlap, LAST, overlap,", "largest overlap"),
-        ("TOTAL(F64, contact_work, SUM, contact_work,", "TOTAL(F64, contact_work, LAST, contact_work,",
+        ("TOTAL(F64, max_overlap, MAX, overlap)", "TOTAL(F64, max_overlap, LAST, overlap)", "largest overlap"),
+        ("TOTAL(F64, contact_work, SUM, contact_work)", "TOTAL(F64, contact_work, LAST, contact_work)",
          "work of a step"),
-        ("TOTAL(I64, repeats, SUM, repeats,", "TOTAL(I64, repeats, STEPS, repeats,", "repeats"),
-        ("TOTAL(I64, positive_work, STEPS, added_energy,", "TOTAL(I64, positive_work, STEPS, repeats,",
+        ("TOTAL(I64, repeats, SUM, repeats)", "TOTAL(I64, repeats, STEPS, repeats)", "repeats"),
+        ("TOTAL(I64, positive_work, STEPS, added_energy)", "TOTAL(I64, positive_work, STEPS, repeats)",
          "energy from contacts"),
     ]),
     "src/run/run_state.c": (["unit/test_state_check"], [
