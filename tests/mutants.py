@@ -1058,7 +1058,7 @@ MUTANTS = {
         ("bool any = leave_out(planner, way, &tried);", "bool any = false; (void)leave_out;", "no corner is left out"),
         ("any = put_in(planner, way, &tried) || any;", "(void)put_in;", "no corner is put in"),
         ("goal[0] = g[0] - u[0] * t,", "goal[0] = g[0] + u[0] * t,", "the goal drifts to the wrong side"),
-        ("kept = kept && apart(route, &plan->route[a]) > t->width;", "(void)apart;", "routes on top of each other"),
+        ("new = apart(route, &plan->route[a]) > w;", "(void)a;", "routes on top of each other"),
         ("    if (w.n == 0) {", "    if (false) {", "no way-point where the search ends where it begins"),
         ("plan->route[b].cost < plan->route[b - 1].cost", "false", "routes in the order in which they are found"),
     ]),
