@@ -50,6 +50,11 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
 
 // --- numbers that follow ---------------------------------------------------------------------------------------------
 
+double bt_case_rise(double ice_density, double water_density)
+{
+    return ice_density * (1 - ice_density / water_density) * BT_GRAVITY;
+}
+
 double bt_case_tow_sign(const bt_case *input) { return bt_cos(input->tow.direction) < 0 ? -1 : 1; }
 
 /// fault: returns why an outline is refused, or NULL.
