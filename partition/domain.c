@@ -15,7 +15,7 @@
 #define LASTS 4         // a gain that has lasted for some steps is expected to last for so many times these steps
 #define IMBALANCE 0.05  // of the work; a division that was made without knowing the work, and has more, is made anew
 enum { CHECK_STEPS = 10 };
-// Seconds, measured on one core (see partition/README.md).
+// Seconds, measured on one core.
 #define CONTACT_SWEEP 30e-9
 #define CONTACT_STEP 300e-9
 #define PAIR 60e-9
