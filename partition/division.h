@@ -69,7 +69,7 @@ struct bt_domain {
 /// Kinds of work between which ranks wait for each other: sweeps, and the rest of a step.
 enum { BT_WORK_SWEEPS, BT_WORK_REST };
 
-/// Work of a body at rest, s: the weight of cells before anything has been counted (partition/README.md).
+/// Work of a body at rest, s: the weight of cells before anything has been counted.
 #define BT_WORK_AT_REST 2e-9
 
 /// Place of cell (x, y) in the map, −1 outside.

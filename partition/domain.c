@@ -15,7 +15,7 @@
 #define LASTS 4         // a gain that has lasted for some steps is expected to last for so many times these steps
 #define IMBALANCE 0.05  // of the work; a division that was made without knowing the work, and has more, is made anew
 enum { CHECK_STEPS = 10 };
-// Seconds, measured on one core (see partition/README.md).
+// Seconds, measured on one core.
 #define CONTACT_SWEEP 30e-9
 #define CONTACT_STEP 300e-9
 #define PAIR 60e-9
@@ -179,6 +179,41 @@ void bt_domain_solve(bt_world *world, void (*solve)(bt_world *world), bt_vel *sh
 
 // --- balance ---------------------------------------------------------------------------------------------------------
 
+// gain: time that dividing the cells saves, since the last check, s, modelled; lists: to make the lists of pairs of one
+// rank's cells anew, s, modelled (of all cells where one rank has them).
+
+/// One rank has all cells. They are divided once
+///     division of all bodies + lists made by all ranks < LASTS × time lost since.
+static void check_undivided(bt_world *world, double gain, double lists)
+{
+    bt_domain *domain = world->domain;
+    domain->lost = bt_max(0, domain->lost + gain);
+    domain->due = DIVISION * (double)world->bodies.n_global + lists / domain->comm->size < LASTS * domain->lost;
+    domain->for_one = !domain->due;
+}
+
+/// Each rank has cells. One takes them all once
+///     division of all bodies + lists < LASTS × time that one rank would have saved since;
+/// they are cut anew once
+///     division of the bodies of a rank + lists < time lost by imbalance beyond that which the last cut left.
+/// mean: work of a rank since the last check, s.
+static void check_divided(bt_world *world, double gain, double lists, double mean, double imbalance)
+{
+    bt_domain *domain = world->domain;
+    const double division = DIVISION * (double)world->bodies.n_global;
+    if (isinf(domain->lost) && imbalance <= IMBALANCE) domain->lost = 0;
+    if (!isinf(domain->lost)) {
+        domain->stats.checks++;
+        domain->stats.imbalance += imbalance;
+        domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
+        domain->fresh = bt_min(domain->fresh, imbalance); // a jam that has dissolved must not earn a credit
+        domain->lost += (imbalance - domain->fresh) * mean;
+    }
+    domain->spared = bt_max(0, domain->spared - gain);
+    domain->for_one = division + lists < LASTS * domain->spared && !bt_division_is_forced(world);
+    domain->due = domain->for_one || division / domain->comm->size + lists < domain->lost;
+}
+
 /// Collective. Is a new division due? Adds the work counted since the last check to what the present division has cost;
 /// once a change would have paid for itself, it is due.
 static void check_balance(bt_world *world)
@@ -192,29 +227,10 @@ static void check_balance(bt_world *world)
     bt_sum_add(&total, mine * 0x1p40);
     bt_comm_reduce(domain->comm, &total, 1, most, BT_CUT_KINDS, NULL, 0);
     for (int k = 0; k < BT_CUT_KINDS; k++) heaviest += most[k];
-    const double steps = (double)domain->steps, work = bt_sum_value(&total) * 0x1p-40,
-                 mean = work / domain->comm->size, imbalance = mean > 0 ? heaviest / mean - 1 : 0,
-                 gain = steps * bt_division_gain(world, work / steps), bodies = (double)world->bodies.n_global,
-                 lists = NEW_LISTS * most[BT_WORK_REST] / steps / (domain->undivided ? domain->comm->size : 1);
-    const bool pays = DIVISION * bodies + lists <
-                      LASTS * (domain->undivided ? domain->lost + gain : domain->spared - gain);
-    if (domain->undivided) {
-        domain->lost = bt_max(0, domain->lost + gain);
-        domain->for_one = !pays;
-        domain->due = pays;
-    } else {
-        if (isinf(domain->lost) && imbalance <= IMBALANCE) domain->lost = 0;
-        if (!isinf(domain->lost)) {
-            domain->stats.checks++;
-            domain->stats.imbalance += imbalance;
-            domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
-            domain->fresh = bt_min(domain->fresh, imbalance); // a jam that has dissolved must not earn a credit
-            domain->lost += (imbalance - domain->fresh) * mean;
-        }
-        domain->spared = bt_max(0, domain->spared - gain);
-        domain->for_one = pays && !bt_division_is_forced(world);
-        domain->due = domain->for_one || domain->lost > DIVISION * bodies / domain->comm->size + lists;
-    }
+    const double steps = (double)domain->steps, work = bt_sum_value(&total) * 0x1p-40, mean = work / domain->comm->size;
+    const double gain = steps * bt_division_gain(world, work / steps), lists = NEW_LISTS * most[BT_WORK_REST] / steps;
+    if (domain->undivided) check_undivided(world, gain, lists);
+    else check_divided(world, gain, lists, mean, mean > 0 ? heaviest / mean - 1 : 0);
     domain->wait = domain->wait < CHECK_STEPS / 2 ? 2 * domain->wait : CHECK_STEPS;
     if (domain->due) return;
     domain->steps = domain->sweeps = 0;

@@ -329,6 +329,9 @@ int bt_case_waterline(const bt_case *input, double *v);
 /// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2] m. Returns the count.
 int bt_case_floe_outline(const bt_floe_def *floe, double *v);
 
+/// Potential energy that sheets gain on each other, over area and thickness squared, Pa/m (docs/theory.md, rafting).
+double bt_case_rise(double ice_density, double water_density);
+
 /// Mass of the towed body without added mass, kg.
 double bt_case_body_mass(const bt_case *input);
 

@@ -127,8 +127,8 @@ double bt_field_mean_size(const bt_field *field);
 /// Thickness of floe i by the law of the case, m.
 double bt_field_thickness(const bt_case *input, bt_idx i);
 
-/// Collective. Send the field of rank 0 to all ranks; `field` must be initialised.
 struct bt_comm;
+/// Collective. Send the field of rank 0 to all ranks; `field` must be initialised.
 void bt_field_share(const struct bt_comm *comm, bt_field *field);
 
 /// Name of the case's domain.frame.

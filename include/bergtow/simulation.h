@@ -180,8 +180,8 @@ const char *bt_file_holds(const char *path);
 bt_status bt_number_read(const char *text, const char *unit, double *value);
 
 /// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json), or "limits": the numbers by which
-/// the program judges windows, domains and maps, and sizes of its inputs and outputs. NULL for another word. Release
-/// with bt_release.
+/// the program judges windows, domains and maps, sizes of its inputs and outputs, and constants that the Python package
+/// also needs. NULL for another word. Release with bt_release.
 char *bt_list_json(const char *what);
 
 /// Are the bytes of a sealed file unchanged since it was written? kind: "result", "ensemble", "field" or "checkpoint".

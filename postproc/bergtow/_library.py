@@ -127,6 +127,7 @@ _SIGNATURES = {
     "bt_record_check": (Status, c_char_p, c_char_p, c_char_p, c_size_t),
     "bt_number_read": (Status, c_char_p, c_char_p, POINTER(c_double)),
     "bt_stats_mean": (Mean, POINTER(c_double), c_int64),
+    "bt_case_rise": (c_double, c_double, c_double),
     "bt_catenary_span": (c_double, c_double, c_double, c_double, c_double),
     "bt_catenary_pull": (c_double, c_double, c_double, c_double, c_double, POINTER(c_double)),
     "bt_estimate_ship": (Estimate, c_double, c_double, c_double, c_double, c_double),
@@ -270,7 +271,8 @@ def listed(what: str) -> dict[str, Any]:
 
 
 def limit(name: str) -> Any:
-    """A limit that the program applies to windows, domains or maps, or to the size of its inputs and outputs."""
+    """A limit that the program applies to windows, domains or maps, or to the size of its inputs and outputs; or one of
+    its constants."""
     return listed("limits")[name]
 
 

@@ -23,6 +23,12 @@ def _keys() -> dict[str, dict[str, Any]]:
     return {key["name"]: key for key in _library.listed("keys")["keys"]}
 
 
+@functools.cache
+def preset(key: str) -> Any:
+    """The default of a key that has one whatever else a case has."""
+    return Case({"run": {"dt": 1, "duration": 1}})[key]
+
+
 def quantities() -> dict[str, Any]:
     """The quantities that a run writes (series, summary keys, estimates), with units and meanings."""
     return copy.deepcopy(_library.listed("quantities"))

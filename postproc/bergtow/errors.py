@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Optional, Union
 
-#: exit codes of the commands, the same as those of the program (bergtow/base.h: bt_status): done; usage; a case or map
-#: that is rejected; a file that cannot be read or written, or a number that members are missing from; a run that
-#: failed; stopped by the user, a signal or a limit
+#: exit codes of the commands, those of bt_status (bergtow/base.h); IO also for numbers that members are missing from
 OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
 

@@ -19,6 +19,16 @@ def hours_text(hours):
     return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
 
 
+def percent(x):
+    """A share, "–" if it is not known."""
+    return "–" if x is None or not np.isfinite(x) else f"{round(100 * x) + 0} %"
+
+
+def change(x):
+    """A relative change, with its sign."""
+    return "–" if x is None else f"{100 * x:+.1f} %"
+
+
 class Table(NamedTuple):
     """A head and rows of texts; by: the column whose equal cells are merged on a page."""
     head: list

@@ -15,6 +15,14 @@ bool bt_is_name(const char *s, int most)
     return *s && strlen(s) <= (size_t)most;
 }
 
+void bt_name_check(const char *kind, const char *name, int most, bool taken, bt_errors *err)
+{
+    if (!bt_is_name(name, most))
+        bt_errors_add(err, "%s \"%s\": the name must have only lower-case letters, digits and _, at most %d", kind,
+                      name, most);
+    else if (taken) bt_errors_add(err, "%s %s: this name is taken; choose another", kind, name);
+}
+
 size_t bt_utf8_length(const unsigned char *s)
 {
     if (s[0] < 0x80) return 1;

@@ -13,6 +13,10 @@ enum { BT_MOST_LAW_NAME = 40 }; ///< characters: names of its series append a wo
 /// Is s a name: 1 to `most` lower-case letters, digits and _, not beginning with a digit?
 bool bt_is_name(const char *s, int most);
 
+/// Report in err why a thing that a program adds, of this kind, cannot have this name, of `most` characters at most, or
+/// that one of its kind has it already.
+void bt_name_check(const char *kind, const char *name, int most, bool taken, bt_errors *err);
+
 /// May a law add `more` series, one of them with this name? If not, err says why. Set by output/quantity.c, which keeps
 /// the series and stands above the laws; NULL if nobody keeps any.
 extern bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);

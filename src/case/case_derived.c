@@ -10,6 +10,7 @@
 #include "base/name.h"
 #include "base/table.h"
 #include "case/size_law.h"
+#include "geometry/box.h"
 
 // --- shapes of the body ----------------------------------------------------------------------------------------------
 
@@ -30,12 +31,9 @@ static int body_shape_named(bt_body_shape shape, double length, double width, do
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err)
 {
     const size_t before = err->n;
-    if (!name || !bt_is_name(name, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "shape \"%s\": the name must have only lower-case letters, digits and _, at most 40",
-                      name ? name : "");
-    for (int k = 0; err->n == before && bt_body_shapes[k]; k++)
-        if (!strcmp(bt_body_shapes[k], name))
-            bt_errors_add(err, "shape %s: a shape of this name exists already; choose another", name);
+    bool taken = false;
+    for (int k = 0; name && bt_body_shapes[k]; k++) taken = taken || !strcmp(bt_body_shapes[k], name);
+    bt_name_check("shape", name ? name : "", BT_MOST_LAW_NAME, taken, err);
     if (!outline) bt_errors_add(err, "shape %s: it has no function", name);
     if (n_added == BT_MAX_ADDED_SHAPES)
         bt_errors_add(err, "shape %s: there are %d of them; raise BT_MAX_ADDED_SHAPES", name, n_added);
@@ -51,6 +49,11 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
 }
 
 // --- numbers that follow ---------------------------------------------------------------------------------------------
+
+double bt_case_rise(double ice_density, double water_density)
+{
+    return ice_density * (1 - ice_density / water_density) * BT_GRAVITY;
+}
 
 double bt_case_tow_sign(const bt_case *input) { return bt_cos(input->tow.direction) < 0 ? -1 : 1; }
 
@@ -81,8 +84,7 @@ static const char *floe_fault(int n, const double *v)
 {
     bt_parts parts;
     const char *why = bt_outline_fault(n, v);
-    if (why || bt_outline_convex(n, v) || bt_outline_split(n, v, &parts)) return why;
-    return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
+    return why || bt_outline_convex(n, v) || bt_outline_split(n, v, &parts) ? why : BT_NO_PARTS;
 }
 
 int bt_case_floe_admit(const bt_floe_def *floe, double *v, const char **why)

@@ -27,12 +27,6 @@ double bt_case_body_length(const bt_case *input, double angle);
 
 #define BT_GRAVITY 9.81 ///< m/s²
 
-/// Potential energy that sheets gain on each other, over area and thickness squared, Pa/m (docs/theory.md, rafting).
-static inline double bt_case_rise(double ice_density, double water_density)
-{
-    return ice_density * (1 - ice_density / water_density) * BT_GRAVITY;
-}
-
 /// Is the ice read from a file rather than made?
 static inline bool bt_case_reads_field(const bt_case *input) { return input->ice.field || input->ice.outlines; }
 

@@ -12,6 +12,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"
@@ -40,9 +41,8 @@ typedef struct idle {
     "tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness tow.branch2.damping "              \
     "tow.branch2.breaking_load"
 
-enum { IDLE = 39 };
-
-static void list_idle(const bt_case *input, idle out[IDLE])
+/// The n rows for a case; the caller frees them.
+static idle *list_idle(const bt_case *input, int *n)
 {
     const bool read = bt_case_reads_field(input), made = bt_case_makes_ice(input),
                power = input->ice.size_law == BT_SIZE_POWER;
@@ -139,8 +139,8 @@ static void list_idle(const bt_case *input, idle out[IDLE])
         {!read, ALWAYS, "ice.nonconvex", "ice.outlines ice.field", "on a field that the program makes, whose floes are "
                                                                    "convex"},
     };
-    _Static_assert(sizeof all == IDLE * sizeof *all, "count the rows");
-    memcpy(out, all, sizeof all);
+    *n = sizeof all / sizeof *all;
+    return memcpy(bt_alloc(1, sizeof all), all, sizeof all);
 }
 
 static const bt_key *row_of(const char *key)
@@ -164,13 +164,15 @@ static bt_case with_default(const bt_case *c, const bt_key *key)
 
 const char *bt_case_why_unused(const bt_case *input, const char *key)
 {
-    idle rules[IDLE];
+    int n;
+    idle *rules = list_idle(input, &n);
     char name[BT_LONGEST_KEY];
-    list_idle(input, rules);
-    for (int i = 0; i < IDLE; i++)
+    const char *why = NULL;
+    for (int i = 0; i < n && !why; i++)
         for (const char *keys = rules[i].keys; rules[i].so && bt_next_name(&keys, name);)
-            if (!strcmp(name, key)) return rules[i].why;
-    return NULL;
+            if (!strcmp(name, key)) why = rules[i].why;
+    free(rules);
+    return why;
 }
 
 bool bt_case_changed(const bt_case *c, const char *key)
@@ -185,12 +187,13 @@ bool bt_case_changed(const bt_case *c, const char *key)
 /// Call `found` for each key that is not used although its value is not the default.
 static void look(const bt_case *input, void (*found)(void *to, const char *key, const idle *rule), void *to)
 {
-    idle rules[IDLE];
+    int n;
+    idle *rules = list_idle(input, &n);
     char name[BT_LONGEST_KEY];
-    list_idle(input, rules);
-    for (int i = 0; i < IDLE; i++)
+    for (int i = 0; i < n; i++)
         for (const char *keys = rules[i].keys; rules[i].so && rules[i].refused != NEVER && bt_next_name(&keys, name);)
             if (bt_case_changed(input, name)) found(to, name, &rules[i]);
+    free(rules);
 }
 
 /// Does the file that gives the key have more than half of all keys? Nobody writes so many by hand.
@@ -281,7 +284,6 @@ typedef struct limit {
 #define MADE "ice.concentration ice.field ice.outlines ice.size ice.size_law ice.size_min ice.size_max "
 #define BODY "body.shape tow.mode"
 
-enum { LIMITS = 64 };
 enum { TIDE_STEPS = 20 }; // a step takes the current at its middle: 1 - sinc(π/20) = 0.4 % off its mean
 
 /// Does the tow run along x? Then its lead goes round in a moving window without being displaced.
@@ -293,7 +295,8 @@ static bool along_x(const bt_case *input)
     return along;
 }
 
-static void list_limits(const bt_case *input, limit out[LIMITS])
+/// The n rows for a case; the caller frees them.
+static limit *list_limits(const bt_case *input, int *n)
 {
     const double size_min = input->ice.size_min, size_max = input->ice.size_max, ahead = input->domain.ahead;
     const bool read = bt_case_reads_field(input), made = bt_case_makes_ice(input),
@@ -445,8 +448,8 @@ static void list_limits(const bt_case *input, limit out[LIMITS])
         {true, AT_LEAST, "estimate.kappa", "estimate.kappa_low", input->estimate.kappa_low, "", "; lower that too"},
         {true, AT_MOST, "estimate.kappa", "estimate.kappa_high", input->estimate.kappa_high, "", "; raise that too"},
     };
-    _Static_assert(sizeof all == LIMITS * sizeof *all, "count the rows");
-    memcpy(out, all, sizeof all);
+    *n = sizeof all / sizeof *all;
+    return memcpy(bt_alloc(1, sizeof all), all, sizeof all);
 }
 
 static void refuse_limit(const bt_check *check, const limit *l)
@@ -480,8 +483,9 @@ static void refuse_limit(const bt_check *check, const limit *l)
 
 void bt_case_check_constraints(const bt_check *check)
 {
-    limit limits[LIMITS];
+    int n;
     look(check->c, refuse, (void *)check);
-    list_limits(check->c, limits);
-    for (int i = 0; i < LIMITS; i++) refuse_limit(check, &limits[i]);
+    limit *limits = list_limits(check->c, &n);
+    for (int i = 0; i < n; i++) refuse_limit(check, &limits[i]);
+    free(limits);
 }

@@ -334,7 +334,8 @@ bt_key bt_case_keys[] = {
          "where the line is fastened, from the centroid along the body's own y"),
     CHOICE("tow.line.type", tow.line.type, rope_types, "numbers",
            "numbers: EA is tow.line_stiffness; a named line takes EA and breaking load from its diameter (unless "
-           "given): steel-wire 6x19 and 8-strand polypropylene [Orcina, OrcaFlex manual], dyneema [MoorPy, NREL]"),
+           "given): steel-wire 6x19 and 8-strand polypropylene [Orcina, OrcaFlex manual], dyneema [MoorPy, NREL]. The "
+           "wires and HMPE lines of bergtow.towing are other products"),
     REAL("tow.line.diameter", tow.line.diameter, LENGTH, "0 m", "[0, 1]", "diameter of a named line"),
     INT("tow.line.branches", tow.line.branches, "1", "[1, 2]",
         "lines from hull to towing end: one, or two as a bridle"),

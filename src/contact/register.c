@@ -58,11 +58,7 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "contact law \"%s\": the name must have only lower-case letters, digits and _, at most 40",
-                      name);
-    else if (is_known(name))
-        bt_errors_add(err, "contact law %s: a law of this name exists already; choose another", name);
+    bt_name_check("contact law", name, BT_MOST_LAW_NAME, is_known(name), err);
     if (!law->on || !law->bound) bt_errors_add(err, "contact law %s: it needs the functions `on` and `bound`", name);
     if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "contact law %s: describe it in one line (`doc`)", name);
     if (law->n_keys < 0 || law->n_keys > BT_MAX_CONTACT_OWN)

@@ -167,12 +167,9 @@ bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = def->name ? def->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // taken by the summary for all curves
-        bt_errors_add(err, "estimate \"%s\": the name must have only lower-case letters, digits and _, at most "
-                           "40", name);
-    for (int k = 0; k < n_estimates; k++)
-        if (!strcmp(estimates[k].name, name))
-            bt_errors_add(err, "estimate %s: an estimate of this name exists already; choose another", name);
+    bool taken = !strcmp(name, "curves"); // by the summary, for all curves
+    for (int k = 0; k < n_estimates; k++) taken = taken || !strcmp(estimates[k].name, name);
+    bt_name_check("estimate", name, BT_MOST_LAW_NAME, taken, err);
     if (!def->label || !def->formula || !def->source)
         bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
     if (!def->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);

@@ -10,6 +10,7 @@
 #include "bergtow/outline.h"
 #include "field/field_make.h"
 #include "base/elementary.h"
+#include "geometry/box.h"
 
 void bt_refuse(bt_refusals *refusals, const char *fmt, ...)
 {
@@ -78,8 +79,7 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
     }
     case BT_NONCONVEX_SPLIT: {
         bt_parts parts;
-        if (!bt_outline_split(*n, v, &parts))
-            return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
+        if (!bt_outline_split(*n, v, &parts)) return BT_NO_PARTS;
         counts->split++;
         counts->parts += parts.n;
         return NULL;

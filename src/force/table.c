@@ -56,8 +56,8 @@ static void check_series(const bt_force_law *law, const char *name, bt_errors *e
 {
     const char *of = law->part_of ? law->part_of : law->turns_only ? NULL : name;
     if (law->part_of && !bt_is_name(law->part_of, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "force law %s: part_of \"%s\" is not a name of lower-case letters, digits and _, at most 40",
-                      name, law->part_of);
+        bt_errors_add(err, "force law %s: part_of \"%s\" is not a name of lower-case letters, digits and _, at most %d",
+                      name, law->part_of, BT_MOST_LAW_NAME);
     if (!of) return;
     const int there = bt_force_series_find(of);
     if (there >= 0 && bt_force_series_of[there].law)
@@ -73,11 +73,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME))
-        bt_errors_add(err, "force law \"%s\": the name must have only lower-case letters, digits and _, at most "
-                           "40", name);
-    else if (bt_force_series_find(name) >= 0)
-        bt_errors_add(err, "force law %s: a force of this name exists already; choose another", name);
+    bt_name_check("force law", name, BT_MOST_LAW_NAME, bt_force_series_find(name) >= 0, err);
     if (!law->add) bt_errors_add(err, "force law %s: it has no function `add`", name);
     if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "force law %s: describe it in one line (`doc`)", name);
     if (law->n_keys < 0 || law->n_keys > BT_MAX_FORCE_OWN)

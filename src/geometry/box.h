@@ -29,4 +29,11 @@ static inline bool bt_box_apart(const bt_box *a, const bt_box *b)
 /// m. near: distance / extent up to which neighbouring vertices coincide.
 const char *bt_ring_fault(int n, const double *v, double near, double *extent);
 
+/// What is wrong with its area, relative to the extent, or with its sense, or NULL. Tell of edges that cross before
+/// this: a figure of eight may have no area, or a negative one.
+const char *bt_ring_area_fault(int n, const double *v, double extent);
+
+/// What is wrong with an outline that bt_outline_split cannot cut.
+#define BT_NO_PARTS "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it"
+
 #endif

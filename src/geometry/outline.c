@@ -102,11 +102,7 @@ const char *bt_outline_fault(int n, const double *v)
     double extent;
     const char *fault = bt_ring_fault(n, v, NEAR, &extent);
     if (fault) return fault;
-    if (bt_outline_crosses(n, v)) return "its edges cross or touch each other";
-    const double area2 = bt_outline_area2(n, v);
-    if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
-    if (area2 < 0) return "its vertices run clockwise; list them anticlockwise (from +x towards +y)";
-    return NULL;
+    return bt_outline_crosses(n, v) ? "its edges cross or touch each other" : bt_ring_area_fault(n, v, extent);
 }
 
 bool bt_outline_convex(int n, const double *v) { return bt_shape_fault(n, v) == NULL; }

@@ -97,18 +97,21 @@ const char *bt_ring_fault(int n, const double *v, double near, double *extent)
     return NULL;
 }
 
+const char *bt_ring_area_fault(int n, const double *v, double extent)
+{
+    double area2 = 0;
+    for (const double *p = v + 2; p < v + 2 * (n - 1); p += 2)
+        area2 += cross(p[0] - v[0], p[1] - v[1], p[2] - v[0], p[3] - v[1]);
+    if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
+    return area2 < 0 ? "its vertices run clockwise; list them anticlockwise (from +x towards +y)" : NULL;
+}
+
 /// near: distance / extent up to which neighbouring vertices coincide; angle: largest turn the wrong way, rad.
 static const char *fault_of(int n, const double *v, double near, double angle)
 {
-    double extent, area2 = 0, turned = 0;
+    double extent, turned = 0;
     const char *fault = bt_ring_fault(n, v, near, &extent);
-    if (fault) return fault;
-    for (int i = 0; i < n; i++) {
-        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
-        area2 += cross(p[0] - v[0], p[1] - v[1], q[0] - v[0], q[1] - v[1]);
-    }
-    if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
-    if (area2 < 0) return "its vertices run clockwise; list them anticlockwise (from +x towards +y)";
+    if (fault || (fault = bt_ring_area_fault(n, v, extent))) return fault;
     bool reflex = false;
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n), *r = v + 2 * ((i + 2) % n);

@@ -22,49 +22,57 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
     return most;
 }
 
-#define TOTAL(type, member, rule_, from, key, units, meaning)                                                          \
+/// The program's own series of a member of bt_sample.
+static const bt_quantity *series_at(size_t offset)
+{
+    const bt_quantity *series = bt_own_series;
+    while (series->offset != offset) series++;
+    return series;
+}
+
+#define TOTAL(type, member, rule_, from)                                                                               \
     {                                                                                                                  \
-        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member), units, meaning, "one", BT_ROW_ANY, key},      \
+        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member), NULL, NULL, "one", BT_ROW_ANY, NULL},         \
         .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from)                                                  \
     }
-static const bt_total totals[] = {
-    TOTAL(F64, sum_contacts, SUM, contacts, NULL, "1", "contact points, sum over the steps"),
-    TOTAL(F64, sum_sweeps, SUM, sweeps, NULL, "1", "sweeps, sum over the steps"),
-    TOTAL(F64, sum_updates, SUM, contact_updates, NULL, "1", "updates of contacts, sum over the steps"),
-    TOTAL(F64, sum_moves, SUM, momentum_moves, NULL, "1", "momentum moves, sum over the steps"),
-    TOTAL(F64, sum_checks, SUM, residual_checks, NULL, "1",
-        "residuals of contacts that were taken, sum over the steps"),
-    TOTAL(F64, sum_projected, SUM, position_updates, NULL, "1",
-        "updates of contacts by the position projection, sum over the steps"),
-    TOTAL(F64, contact_work, SUM, contact_work, "contact_work_j", "J",
-          "work of the contact impulses on the velocities from the start to the end of a step"),
-    TOTAL(F64, max_overlap, MAX, overlap, "max_overlap_m", "m", "deepest overlap of two bodies"),
-    TOTAL(F64, max_momentum_residual, MAX, momentum_residual, "momentum_residual", "1",
-        "largest |momentum change - external impulse| / momentum exchanged of a step"),
-    TOTAL(F64, max_residual, MAX, residual, "max_residual_m_s", "m/s",
-        "largest residual of the contact problem at the end of a step"),
-    TOTAL(I64, unconverged, STEPS, unconverged, "unconverged_steps", "1",
-        "steps that reached the work limit before the tolerance"),
-    TOTAL(F64, locked_steps, STEPS, locked, "locked_steps", "1",
-        "of these, steps in which some bodies could not give way to any load: their loads have no bound"),
-    TOTAL(F64, no_load_steps, STEPS, no_load, "no_load_steps", "1",
-        "of these, steps in which they press on the towed body: its load is undefined"),
-    TOTAL(I64, unprojected, STEPS, unprojected, "unprojected_steps", "1",
-        "steps whose position projection reached its work limit"),
-    TOTAL(I64, positive_work, STEPS, added_energy, "positive_work_steps", "1",
-        "steps in which the contacts added energy"),
-    TOTAL(I64, restitution_cut, STEPS, restitution_cut, "restitution_cut_steps", "1",
-        "steps whose restitution was lowered so that the contacts add no energy"),
-    TOTAL(I64, repeats, SUM, repeats, "repeated_solves", "1",
-        "times a step was solved again because floes outran the contact margin"),
-    TOTAL(I64, outrun, STEPS, outrun, "outrun_steps", "1", "steps whose last solution still outran the margin"),
-    TOTAL(I64, misjudged, SUM, misjudged, "misjudged_contacts", "1",
-        "contacts that bore load at the end of a step although the pair passed, and pairs that met without one"),
+static bt_total totals[] = { // units, meaning and key: own_total
+    TOTAL(F64, sum_contacts, SUM, contacts),
+    TOTAL(F64, sum_sweeps, SUM, sweeps),
+    TOTAL(F64, sum_updates, SUM, contact_updates),
+    TOTAL(F64, sum_moves, SUM, momentum_moves),
+    TOTAL(F64, sum_checks, SUM, residual_checks),
+    TOTAL(F64, sum_projected, SUM, position_updates),
+    TOTAL(F64, contact_work, SUM, contact_work),
+    TOTAL(F64, max_overlap, MAX, overlap),
+    TOTAL(F64, max_momentum_residual, MAX, momentum_residual),
+    TOTAL(F64, max_residual, MAX, residual),
+    TOTAL(I64, unconverged, STEPS, unconverged),
+    TOTAL(F64, locked_steps, STEPS, locked),
+    TOTAL(F64, no_load_steps, STEPS, no_load),
+    TOTAL(I64, unprojected, STEPS, unprojected),
+    TOTAL(I64, positive_work, STEPS, added_energy),
+    TOTAL(I64, restitution_cut, STEPS, restitution_cut),
+    TOTAL(I64, repeats, SUM, repeats),
+    TOTAL(I64, outrun, STEPS, outrun),
+    TOTAL(I64, misjudged, SUM, misjudged),
 };
 
 enum { N_TOTALS = sizeof totals / sizeof *totals };
 
 int bt_n_history_totals(void) { return N_TOTALS + bt_law_first_total(BT_LAWS); }
+
+/// A total of the program's own, with units and meaning of its series; and the key, unless that is of the mean.
+static const bt_total *own_total(int k)
+{
+    bt_total *total = &totals[k];
+    if (total->at.meaning) return total;
+    const bt_quantity *series = series_at(total->offset);
+    total->at.units = series->units;
+    total->at.key = series->keep == BT_KEEP_MEAN ? NULL : series->summary;
+    total->at.meaning = bt_text_of("%s: %s", total->rule == BT_TOTAL_MAX ? "largest in the run" : "sum over the run",
+                                   series->description);
+    return total;
+}
 
 /// Totals of the contact laws, made from their tables once.
 static const bt_total *total_of_law(int k)
@@ -85,7 +93,7 @@ static const bt_total *total_of_law(int k)
     return &made[k];
 }
 
-const bt_total *bt_history_total(int k) { return k < N_TOTALS ? &totals[k] : total_of_law(k - N_TOTALS); }
+const bt_total *bt_history_total(int k) { return k < N_TOTALS ? own_total(k) : total_of_law(k - N_TOTALS); }
 
 /// Add a step to a total. Counts are exact in a double up to 2⁵³, far beyond any run.
 static void add_total(bt_history *history, const bt_total *total, const bt_sample *sample)
@@ -108,8 +116,7 @@ static void add_total(bt_history *history, const bt_total *total, const bt_sampl
 
 bt_state_row bt_history_column(int k, char name[BT_HISTORY_NAME])
 {
-    const bt_quantity *quantity = k < BT_N_COLUMNS ? bt_own_series : bt_added(k - BT_N_COLUMNS);
-    while (k < BT_N_COLUMNS && quantity->offset != places[k]) quantity++;
+    const bt_quantity *quantity = k < BT_N_COLUMNS ? series_at(places[k]) : bt_added(k - BT_N_COLUMNS);
     if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "history/%s", names[k]);
     else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", quantity->name);
     return (bt_state_row){strchr(name, '/') + 1, BT_ITEM_F64, 1, quantity->offset, quantity->units,

@@ -76,12 +76,7 @@ static char *in_words(const char *name)
 /// Report in err why there cannot be a series of this name, or `more` of them.
 static void registry_check(const char *name, int more, bt_errors *err)
 {
-    if (!bt_is_name(name, MOST_NAME))
-        bt_errors_add(err, "quantity \"%s\": the name must have only lower-case letters, digits and _, at most "
-                           "%d", name,
-                      MOST_NAME);
-    else if (is_taken(name))
-        bt_errors_add(err, "quantity %s: a series of this name exists already; choose another", name);
+    bt_name_check("quantity", name, MOST_NAME, is_taken(name), err);
     if (n_added + more > BT_MAX_ADDED)
         bt_errors_add(err, "quantity %s: a program can add at most %d, and all are in use; use the name of a force "
                       "whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);

@@ -530,79 +530,102 @@ static bt_lattice *lattice_of(bt_planner *planner)
     return bt_lattice_make(planner, ax, ay, h, h / ceil(h / cell - 1e-9));
 }
 
+/// Faults of start and goal. The straight line, if it arrives, is the first route of the plan. goal: its place in the
+/// ice then, m.
+static int ends_of(const bt_planner *planner, bt_route_plan *plan, double goal[4])
+{
+    const bt_route_task *t = &planner->task;
+    double there[2];
+    int status = fault_of_end(planner, 0, t->start, 0, &plan->force);
+    way_goal(planner, 0, t->start[0], t->start[1], there);
+    const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
+    plan->n = !at_goal && through(planner, 0, NULL, &plan->route[0]) == BT_ROUTE_OK;
+    if (!status && !plan->n) status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
+    const double time = plan->route[0].duration;
+    for (int a = 0; a < 4; a++) goal[a] = t->goal[t->goal_is_line ? a : a % 2] - t->drift[a % 2] * time;
+    return status || t->goal_is_line ? status : fault_of_end(planner, 1, goal, time, &plan->force);
+}
+
+/// The cheapest route at the present penalty; false if there is none. direct: as of into_route.
+static bool find_one(bt_planner *planner, bt_lattice *lattice, const double goal[4], bool direct, bt_route *route)
+{
+    const bt_route_task *t = &planner->task;
+    const bool by_peak = t->objective == BT_ROUTE_PEAK;
+    const int objective = by_peak ? BT_ROUTE_WORK : t->objective;
+    bt_lattice_way way = {0};
+    double limit = t->force_limit, peak = 0;
+    bool got = true;
+    if (by_peak) { // of the ways with the least peak, that of the least work
+        got = bt_lattice_search(lattice, goal, BT_ROUTE_PEAK, limit, &peak, &way);
+        bt_lattice_way_free(&way);
+        limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
+    }
+    got = got && bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
+    if (!got && !isnan(t->goal_heading)) { // no move may end at a node with that heading: the tail turns
+        const double heading = t->goal_heading;
+        planner->task.goal_heading = NAN;
+        got = bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
+        planner->task.goal_heading = heading;
+    }
+    got = got && into_route(planner, &way, direct, route);
+    bt_lattice_way_free(&way);
+    return got;
+}
+
+/// Put the route behind the last one into the plan if it is new: not the straight line, or of alternatives, more than W
+/// from every other. Otherwise release it.
+static bool take_new(const bt_planner *planner, bool first, bt_route_plan *plan)
+{
+    bt_route *route = &plan->route[plan->n];
+    const bt_route *straight = &plan->route[0];
+    const double w = planner->task.width;
+    bool new = !first || apart(route, straight) > 1e-3 * w || fabs(route->cost - straight->cost) > 1e-6 * route->cost;
+    for (int a = 0; !first && new && a < plan->n; a++) new = apart(route, &plan->route[a]) > w;
+    if (new) {
+        plan->n++;
+        return true;
+    }
+    free(route->corner);
+    free(route->stretch);
+    *route = (bt_route){0};
+    return false;
+}
+
+/// Add an alternative, found with cells near the other routes made ever more expensive; false if there is none.
+static bool add_alternative(bt_planner *planner, bt_lattice *lattice, const double goal[4], bt_route_plan *plan)
+{
+    planner->penalty = REPELS;
+    bt_swath_keep(planner);
+    for (int k = 0; k < TRIES; k++, planner->penalty *= planner->penalty) {
+        if (!find_one(planner, lattice, goal, false, &plan->route[plan->n])) return false;
+        if (take_new(planner, false, plan)) {
+            repel(planner, &plan->route[plan->n - 1]);
+            return true;
+        }
+    }
+    return false;
+}
+
 static void make(const bt_route_task *task, bt_route_plan *plan)
 {
     bt_planner planner;
+    double goal[4];
     begin(&planner, task);
-    *plan = (bt_route_plan){.n = 1};
+    *plan = (bt_route_plan){0};
     bt_lattice *lattice = lattice_of(&planner);
-    const bt_route_task *t = &planner.task;
     plan->cell = planner.ice.cell;
     plan->spacing = bt_lattice_spacing(lattice);
-    plan->status = fault_of_end(&planner, 0, t->start, 0, &plan->force);
-    double there[2];
-    way_goal(&planner, 0, t->start[0], t->start[1], there);
-    const bool at_goal = !(bt_hypot(there[0] - t->start[0], there[1] - t->start[1]) > 1e-9 * t->width);
-    if (at_goal || through(&planner, 0, NULL, &plan->route[0]) != BT_ROUTE_OK) {
-        plan->n = 0;
-        if (!plan->status) plan->status = at_goal ? BT_ROUTE_AT_GOAL : BT_ROUTE_GOAL_DRIFTS;
-    }
-    const bt_route *straight = &plan->route[0];
-    double goal[4] = {0};
-    for (int a = 0; a < 4; a++) goal[a] = t->goal[t->goal_is_line ? a : a % 2] - t->drift[a % 2] * straight->duration;
-    if (!plan->status && !t->goal_is_line)
-        plan->status = fault_of_end(&planner, 1, goal, straight->duration, &plan->force);
-    bool last = plan->status != BT_ROUTE_OK;
-    int found_any = 0;
-    for (int wanted = 0; plan->n < 1 + t->routes && !last; wanted++) {
-        bool kept = false;
-        planner.penalty = wanted ? REPELS : 1;
+    plan->status = ends_of(&planner, plan, goal);
+    if (!plan->status) {
         bt_swath_keep(&planner);
-        for (int k = 0; k < TRIES && !kept && !last; k++, planner.penalty *= planner.penalty) {
-            bt_lattice_way way = {0};
-            double limit = t->force_limit, peak = 0;
-            bool got = true;
-            if (t->objective == BT_ROUTE_PEAK) {
-                got = bt_lattice_search(lattice, goal, BT_ROUTE_PEAK, limit, &peak, &way);
-                bt_lattice_way_free(&way);
-                limit = bt_min(limit, peak * t->force_factor * (1 + 1e-9));
-            }
-            const int objective = t->objective == BT_ROUTE_PEAK ? BT_ROUTE_WORK : t->objective;
-            got = got && bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
-            if (!got && !isnan(t->goal_heading)) { // no move may end at a node with that heading: the tail turns
-                const double heading = t->goal_heading;
-                planner.task.goal_heading = NAN;
-                got = bt_lattice_search(lattice, goal, objective, limit, NULL, &way);
-                planner.task.goal_heading = heading;
-            }
-            bt_route *route = &plan->route[plan->n];
-            if (!got || !into_route(&planner, &way, wanted == 0, route)) {
-                last = true;
-                if (got) bt_lattice_way_free(&way);
-                break;
-            }
-            bt_lattice_way_free(&way);
-            found_any++;
-            kept = wanted == 0 ? apart(route, straight) > 1e-3 * t->width ||
-                   fabs(route->cost - straight->cost) > 1e-6 * route->cost
-                               : true;
-            for (int a = 0; wanted > 0 && a < plan->n; a++) kept = kept && apart(route, &plan->route[a]) > t->width;
-            if (kept) plan->n++;
-            else {
-                free(route->corner);
-                free(route->stretch);
-                *route = (bt_route){0};
-            }
-            if (wanted == 0) {
-                repel(&planner, straight);
-                break;
-            }
-        }
-        if (kept) repel(&planner, &plan->route[plan->n - 1]);
-        else last = last || wanted > 0;
+        if (!find_one(&planner, lattice, goal, true, &plan->route[1])) plan->status = BT_ROUTE_NONE;
     }
-    if (!plan->status && !found_any) plan->status = BT_ROUTE_NONE;
-    else if (!plan->status && plan->n < 1 + t->routes) plan->status = BT_ROUTE_FEWER;
+    if (!plan->status) {
+        if (take_new(&planner, true, plan)) repel(&planner, &plan->route[1]);
+        repel(&planner, &plan->route[0]);
+        while (plan->n < 1 + task->routes && add_alternative(&planner, lattice, goal, plan)) {}
+        if (plan->n < 1 + task->routes) plan->status = BT_ROUTE_FEWER;
+    }
     for (int a = 2; a < plan->n; a++) // sort the planned ones by cost, of equal ones the first found first
         for (int b = a; b > 1 && plan->route[b].cost < plan->route[b - 1].cost; b--) {
             const bt_route swap = plan->route[b];

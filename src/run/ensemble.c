@@ -312,36 +312,97 @@ static void share_cores(bt_ensemble *ensemble, bool open)
     if (open) ensemble->threads = bt_max(1, ensemble->threads / ensemble->jobs);
 }
 
-bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
-                          bt_errors *err)
+/// Collective. Check the study, prepare the folder. digest: of the study. threads, open: as of choose_threads.
+static bt_status prepare(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
+                         char digest[BT_DIGEST_TEXT], int *threads, bool *open, bt_errors *err)
 {
     bt_status status = bt_comm_same(comm, study->path, study->text, err);
     if (status == BT_OK) status = bt_study_fits(study, comm->size, err);
-    char digest[BT_DIGEST_TEXT] = "";
-    int threads = 1;
-    bool open = false;
-    if (status == BT_OK) status = choose_threads(comm, study, options, &threads, &open, err);
+    if (status == BT_OK) status = choose_threads(comm, study, options, threads, open, err);
     if (status == BT_OK && comm->rank == 0) status = bt_study_check_ice(study, err);
     if (status == BT_OK && comm->rank == 0) status = bt_ensemble_prepare_folder(study, options, digest, err);
     status = bt_comm_agree(comm, status);
-    if (status != BT_OK) return status;
-    bt_comm_bcast(comm, digest, sizeof digest);
+    if (status == BT_OK) bt_comm_bcast(comm, digest, BT_DIGEST_TEXT);
+    return status;
+}
 
+/// On rank 0: say what is to be done.
+static void print_head(const bt_ensemble *ensemble)
+{
+    const bt_study *study = ensemble->s;
+    if (ensemble->o->job) return;
+    if (!ensemble->o->quiet) {
+        printf("%" PRId64 " member%s: %" PRId64 " condition%s x %" PRId64 " field%s, %" PRId64
+               " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
+               ensemble->n, bt_plural(ensemble->n), study->n_conditions, bt_plural(study->n_conditions), study->repeats,
+               bt_plural(study->repeats), ensemble->before, ensemble->n_groups * ensemble->jobs, study->ranks,
+               ensemble->threads);
+        fflush(stdout);
+    }
+    if (ensemble->fixed > 0 && study->repeats > 1)
+        bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions no ice depends on the seed (ice from a file, "
+                       "or none): the fields of each are one run", ensemble->fixed, study->n_conditions);
+}
+
+/// Collective. Work until no member is left to start or to wait for, or a signal comes. idle: on a rank of no group.
+static bt_status work_all(bt_ensemble *ensemble, bool idle)
+{
+    const bt_ensemble_options *options = ensemble->o;
+    struct sigaction before[BT_N_CAUGHT];
+    stop_signal = 0;
+    bt_halt_catch(on_signal, NULL, before);
+    const bool helped = ensemble->jobs > 1;
+    if (helped) options->helpers->start(options->helpers->of, ensemble->jobs - 1, ensemble->threads);
+    bt_status status = BT_OK;
+    bool others;
+    int looks = 0;
+    do {
+        if (!idle) status = work(ensemble);
+        bt_comm_rest(ensemble->world);
+        status = bt_comm_agree(ensemble->world, status);
+        others = status == BT_OK && !options->leave && options->max_steps == 0 && wait_for_others(ensemble, looks++);
+    } while (others);
+    if (helped) options->helpers->end(options->helpers->of, status == BT_ERR_SIGNAL);
+    bt_halt_let_go(before);
+    if (ensemble->alone >= 0) close(ensemble->alone);
+    return status;
+}
+
+static void release(bt_ensemble *ensemble)
+{
+    for (int64_t i = 0; i < ensemble->n; i++) {
+        bt_member_free(&ensemble->list[i].m);
+        free(ensemble->list[i].folder);
+    }
+    free(ensemble->list);
+    free(ensemble->fields);
+    bt_study_files_free(&ensemble->files);
+    bt_member_records_end(&ensemble->records);
+    bt_member_notes_free(&ensemble->warnings);
+}
+
+bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
+                          bt_errors *err)
+{
+    char digest[BT_DIGEST_TEXT] = "";
+    int threads = 1;
+    bool open = false;
+    bt_status status = prepare(comm, study, options, digest, &threads, &open, err);
+    if (status != BT_OK) return status;
     bt_comm group;
-    bt_comm_split(comm, comm->rank / (int)study->ranks, &group);
-    // ranks left over after whole groups
-    const bool idle = comm->rank / (int)study->ranks >= comm->size / (int)study->ranks;
+    const int n_groups = comm->size / (int)study->ranks, of_group = comm->rank / (int)study->ranks;
+    bt_comm_split(comm, of_group, &group);
     bt_ensemble ensemble = {.world = comm,
-                         .group = &group,
-                         .s = study,
-                         .o = options,
-                         .began = bt_clock(),
-                         .gathered = bt_clock(),
-                         .err = err,
-                         .n_groups = comm->size / (int)study->ranks,
-                         .of_group = comm->rank / (int)study->ranks,
-                         .threads = threads,
-                         .alone = -1};
+                            .group = &group,
+                            .s = study,
+                            .o = options,
+                            .began = bt_clock(),
+                            .gathered = bt_clock(),
+                            .err = err,
+                            .n_groups = n_groups,
+                            .of_group = of_group,
+                            .threads = threads,
+                            .alone = -1};
     bt_member_records_begin(&ensemble.records, study, digest);
     if (group.rank == 0) bt_study_files_find(&ensemble.files, study);
     // not in a helper: the call that started it has done so, and records new failures
@@ -350,34 +411,11 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
     bt_ensemble_list(&ensemble);
     bt_ensemble_count_settled(&ensemble);
     share_cores(&ensemble, open);
-    if (comm->rank == 0 && !options->quiet && !options->job) {
-        printf("%" PRId64 " member%s: %" PRId64 " condition%s x %" PRId64 " field%s, %" PRId64
-               " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
-               ensemble.n, bt_plural(ensemble.n), study->n_conditions, bt_plural(study->n_conditions), study->repeats,
-               bt_plural(study->repeats), ensemble.before, ensemble.n_groups * ensemble.jobs,
-               study->ranks, ensemble.threads);
-        fflush(stdout);
+    if (comm->rank == 0) {
+        print_head(&ensemble);
+        gather(&ensemble, false); // after a kill the file may be out of date
     }
-    if (comm->rank == 0 && !options->job && ensemble.fixed > 0 && study->repeats > 1)
-        bt_errors_warn("warning: in %" PRId64 " of %" PRId64 " conditions no ice depends on the seed (ice from a file, "
-                       "or none): the fields of each are one run", ensemble.fixed, study->n_conditions);
-    if (comm->rank == 0) gather(&ensemble, false); // after a kill the file may be out of date
-    struct sigaction before[BT_N_CAUGHT];
-    stop_signal = 0;
-    bt_halt_catch(on_signal, NULL, before);
-    const bool helped = ensemble.jobs > 1;
-    if (helped) options->helpers->start(options->helpers->of, ensemble.jobs - 1, ensemble.threads);
-    bool others;
-    int looks = 0;
-    do {
-        if (!idle) status = work(&ensemble);
-        bt_comm_rest(comm);
-        status = bt_comm_agree(comm, status);
-        others = status == BT_OK && !options->leave && options->max_steps == 0 && wait_for_others(&ensemble, looks++);
-    } while (others);
-    if (helped) options->helpers->end(options->helpers->of, status == BT_ERR_SIGNAL);
-    bt_halt_let_go(before);
-    if (ensemble.alone >= 0) close(ensemble.alone);
+    status = work_all(&ensemble, of_group >= n_groups); // ranks left over after whole groups
     bt_ensemble_share_records(&ensemble);
     if (comm->rank == 0) {
         const bt_status gathered = gather(&ensemble, true);
@@ -386,14 +424,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_e
         if (status == BT_OK) status = gathered;
     }
     bt_comm_split_end(&group);
-    for (int64_t i = 0; i < ensemble.n; i++) {
-        bt_member_free(&ensemble.list[i].m);
-        free(ensemble.list[i].folder);
-    }
-    free(ensemble.list);
-    free(ensemble.fields);
-    bt_study_files_free(&ensemble.files);
-    bt_member_records_end(&ensemble.records);
-    bt_member_notes_free(&ensemble.warnings);
+    release(&ensemble);
     return bt_comm_agree(comm, status);
 }

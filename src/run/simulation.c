@@ -17,7 +17,9 @@
 #include "case/arch.h"
 #include "case/case_base.h"
 #include "case/case_check.h"
+#include "case/case_derived.h"
 #include "case/ice_bounds.h"
+#include "case/rope.h"
 #include "case/schema.h"
 #include "field/map_crs.h"
 #include "output/checkpoint.h"
@@ -577,6 +579,9 @@ static char *limits_json(void)
     bt_json_numbers(&json, "map_ice_free_deg", 2, (const double[]){BT_MAP_FREE_SOUTH, BT_MAP_FREE_NORTH});
     bt_json_int(&json, "outline_vertices", BT_MAX_VERTICES);
     bt_json_numbers(&json, "thickness_m", 2, thickness);
+    bt_json_number(&json, "gravity_m_s2", BT_GRAVITY);
+    const bt_rope rope = bt_rope_named(BT_ROPE_POLYPROPYLENE, 1);
+    bt_json_numbers(&json, "polypropylene_1_m", 3, (const double[]){rope.mass, rope.stiffness, rope.breaking});
     bt_json_close(&json, '}');
     return json.text;
 }

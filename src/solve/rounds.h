@@ -35,14 +35,14 @@
 // a part of the field.
 //
 // The problem is only piecewise smooth, and a Gauss–Seidel sweep is not a gradient step: with a fixed cap some jams run
-// in circles (contacts that open and close, or stick and slip, in turn). So the cap is adapted to its gain. If three
-// rounds reduce the sum of squares by a fifth, the cap moves nearer to 1 and rounds become longer; otherwise its
-// distance from 1 grows by half, and below 0.3 there is no momentum. If that does not help either, three rounds of 400
-// sweeps follow without a cap: chains of many floes, and heavy bodies that press on light ones, are slow rather than
-// circling, and converge only with β near 1 (a row of 5 floes under 10⁴ times their mass: 13,000 sweeps, where plain
-// ones need more than 500,000). A problem that has not converged within the limit of work gets three tenths more
-// without momentum, since momentum that does not converge circles far from the solution. If the residual is still above
-// four tolerances, the iteration restarts with half of the work, at most twice.
+// in circles (contacts that open and close, or stick and slip, in turn). So the cap is adapted to its gain. If some
+// rounds reduce the sum of squares enough (GAIN in rounds.c, where the other numbers are, too), the cap moves nearer to
+// 1 and rounds become longer; otherwise its distance from 1 grows, down to no momentum. If that does not help either,
+// rounds of many sweeps (FREE_LENGTH) follow without a cap: chains of many floes, and heavy bodies that press on light
+// ones, are slow rather than circling, and converge only with β near 1 (a row of 5 floes under 10⁴ times their mass:
+// 13,000 sweeps, where plain ones need more than 500,000). A problem that has not converged within the limit of work
+// gets some more without momentum, since momentum that does not converge circles far from the solution. If the residual
+// is still FAR above the tolerance, the iteration restarts with half of the work, at most twice.
 //
 // A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the
 // unknowns of the best residual pass are kept, from half of the work on, and are the result.

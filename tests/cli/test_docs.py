@@ -12,7 +12,7 @@ import sys
 import pytest
 
 import harness
-from bergtow import cli
+from bergtow import cli, errors
 from harness import BERGTOW, DONE, ROOT, call
 
 sys.path.insert(0, str(ROOT / "docs"))
@@ -269,6 +269,16 @@ def test_the_manual_has_every_command():
     assert set(listed) == COMMANDS
     assert {name: listed[name] for name in cli.COMMANDS} == {name: about for name, (_, about) in cli.COMMANDS.items()}
     assert {words[0] for _, words in calls(text)} >= COMMANDS
+
+
+def test_exit_codes_are_those_of_the_header():
+    """In Python, in --help and in the manual; 1 is that of `diff`."""
+    header = (ROOT / "include/bergtow/base.h").read_text()
+    codes = {name: int(code) for name, code in re.findall(r"BT_(?:ERR_)?([A-Z]+) = (\d+),", header)}
+    assert codes and {name: getattr(errors, name) for name in codes} == codes
+    section = (ROOT / "docs/manual.md").read_text().partition("## Errors and exit codes")[2].partition("\n## ")[0]
+    assert set(re.findall(r"^\| (\d) \|", section, re.M)) - {"1"} == set(map(str, codes.values()))
+    assert set(re.findall(r"\d", help_of().partition("Exit codes:")[2])) == set(map(str, codes.values()))
 
 
 def test_the_reference_describes_every_option(tmp_path, monkeypatch):

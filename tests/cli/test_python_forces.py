@@ -188,7 +188,7 @@ def test_what_goes_wrong_in_a_force_is_reported():
         stepped(SHORT, forces={"wrong": drives})
     with pytest.raises(bergtow.BergtowError, match="lower-case letters"):
         stepped(SHORT, forces={"Not a name": raises})
-    with pytest.raises(bergtow.BergtowError, match="a force of this name exists"):
+    with pytest.raises(bergtow.BergtowError, match="this name is taken"):
         stepped(SHORT, forces={"drag": raises})
     with bergtow.Simulation(SHORT, forces={"mine": drives}):
         with pytest.raises(bergtow.BergtowError, match="belongs to a simulation that has not ended"):
@@ -198,7 +198,7 @@ def test_what_goes_wrong_in_a_force_is_reported():
 def test_a_force_whose_series_is_taken_is_refused():
     """Red: it acted, had no series, and sim["tow_force"] was that of the line. Its name stays free."""
     for name in ("tow", "inertia"):
-        with pytest.raises(bergtow.BergtowError, match=f"{name}_force: a series of this name exists"):
+        with pytest.raises(bergtow.BergtowError, match=f"{name}_force: this name is taken"):
             stepped(SHORT, forces={name: lambda bodies: None})
 
 

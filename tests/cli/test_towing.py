@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from bergtow import BergtowError, towing
+from bergtow import BergtowError, Case, towing
 from harness import CASE, call, changed, run, texts, write_case
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -321,7 +321,13 @@ def test_the_tables_of_lines_and_vessels():
             assert a.diameter < b.diameter and a.mass < b.mass and a.breaking < b.breaking and a.stiffness < b.stiffness
     wire = lines["wire-6x36-64"]
     assert wire.breaking == pytest.approx(0.356 * 64 ** 2 * 1960, rel=1e-3)
-    assert wire.weight() == pytest.approx(9.81 * 16.75 * (1 - 1025 / 7850)) and lines["hmpe-64"].weight() == 0
+    assert wire.weight() == pytest.approx(9.81 * 16.75 * (1 - 1027 / 7850)) and lines["hmpe-64"].weight() == 0
+    for name, kind, same in ("polypropylene-96", "polypropylene", 1e-12), ("wire-6x36-64", "steel-wire", 1e-3):
+        case = Case({"run": {"dt": 1, "duration": 1}, "tow.mode": "line", "tow.line.type": kind,
+                     "tow.line.diameter": lines[name].diameter})
+        assert lines[name].stiffness == pytest.approx(case["tow.line_stiffness"], rel=same)
+        if kind == "polypropylene":  # the wires differ in grade
+            assert lines[name].breaking == pytest.approx(case["tow.line.breaking_load"], rel=same)
     assert vessels["ahts-200-ice"].bollard_pull == pytest.approx(200e3 * 9.80665)
     assert math.isnan(vessels["ahts-157"].free_speed)
     assert towing.lightest_line(2.5e6).name == "hmpe-64" and towing.lightest_line(1e9) is None
@@ -347,7 +353,7 @@ def test_a_table_of_ones_own_adds_and_replaces(tmp_path):
     lines = towing.lines(file)
     assert lines["hmpe-64"].breaking == 2e6 and towing.find_line("ours", file).source == "yard"
     assert len(lines) == len(towing.lines()) + 1
-    with pytest.raises(BergtowError, match="^line: 'ours' is not known; give one of wire-6x36-40, "):
+    with pytest.raises(BergtowError, match="^line: 'ours' is not known; give one of polypropylene-80, "):
         towing.find_line("ours")
     file.write_text("name,bollard_pull_t,length_m,beam_m,free_speed_kn,mass_t,source\nmine,70,,,12,900,yard\n")
     mine = towing.find_vessel("mine", file)
@@ -375,7 +381,7 @@ def test_a_block_rolls_where_its_ratio_says():
     assert towing.critical_ratio(850, 1025) == pytest.approx(0.92, abs=3e-3)
     for density in (850, 900):
         height = 100.0
-        draft = height * density / 1025
+        draft = height * density / 1027
         width = towing.critical_ratio(density) * height
         for w, stable in ((1.001 * width, True), (0.999 * width, False)):
             found = towing.roll_stability(w, draft, density)

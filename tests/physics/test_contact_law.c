@@ -176,15 +176,15 @@ TEST(what_will_not_do_is_refused)
     const struct { bt_contact_law law; const char *says;
     } bad[] = {
         {{.name = "twin", .doc = "a law with a number that is there", .on = fender_on, .bound = fender_bound,
-          .remember = fender_remember, .numbers = taken, .n_numbers = 1}, "contacts: a series of this name exists"},
+          .remember = fender_remember, .numbers = taken, .n_numbers = 1}, "contacts: this name is taken"},
         {{.name = "blank", .doc = "a law with a number without a name", .on = fender_on, .bound = fender_bound,
           .remember = fender_remember, .numbers = nameless, .n_numbers = 1}, "its number 1 needs name"},
         {{.name = "soft", .doc = "a law with two numbers of one name", .on = fender_on, .bound = fender_bound,
           .remember = fender_remember, .numbers = twice, .n_numbers = 2}, "two of its series are named grip"},
         {{.name = "soft", .doc = "a law with a number called its work", .on = fender_on, .bound = fender_bound,
           .remember = fender_remember, .numbers = work, .n_numbers = 1}, "two of its series are named soft_work"},
-        {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
-        {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
+        {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "name is taken"},
+        {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "name is taken"},
         {{.name = "Big", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without functions"}, "`on` and `bound`"},
         {{.name = "mute", .on = fender_on, .bound = fender_bound}, "describe it in one line"},

@@ -117,9 +117,9 @@ TEST(what_will_not_do_is_refused)
                               beyond[] = {{"strength", "N", "2 N", "[0, 1]", "a strength of something"}};
     const struct { bt_force_law law; const char *says;
     } bad[] = {
-        {{.name = "tilt", .doc = "a law of that name", .add = spring}, "a force of this name exists"},
-        {{.name = "drag", .doc = "a sum of that name", .add = spring}, "a force of this name exists"},
-        {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: a series"},
+        {{.name = "tilt", .doc = "a law of that name", .add = spring}, "this name is taken"},
+        {{.name = "drag", .doc = "a sum of that name", .add = spring}, "this name is taken"},
+        {{.name = "tow", .doc = "a law whose series is there", .add = spring}, "tow_force: this name"},
         {{.name = "share", .doc = "a part of no name", .add = spring, .part_of = "My Sum!"}, "part_of \"My Sum!\""},
         {{.name = "swell", .doc = "a part of one law", .add = spring, .part_of = "coriolis"}, "the force of one law"},
         {{.name = "Big Law", .doc = "a law of that name", .add = spring}, "lower-case letters"},

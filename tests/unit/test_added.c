@@ -67,8 +67,8 @@ static int line(double l, double w, double *v)
 TEST(what_will_not_do_is_refused)
 {
     const struct { const char *name; bt_shape_outline outline; const char *says; } bad[] = {
-        {"ship", capsule, "a shape of this name"}, {"capsule", capsule, "a shape of this name"},
-        {"none", capsule, "a shape of this name"}, {"Big barge", capsule, "lower-case letters"},
+        {"ship", capsule, "this name is taken"}, {"capsule", capsule, "this name is taken"},
+        {"none", capsule, "this name is taken"}, {"Big barge", capsule, "lower-case letters"},
         {"barge", NULL, "no function"},            {"stick", line, "it is not an outline"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {

@@ -20,7 +20,7 @@ TEST(what_will_not_do_is_refused)
         {{.name = "9th", SOUND}, "lower-case letters"},
         {{SOUND}, "lower-case letters"},
         {{.name = "a_name_of_more_than_forty_eight_letters_is_too_long", SOUND}, "at most 48"},
-        {{.name = "tow_force", SOUND}, "a series of this name exists"},
+        {{.name = "tow_force", SOUND}, "this name is taken"},
         {{.name = "bare", .description = "a number of the test", .of_world = one}, "no units"},
         {{.name = "mute", .units = "N", .of_world = one}, "describe it in one sentence"},
         {{.name = "idle", .units = "N", .description = "a number of the test"}, "give it one of"},

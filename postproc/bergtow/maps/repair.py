@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bergtow import _library
+from bergtow.case import preset
 from bergtow.errors import RunError
 from bergtow.maps.plane import vertices
 
@@ -126,8 +127,7 @@ def repaired(shapes, rules, book):
     floes = [floe for shape in shapes for floe in whole(shape, book)]
     floes = [f for f in floes if chosen(f, rules, book)]
     size = float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1e3
-    slop = next(float(key["default"]) for key in _library.listed("keys")["keys"] if key["name"] == "solver.slop")
-    finest = slop * size  # the overlap that a case accepts by default
+    finest = preset("solver.slop") * size  # the overlap that a case accepts by default
     rules.tolerance = rules.tolerance or finest
     rules.thin, rules.gap = THIN * min(rules.tolerance, finest), GAP * size
     floes = [f for floe in floes for f in simplified(floe, rules, book)]

@@ -119,7 +119,7 @@ class Replay:
             "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
             "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
             "style": {k.lower(): getattr(style, k)
-                      for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")
+                      for k in ("INK", "WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")
                       }, "rafts": run.value("ice.rafting.kappa", 0) > 0, **self._bodies(frames), "curve": curve(run)
         }
 

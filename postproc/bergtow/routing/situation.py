@@ -26,7 +26,6 @@ import h5py
 import numpy as np
 
 FIXED = 2  # bt_simulation: a body permanently at rest
-GRAVITY = 9.81  # m/s2
 ORIGIN = "set ice.origin_lon and ice.origin_lat to where x = y = 0 lies, unless the ice is outlines in metres"
 BENT, HALVINGS = 1.0, 12  # m, of the edges of a no-go area; how often one is halved at most
 AROUND = 3  # reaches of a map: no-go areas are cut off so far from the origin of the case
@@ -405,7 +404,8 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
     # the mean width of a convex outline over all headings is its perimeter over pi (Cauchy)
     across = width or np.sum(np.hypot(*(np.roll(hull, -1, 0) - hull).T)) / np.pi
     density, kappa = values["ice.density"], values["ice.rafting.kappa"]
-    rafting = 0.5 * kappa * density * (1 - density / values["water.density"]) * GRAVITY if kappa > 0 else np.inf
+    rise = _library.library().bt_case_rise(density, values["water.density"])
+    rafting = 0.5 * kappa * rise if kappa > 0 else np.inf
     return Situation(
         case=case, field=field_file, values=values, place=place,
         ice=planner.Ice(outlines=[outlines[i] for i in floes], thickness=thickness, density=density,

@@ -3,7 +3,7 @@
 from answer.json, where numbers that are not finite are None."""
 import math
 
-from bergtow.table import Table, designed, level, number, short, written
+from bergtow.table import Table, designed, level, number, percent, short, written
 from bergtow.text import loads as loads_text
 from bergtow.towing.library import KNOT
 from bergtow.towing.vessel import tonnes
@@ -78,10 +78,6 @@ def plain(x):
 
 def minutes(s):
     return f"{short(s / 60, 2)} min"
-
-
-def percent(x):
-    return f"{round(100 * x) + 0} %"
 
 
 # ---- the sentence

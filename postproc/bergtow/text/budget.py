@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The result of bergtow budget as one table, in parts of bergtow/table.py, and one picture."""
 from bergtow.result.members import listed
-from bergtow.table import Table, Warned, number, quantity, scale
-from bergtow.text.converge import percent
+from bergtow.table import Table, Warned, number, percent, quantity, scale
+from bergtow.text.converge import effect
 
 import numpy as np
 
@@ -15,11 +15,7 @@ def _ends(found, ends):
     return f" ({' to '.join(quantity(x, found['units']) for x in ends)})"
 
 
-def _percent(x):
-    return "–" if x is None or not np.isfinite(x) else f"{100 * x:.0f} %"
-
-
-def of_mean(found, x, say=_percent):
+def of_mean(found, x, say=percent):
     """A number as a share of the mean, "–" beside a mean of 0."""
     return say(x / abs(found["mean"])) if x is not None and found["mean"] else "–"
 
@@ -37,7 +33,7 @@ def rows(found):
     parts = [("fields: one tow", found["fields"]), ("parameters" + (" and fields" if one else ""), found["parameters"])]
     for name, p in parts[one:]:
         out.append([name, quantity(p["sd"], found["units"]) + _ends(found, p["sd_95"]), of_mean(found, p["sd"]),
-                    _percent(p["share"]), "", "", ""])
+                    percent(p["share"]), "", "", ""])
     indices = found["shares"].get("indices", {})
     for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
         i, given = indices.get(name), found["assumed"][name]
@@ -58,10 +54,10 @@ def _numerics(found):
     bound = "" if n["unknown"] else "at most "
     known = n["sd"] is not None and np.isfinite(n["sd"])
     out = [["numerics", bound + quantity(n["sd"], found["units"]) if known else "not known",
-            of_mean(found, n["sd"]) if known else "", _percent(n["share"]) if known else "", "", "", ""]]
+            of_mean(found, n["sd"]) if known else "", percent(n["share"]) if known else "", "", "", ""]]
     if n.get("bias"):
         out.append([f"bias of {', '.join(n['biases'])}", quantity(abs(n["bias"]), found["units"]),
-                    of_mean(found, abs(n["bias"])), _percent(n["bias_share"]), "", "", ""])
+                    of_mean(found, abs(n["bias"])), percent(n["bias_share"]), "", "", ""])
     return out
 
 
@@ -76,9 +72,9 @@ def numerics_notes(found):
         return f" Numerics: {n['refused']}."
     said = ""
     if n.get("bias"):
-        each = ", ".join(f"{name} by {percent(b)}" for name, b in n["biases"].items())
+        each = ", ".join(f"{name} by {effect(b)}" for name, b in n["biases"].items())
         said = (f" Bias: the values to which it was converged change the mean, {each}; together "
-                f"{of_mean(found, n['bias'], percent)}. It is not scatter: no number here is corrected for it, and "
+                f"{of_mean(found, n['bias'], effect)}. It is not scatter: no number here is corrected for it, and "
                 "its square is in the last line and the shares.")
     if n.get("unknown"):
         said += f" Numerics without {', '.join(f'{name} ({why})' for name, why in n['unknown'].items())}."

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: MIT
 """The verdicts of bergtow converge, as parts of bergtow/table.py."""
-from bergtow.table import Table, Warned, number
+from bergtow.table import Table, Warned, change, number
 
 WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
 
 
-def percent(value):
-    """Percentage to a tenth below 20 %, where the margin lies, and to two digits above."""
-    if value is None:
-        return "–"
-    x = 100 * value
-    return f"{x:+.1f} %" if abs(x) < 20 else f"{float(f'{x:.1e}'):+.0f} %"
+def effect(x):
+    """A change to a tenth of a percent below 20 %, where the margin lies, and to two digits above."""
+    return change(x) if x is None or abs(100 * x) < 20 else f"{float(f'{100 * x:.1e}'):+.0f} %"
 
 
 def interval(ends):
-    return "–" if ends is None or None in ends else f"{percent(ends[0])} to {percent(ends[1])}"
+    return "–" if ends is None or None in ends else f"{effect(ends[0])} to {effect(ends[1])}"
 
 
 def value(row, which):
@@ -55,7 +52,7 @@ def cells(row):
     # equal for a start whose ramp cannot be made longer
     values = " -> ".join(dict.fromkeys((value(row, "from"), value(row, "to"))))
     return [row["name"], values, row["quantity"],
-            f"{percent(row['effect'])} ({interval(row['interval_95'])})", on,
+            f"{effect(row['effect'])} ({interval(row['interval_95'])})", on,
             WORDS[row["judged"]] + without(row.get("share_without")), advice(row)]
 
 

@@ -3,7 +3,7 @@
 import math
 
 from bergtow.stats.mean import LEVEL
-from bergtow.table import number, quantity, table
+from bergtow.table import change, number, quantity, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
 WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak force", "length": "length of the way"}
@@ -53,10 +53,6 @@ def warnings(found):
     return [f"warning: {w['text']}" for w in found["warnings"]]
 
 
-def percent(x):
-    return "–" if x is None else f"{100 * x:+.1f} %"
-
-
 def verified(found, markdown=False):
     """The tows compared with the straight line."""
     verdict, unit, limited = found["verdict"], UNITS[found["objective"]], found["force_limit"] is not None
@@ -72,7 +68,7 @@ def verified(found, markdown=False):
             against = "is it"
         elif c and c["relative"] is not None:
             low, high = c["relative_95"]
-            against = percent(c["relative"]) + ("" if low is None else f" ({percent(low)} to {percent(high)})")
+            against = change(c["relative"]) + ("" if low is None else f" ({change(low)} to {change(high)})")
         said = [f"{FAULTS[f]} in {n} of {verdict['members']}" for f, n in r["counts"].items() if n]
         rows.append([r["label"], amount(s[found["objective"]], unit), against, amount(s["mean_force"], "N"),
                      amount(s["peak"], "N"), *[amount(largest(r), "N")] * limited, amount(s["time"], "s"),
@@ -102,8 +98,8 @@ def answer(found):
         if c["fails_less"]:
             return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in "
                     f"which {chosen} does not.")
-        return (f"Take {chosen}: {objective} {percent(c['relative'])} against the straight line, "
-                f"{percent(low)} to {percent(high)} at 95 %.")
+        return (f"Take {chosen}: {objective} {change(c['relative'])} against the straight line, "
+                f"{change(low)} to {change(high)} at 95 %.")
     if code == "straight_not_passable":
         return (f"The straight line cannot be towed; {chosen} " +
                 ("reaches the goal without a fault in every member that judged." if v["recommended"] else
@@ -111,7 +107,7 @@ def answer(found):
     if code == "no_route":
         return "No route other than the straight line was found."
     if code == "one_member":
-        much = f"{chosen} has {percent(c['relative'])} of {objective}" if c and c["relative"] is not None else \
+        much = f"{chosen} has {change(c['relative'])} of {objective}" if c and c["relative"] is not None else \
             f"{chosen} cannot be compared with it"
         return (f"No route shown better than the straight line: there is one member, and no interval ({much} in it). "
                 "If the map is perfect, that is the answer; give --members and errors of the map for an interval.")
@@ -123,8 +119,8 @@ def interval(c):
         return "cannot be compared, since one of the two fails"
     low, high = c["relative_95"]
     if low is None or math.isnan(low):
-        return f"is {percent(c['relative'])}; one pair has no interval"
-    return f"is {percent(c['relative'])}, {percent(low)} to {percent(high)} at 95 %"
+        return f"is {change(c['relative'])}; one pair has no interval"
+    return f"is {change(c['relative'])}, {change(low)} to {change(high)} at 95 %"
 
 
 def meaning(found):

@@ -3,6 +3,9 @@
 
 Each row of lines.csv and vessels.csv has a source. A user table has the same head; its rows are added, and replace rows
 of the same name. Values of lines are those of new ones. An empty cell of a vessel means unknown.
+
+Polypropylene is that of `tow.line.type`, from the program's coefficients. The wires (6x36) and HMPE lines (eye-spliced)
+of lines.csv are other products than its steel-wire (6x19) and dyneema, and break at other loads.
 """
 from __future__ import annotations
 
@@ -14,9 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, Union
 
+from .._library import limit
+from ..case import preset
 from ..errors import CASE, IO, BergtowError
 from ._given import above_zero
-from .stability import GRAVITY
 from .vessel import STANDARD_GRAVITY
 
 KNOT = 1852 / 3600  #: m/s
@@ -34,9 +38,10 @@ class Line:
     breaking: float  #: N
     source: str
 
-    def weight(self, water_density: float = 1025.0) -> float:
-        """Weight in water, N/m; 0 for a line that floats."""
-        return max(0.0, self.mass * GRAVITY * (1 - water_density / self.density))
+    def weight(self, water_density: float | None = None) -> float:
+        """Weight in water, N/m; 0 for a line that floats. Density of the water: by default that of a case."""
+        water = preset("water.density") if water_density is None else water_density
+        return max(0.0, self.mass * limit("gravity_m_s2") * (1 - water / self.density))
 
 
 @dataclass(frozen=True)
@@ -111,9 +116,16 @@ def _table(name: str, columns: tuple[tuple[str, str, float | None, bool], ...], 
     return found if library is None else found | _read(Path(library), columns, make)
 
 
+def _polypropylene() -> dict[str, Line]:
+    mass, stiffness, breaking = limit("polypropylene_1_m")  # of a diameter of 1 m; all go with its square
+    return {name: Line(name, "polypropylene", d, mass * d * d, 910, stiffness * d * d, breaking * d * d,
+                       "8-strand polypropylene: mass, breaking load and EA Orcina OrcaFlex manual; density assumed")
+            for d in (0.080, 0.096, 0.112, 0.128) for name in [f"polypropylene-{1000 * d:.0f}"]}
+
+
 def lines(library: PathLike = None) -> dict[str, Line]:
     """{name: line}; library: a user table. Raises BergtowError with file, line and column."""
-    return _table("lines.csv", _LINES, Line, library)
+    return _polypropylene() | _table("lines.csv", _LINES, Line, library)
 
 
 def vessels(library: PathLike = None) -> dict[str, Vessel]:

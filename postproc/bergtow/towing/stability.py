@@ -16,10 +16,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .._library import limit
+from ..case import preset
 from ..errors import BergtowError
 from ._given import above_zero, not_below_zero
-
-GRAVITY = 9.81  #: m/s2
 
 
 def metacentric_height(width: float, draft: float, sail: float, gyration: float | None = None) -> float:
@@ -31,8 +31,9 @@ def metacentric_height(width: float, draft: float, sail: float, gyration: float 
     return square / draft - 0.5 * sail
 
 
-def critical_ratio(density: float, water_density: float = 1025.0) -> float:
-    """W/H of a free block below which it rolls over."""
+def critical_ratio(density: float, water_density: float | None = None) -> float:
+    """W/H of a free block below which it rolls over; density of the water: by default that of a case."""
+    water_density = preset("water.density") if water_density is None else water_density
     above_zero(density=density, water_density=water_density)
     if density >= water_density:
         raise BergtowError(f"density: {density:g} kg/m3 does not float in {water_density:g} kg/m3; give a lower one")
@@ -49,8 +50,11 @@ class RollStability:
     stable: bool
 
 
-def roll_stability(width: float, draft: float, density: float = 900.0, water_density: float = 1025.0) -> RollStability:
-    """Stability of a free block of this width (its least) and draft."""
+def roll_stability(width: float, draft: float, density: float | None = None,
+                   water_density: float | None = None) -> RollStability:
+    """Stability of a free block of this width (its least) and draft; densities: by default those of a case."""
+    density = preset("body.density") if density is None else density
+    water_density = preset("water.density") if water_density is None else water_density
     critical = critical_ratio(density, water_density)
     height = draft * water_density / density
     gm = metacentric_height(width, draft, height - draft)
@@ -71,5 +75,5 @@ def heel_angle(moment: float, mass: float, gm: float) -> float:
     above_zero(mass=mass)
     if not gm > 0:
         return math.inf
-    sine = abs(moment) / (mass * GRAVITY * gm)
+    sine = abs(moment) / (mass * limit("gravity_m_s2") * gm)
     return math.asin(sine) if sine <= 1 else math.inf

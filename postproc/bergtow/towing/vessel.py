@@ -16,6 +16,7 @@ from typing import Union
 import numpy as np
 
 from .. import _library
+from ..case import preset
 from ..errors import CASE, IO, BergtowError
 from ._given import above_zero, not_below_zero
 
@@ -118,9 +119,11 @@ class IceResistance:
 
 
 def ice_resistance(beam: float, thickness: float, concentration: float, speed: float,
-                   ice_density: float = 910.0) -> IceResistance:
+                   ice_density: float | None = None) -> IceResistance:
     """A ship in pack ice, by the regression for ships that is also among the estimates. The source gives no range of
-    ice and speed, and the hulls differ by a factor of more than ten at one knot: an order of magnitude."""
+    ice and speed, and the hulls differ by a factor of more than ten at one knot: an order of magnitude. ice_density: by
+    default that of a case."""
+    ice_density = preset("ice.density") if ice_density is None else ice_density
     above_zero(beam=beam, ice_density=ice_density)
     not_below_zero(thickness=thickness, speed=speed)
     if not 0 <= concentration <= 1:

@@ -352,7 +352,7 @@ function drawEdges(g, rect) {
     const soft = (kind) => kind === "open" || kind === "periodic" || kind === "moving", [left, top, w, h] = rect;
     const ends = soft(head.edges[0]), sides = soft(head.edges[1]);
     const vertical = head.geographic ? sides : ends, horizontal = head.geographic ? ends : sides;
-    g.strokeStyle = "#8a949e";
+    g.strokeStyle = head.style.wall;
     g.lineWidth = 1;
     g.setLineDash([5, 4]);
     g.beginPath();
@@ -463,7 +463,7 @@ function drawScale(g) {
     const x = 14 * ratio, y = canvas.height - 14 * ratio;
     g.fillStyle = "rgba(255,255,255,0.85)";
     g.fillRect(x - 6 * ratio, y - 20 * ratio, px + 12 * ratio, 26 * ratio);
-    g.fillStyle = g.strokeStyle = "#1d2733";
+    g.fillStyle = g.strokeStyle = head.style.ink;
     g.lineWidth = 2 * ratio;
     g.beginPath();
     g.moveTo(x, y - 4 * ratio);
@@ -478,7 +478,7 @@ function drawScale(g) {
     if (!head.geographic) return;
     g.fillStyle = "rgba(255,255,255,0.85)";
     g.fillRect(8 * ratio, 8 * ratio, 22 * ratio, 36 * ratio);
-    g.fillStyle = "#1d2733";
+    g.fillStyle = head.style.ink;
     g.fillText("N", 19 * ratio, 40 * ratio);
     g.beginPath();
     for (const [u, v] of [[19, 11], [24, 26], [19, 23], [14, 26]]) g.lineTo(u * ratio, v * ratio);
