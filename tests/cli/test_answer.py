@@ -509,6 +509,15 @@ def test_speeds_of_one_call(made):
     assert at not in words.sentence(alone) and " as a mean over " in words.sentence(alone)
 
 
+def test_a_tow_of_a_model_is_shorter_than_the_one_asked_for(made):
+    """24 h at full scale, over the square root of the length scale, as in the statistics. Red: 24 h of the model."""
+    assert {c["tow_hours"] for c in made["conditions"]} == {24 / 20} and made["asked"]["tow_hours"] == 24
+    level = {"kind": "return_level", "n": 8.0, "interval_95": [7.0, 9.0], "case": "case.steady"}
+    assert "of tows of 1.2 h exceed" in words.WORDS["needs"](level, made)
+    fall_back = {"reason": "no_tail", "n_tows": 3, "hours_each": 0.01, "n": 8.0, "share_below": 0.3}
+    assert "a tow of 1.2 h bears more" in words.WORDS["covers"](fall_back, made)
+
+
 def test_the_fall_back_is_named(made):
     value = made["conditions"][0]["value"]
     assert value["kind"] in ("largest_of_n", "return_level")

@@ -156,6 +156,7 @@ def condition(e, c, k, o):
     return {
         "id": name, "label": c.label, "values": c.values, "fields": len(c.finished), "hours": hours, "value": value,
         "gap_s": found and found["gap_s"], "time_scale_s": found and found["time_scale_s"],
+        "tow_hours": found and found["design"]["tow_hours"],
         "mean": {"id": f"{name}.mean", "n": float(means.mean()) if len(means) else np.nan,
                  "interval_95": stat_mean.t_interval(means)},
         "parts": [{"id": f"{name}.{part}", "part": part, "n": n, "share": n / value["n"] if value["n"] else np.nan}
