@@ -37,21 +37,29 @@ def t_interval(x, level=LEVEL):
     return np.mean(x, axis=0) - half, np.mean(x, axis=0) + half
 
 
+def welch_freedom(variances, counts):
+    """Degrees of freedom of a sum of means, by Welch and Satterthwaite. variances: of the means; not all zero."""
+    u = np.asarray(variances)
+    return u.sum() ** 2 / np.sum(u ** 2 / (np.asarray(counts) - 1))
+
+
 def mean_of_conditions(conditions, level=LEVEL):
     """(mean, low, high) of the mean of the means of several conditions; the bounds are NaN if a condition has fewer
     than two fields. conditions: [{field: value}]. Values of one field are correlated, whichever conditions they belong
     to: with m conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the
-    variance is the sum of d^2 n / (n - 1). With one condition this is t_interval."""
-    counts, moved = [len(c) for c in conditions], {}
+    variance is the sum of d^2 n / (n - 1). With one condition this is t_interval. Freedom where no field is shared: by
+    Welch and Satterthwaite, since one condition may have nearly all of the variance, as the fastest of several tows."""
+    counts, moved, variances = [len(c) for c in conditions], {}, []
     mean = np.mean([np.mean(list(c.values())) for c in conditions])
     if min(counts) < 2:
         return mean, np.nan, np.nan
     for c, n in zip(conditions, counts):
         own = np.mean(list(c.values()))
+        variances.append(np.var(list(c.values()), ddof=1) / n)
         for field, x in c.items():
             moved[field] = moved.get(field, 0.0) + (x - own) / (n * len(counts)) * np.sqrt(n / (n - 1))
-    apart = len(moved) == sum(counts)  # no two conditions share a field
-    free = sum(counts) - len(counts) if apart else min(counts) - 1
+    apart = len(moved) == sum(counts) and any(variances)  # no two conditions share a field
+    free = welch_freedom(variances, counts) if apart else min(counts) - 1
     half = scipy.stats.t.ppf(0.5 + level / 2, free) * np.sqrt(sum(d * d for d in moved.values()))
     return mean, mean - half, mean + half
 
