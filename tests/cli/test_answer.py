@@ -756,6 +756,21 @@ def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):
     assert json.dumps(p) and "A design value needs about" in words.plan(p)
 
 
+def test_windows_that_are_too_short_for_a_number_are_told_before_the_first_run(tmp_path, monkeypatch):
+    """The window is 30 s, and five time scales are 7.5 s of this model, 150 s at full scale. Red: "enough for it", and
+    after all runs that no tow force can be named."""
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    path = write_case(tmp_path, changed(CASE, estimate__length_scale=1))
+    gives = {scale: answer.plan(BERGTOW, path, [f"estimate.length_scale={scale}"], 1, 2, np.inf, 10 ** 6)["gives"]
+             for scale in (1, 24, 26)}
+    assert gives == {1: "no_window", 24: "no_window", 26: "return_level"}
+    with pytest.raises(BergtowError, match="lengthen run.duration to 160 s, or give the length scale") as error:
+        cli.perform("design", path, "-o", tmp_path / "out", "--no-pdf", "--no-replay")
+    assert error.value.status == 3 and not (tmp_path / "out/design.yml").exists()
+    p = answer.plan(BERGTOW, path, ["output.window_start=-1"], 1, 2, np.inf, 9)  # it may be longer than half of the run
+    assert p["gives"] == "no_window" and "as short as that" in words.plan(p)
+
+
 @pytest.mark.slow
 def test_intervals_from_eight_fields_hold_the_mean_of_two_hundred(tmp_path):
     """200 fields of a cheap case stand for the truth; eight of them are drawn 500 times. The interval of their mean

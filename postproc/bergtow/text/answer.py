@@ -301,7 +301,8 @@ def plan(p):
     each = f" ({p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min)"
     fields = each if p["window_hours"] > 0 else ""
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
-             "nothing": "not one"}[p["gives"]]
+             "nothing": "not one", "no_window": "none of which has a number if its window is as short as that"
+             }[p["gives"]]
     return (f"A design value needs about {short(p['needs_hours'], 2)} h of simulated tow after the start{fields}, "
             f"about {short(p['needs_min'], 2)} min of computing here. The budget allows {p['budget_fields']} fields, "
             f"{gives}. "
