@@ -350,6 +350,26 @@ def test_no_load_case_begins_that_would_not_end():
     assert runs.make({"course-change": {"run.duration": "1200 s"}}, runs.few) is None and made == ["course-change"]
     kept.add("base")
     assert runs.make({"base": {}, "head-sea": {}}) is None and made[1:] == 2 * ["base"] + 2 * ["head-sea"]
+    kept.add("head-sea")
+    assert runs.make({"base": {}, "head-sea": {}}) is None and len(runs.done) == 2 + 4 + 4  # not again
+
+
+@pytest.mark.parametrize("first, holds, ramps", [
+    (55.0, 0.0, [60, 40, 30]),
+    (15.0, 0.0, [20, 10]),         # none is shorter than the time over which loads are averaged
+    (15.0, 25.0, [20, 30]),        # that of 20 s is known not to hold
+    (15.0, 35.0, [20, 30, 50])])
+def test_no_ramp_is_tried_twice(monkeypatch, first, holds, ramps):
+    """Ramps are whole time scales. Red: 20, 20 and 20 s, counted as three runs."""
+    monkeypatch.setattr(load_cases, "start_ramp", lambda t: first)
+    t = tow(scale=10.0, distance=1e6)
+    made = []
+    runs = SimpleNamespace(make=lambda some, fields: made.extend(some), few=range(2), measured=lambda name, *_: [
+        t.value + holds - float(name.removeprefix("start-").removesuffix("s")) * (holds > 0)])
+    found, ramp = load_cases.start(t, runs, lambda words: None)
+    assert [x["ramp_s"] for x in found["values"]["tried"]] == ramps
+    assert made == [f"start-{s}s" for s in ramps] and found["runs"] == 2 * len(ramps)
+    assert ramp["verified"] and ramp["s"] == min(s for s in ramps if s > holds)
 
 
 def test_the_pace_is_that_of_the_runs_themselves(monkeypatch):

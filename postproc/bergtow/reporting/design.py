@@ -315,7 +315,7 @@ def beside(work, a, row, t):
         cases.insert(0, head or load_cases.head_sea(t, runs))
         if towed:
             cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
-    return cases, ramp, ranges, runs.count
+    return cases, ramp, ranges, len(runs.done)
 
 
 def named(a, case):
