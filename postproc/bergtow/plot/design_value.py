@@ -49,7 +49,8 @@ def _make_room(figure, axes):
     left = [here.x0]
     for box, tick in zip(boxes, ticks):  # a label follows its tick, which moves less than the left side
         share = (tick - here.x0) / here.width
-        left.append((tick - box.x0 / width + EDGE - share * here.x1) / (1 - share))
+        if box.x0 < EDGE * width and share < 1:
+            left.append((tick - box.x0 / width + EDGE - share * here.x1) / (1 - share))
     figure.subplots_adjust(left=max(left), bottom=here.y0 + max(0, EDGE - min(box.y0 for box in boxes) / height))
 
 
