@@ -99,7 +99,7 @@ static double always_there(const double *x, int64_t n)
 /// sixtieth of the window, so that continuous contact is worth six times as many as required; a constant load does not
 /// count. Stretches are not cut to the correlation time: short collisions make it short, and a push of some minutes
 /// would count as hundreds; where a body meets floes one by one nearly all steps are independent, but say nothing about
-/// a mean made of three hits. Slow variation in dense ice is covered by n_eff.
+/// a mean made of three hits. Slow variation in dense ice is covered by the correlation time.
 static double contacts(const double *x, const bt_mean *mean)
 {
     return stretches(x, mean->n, always_there(x, mean->n), (double)mean->n / (6 * BT_STEADY_STRETCHES));

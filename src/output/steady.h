@@ -12,9 +12,10 @@
 //                  changes within the window, the body enters its own wake, leaves the ice (case/track.h) or stands
 //                  still, or the contacts were not solved: the mean is valid for this time only, and says nothing
 //                  of a longer tow
-//     too short    there is no window, or it has fewer than BT_STEADY_INDEPENDENT independent samples of some load,
-//                  contact with ice worth fewer than BT_STEADY_STRETCHES equal stretches, or less than two
-//                  swings of a body on its line
+//     too short    there is no window, or it has fewer than BT_STEADY_INDEPENDENT independent samples of some load by
+//                  its correlation time, n / (2 tau), contact with ice worth fewer than BT_STEADY_STRETCHES equal
+//                  stretches, or less than two swings of a body on its line. n_eff of the ice resistance, which
+//                  pauses lower, is shown and not judged: the limits were measured for the other two
 //     steady       none of these was found
 #ifndef BT_STEADY_H
 #define BT_STEADY_H

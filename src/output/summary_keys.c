@@ -319,7 +319,9 @@ static const bt_json_key rows[] = {
     OF_SUMMARY("window.start_s", window.start, "s", "end of the first step of the window"),
     OF_SUMMARY("window.end_s", window.end, "s", "end of its last step"),
     OF_SUMMARY("window.n_samples", window.n, "1", "steps in the window"),
-    NUMBER("window.n_independent", n_independent, "1", "independent samples of the ice resistance among them"),
+    NUMBER("window.n_independent", n_independent, "1",
+        "independent samples of the ice resistance among them; where contact pauses, at most its stretches of up to "
+        "two correlation times"),
     NUMBER("window.n_contact_stretches", n_stretches, "1",
         "equal stretches of contact with ice that the mean is worth; null where its resistance hardly varies"),
     OF_SUMMARY("window.correlation_time_s", window.correlation_time, "s", "correlation time of the ice resistance"),

@@ -350,6 +350,26 @@ def test_no_load_case_begins_that_would_not_end():
     assert runs.make({"course-change": {"run.duration": "1200 s"}}, runs.few) is None and made == ["course-change"]
     kept.add("base")
     assert runs.make({"base": {}, "head-sea": {}}) is None and made[1:] == 2 * ["base"] + 2 * ["head-sea"]
+    kept.add("head-sea")
+    assert runs.make({"base": {}, "head-sea": {}}) is None and len(runs.done) == 2 + 4 + 4  # not again
+
+
+@pytest.mark.parametrize("first, holds, ramps", [
+    (55.0, 0.0, [60, 40, 30]),
+    (15.0, 0.0, [20, 10]),         # none is shorter than the time over which loads are averaged
+    (15.0, 25.0, [20, 30]),        # that of 20 s is known not to hold
+    (15.0, 35.0, [20, 30, 50])])
+def test_no_ramp_is_tried_twice(monkeypatch, first, holds, ramps):
+    """Ramps are whole time scales. Red: 20, 20 and 20 s, counted as three runs."""
+    monkeypatch.setattr(load_cases, "start_ramp", lambda t: first)
+    t = tow(scale=10.0, distance=1e6)
+    made = []
+    runs = SimpleNamespace(make=lambda some, fields: made.extend(some), few=range(2), measured=lambda name, *_: [
+        t.value + holds - float(name.removeprefix("start-").removesuffix("s")) * (holds > 0)])
+    found, ramp = load_cases.start(t, runs, lambda words: None)
+    assert [x["ramp_s"] for x in found["values"]["tried"]] == ramps
+    assert made == [f"start-{s}s" for s in ramps] and found["runs"] == 2 * len(ramps)
+    assert ramp["verified"] and ramp["s"] == min(s for s in ramps if s > holds)
 
 
 def test_the_pace_is_that_of_the_runs_themselves(monkeypatch):
@@ -507,6 +527,15 @@ def test_speeds_of_one_call(made):
     assert at in words.sentence(made)
     alone = made | {"conditions": [c for c in made["conditions"] if c["speed_m_s"] == made["asked"]["speed_m_s"]]}
     assert at not in words.sentence(alone) and " as a mean over " in words.sentence(alone)
+
+
+def test_a_tow_of_a_model_is_shorter_than_the_one_asked_for(made):
+    """24 h at full scale, over the square root of the length scale, as in the statistics. Red: 24 h of the model."""
+    assert {c["tow_hours"] for c in made["conditions"]} == {24 / 20} and made["asked"]["tow_hours"] == 24
+    level = {"kind": "return_level", "n": 8.0, "interval_95": [7.0, 9.0], "case": "case.steady"}
+    assert "of tows of 1.2 h exceed" in words.WORDS["needs"](level, made)
+    fall_back = {"reason": "no_tail", "n_tows": 3, "hours_each": 0.01, "n": 8.0, "share_below": 0.3}
+    assert "a tow of 1.2 h bears more" in words.WORDS["covers"](fall_back, made)
 
 
 def test_the_fall_back_is_named(made):
@@ -745,6 +774,21 @@ def test_the_plan_is_said_before_the_first_run(tmp_path, monkeypatch, capsys):
     assert p["needs_fields"] == math.ceil(3600 * p["needs_hours"] / 30)
     assert answer.plan(BERGTOW, path, [], 1, 2, np.inf, 9)["budget_fields"] == 9
     assert json.dumps(p) and "A design value needs about" in words.plan(p)
+
+
+def test_windows_that_are_too_short_for_a_number_are_told_before_the_first_run(tmp_path, monkeypatch):
+    """The window is 30 s, and five time scales are 7.5 s of this model, 150 s at full scale. Red: "enough for it", and
+    after all runs that no tow force can be named."""
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    path = write_case(tmp_path, changed(CASE, estimate__length_scale=1))
+    gives = {scale: answer.plan(BERGTOW, path, [f"estimate.length_scale={scale}"], 1, 2, np.inf, 10 ** 6)["gives"]
+             for scale in (1, 24, 26)}
+    assert gives == {1: "no_window", 24: "no_window", 26: "return_level"}
+    with pytest.raises(BergtowError, match="lengthen run.duration to 160 s, or give the length scale") as error:
+        cli.perform("design", path, "-o", tmp_path / "out", "--no-pdf", "--no-replay")
+    assert error.value.status == 3 and not (tmp_path / "out/design.yml").exists()
+    p = answer.plan(BERGTOW, path, ["output.window_start=-1"], 1, 2, np.inf, 9)  # it may be longer than half of the run
+    assert p["gives"] == "no_window" and "as short as that" in words.plan(p)
 
 
 @pytest.mark.slow

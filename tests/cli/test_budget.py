@@ -11,14 +11,14 @@ import pytest
 from scipy import stats
 
 import made_up_ensemble as made_up
-from harness import BERGTOW, ROOT, TOW, changed, environment, script, write_case
+from harness import BERGTOW, ROOT, TOW, call, changed, environment, script, write_case
 
 from bergtow import cli
 from bergtow.errors import RunError
 from bergtow.reporting import method
 from bergtow.result import answers, compared
 from bergtow.result.members import Members
-from bergtow.result.run import Run
+from bergtow.result.run import Run, parse_case
 from bergtow.stats import load as stat_load
 from bergtow.stats import variance as stat_budget
 from bergtow.study import analysis, budget
@@ -123,7 +123,7 @@ def test_numerics_begin_at_the_value_of_the_study():
     """Of what was compared at finer values only what lies beyond counts, and of a coarser one nothing is known."""
     def found(rows=ROWS, **own):
         return stat_budget.relative_numerics(rows, {"width": 10.0, **own})
-    assert found(dt=1.0) == {"sd": pytest.approx(np.hypot(0.02, 0.03)), "biases": {}, "unknown": LEFT}
+    assert found(dt=1.0) == {"sd": pytest.approx(np.hypot(0.02, 0.03)), "biases": {}, "unknown": LEFT, "within": []}
     coarse = found(dt=2.0)
     assert coarse["biases"] == {"dt": pytest.approx(-0.3)} and coarse["unknown"] == LEFT
     assert coarse["sd"] == pytest.approx(np.sqrt(0.025 ** 2 + (0.7 * 0.02) ** 2 + 0.03 ** 2))
@@ -133,8 +133,9 @@ def test_numerics_begin_at_the_value_of_the_study():
         assert other["sd"] == pytest.approx(0.03)
     still = found(ROWS[:1], dt=2.0, width=None)
     assert still["unknown"]["dt"] == "matters up to the last value compared" and still["biases"]
+    assert still["within"] == ["dt"]
     spent = found([{"name": "dt", "judged": "open", "interval_95": [None, None], "from": 2.0, "to": 1.0}], dt=2.0)
-    assert spent["unknown"]["dt"] == "not resolved" and np.isnan(spent["sd"])
+    assert spent["unknown"]["dt"] == "not resolved" and np.isnan(spent["sd"]) and spent["within"] == []
     assert stat_budget.relative_numerics([], {}) is None
 
 
@@ -174,7 +175,9 @@ def test_a_bias_is_named_and_nothing_is_at_most_that_is_not():
     assert "at most" in text and "bias" not in text and "without" not in text and "bias_share" not in found["numerics"]
     every[-2] |= {"judged": "open", "why": "the budget is spent", "interval_95": [-0.3, 0.6]}  # tolerance
     found, text = said_of(every, own, rng)
-    assert "at most" not in text and "tolerance (the budget is spent)" in text
+    assert "at most" not in text and "so far of tolerance (the budget is spent)" in text and "without" not in text
+    assert found["numerics"]["sd"] == pytest.approx(found["mean"] * np.sqrt(
+        0.02 ** 2 + 0.03 ** 2 + 0.005 ** 2 + 0.3 ** 2 + 0.005 ** 2))  # the larger end of the interval is in it
     nothing, text = said_of(ROWS, {"width": 40.0}, rng)
     assert np.isnan([nothing["numerics"]["sd"], nothing["numerics"]["share"]]).all() and "not known" in text
     refused, text = said_of({"refused": "converge.json is of another case, ice.size is 1 m there and 2 m here"}, None,
@@ -200,9 +203,9 @@ def test_converge_of_another_case_does_not_fit():
     texts = [{"ice.size": "2 m", "ice.friction": f"{f}", "run.dt": "1 s", "ice.field": "/a/field.h5",
               "ice.shape": ("voronoi", "rectangles")[f - 1], "lead.mode": "none"} for f in (1, 2)]
     def why(**values):
-        return compared.misfit({"values": texts[0] | {k.replace("__", "."): v for k, v in values.items()}}, texts)
+        return compared.misfit({"values": texts[0] | {k.replace("__", "."): v for k, v in values.items()}}, texts, {})
     assert why() == why(ice__friction="1.5", run__dt="5 s", ice__field="/b/field.h5") == ""
-    assert compared.misfit({}, texts) == ""
+    assert compared.misfit({}, texts, {}) == ""
     assert why(ice__friction="9") == "ice.friction is 9 there and of 2 other values here"
     assert why(ice__shape="polygons") == "ice.shape is polygons there and of 2 other values here"
     assert why(lead__mode="channel") == "lead.mode is channel there and none here"
@@ -217,10 +220,10 @@ def test_the_extent_of_no_lead_is_no_other_case():
     def texts(mode, length):
         return {"ice.size": "2 m", "lead.mode": mode, "lead.length": length}
     short, long = texts("none", "500 m"), texts("none", "600 m")
-    assert compared.misfit({"values": short}, [long]) == compared.alone({"values": short}, [long]) == ""
+    assert compared.misfit({"values": short}, [long], {}) == compared.alone({"values": short}, [long]) == ""
     assert list(compared.unlike(short, long)) == []
     short, long = texts("channel", "500 m"), texts("channel", "600 m")
-    assert compared.misfit({"values": short}, [long]) == "lead.length is 500 m there and 600 m here"
+    assert compared.misfit({"values": short}, [long], {}) == "lead.length is 500 m there and 600 m here"
     assert compared.alone({"values": short}, [long]) == "lead.length 500 m"
     assert list(compared.unlike(short, long)) == [("lead.length", "500 m", "600 m")]
 
@@ -395,6 +398,24 @@ def test_every_stratum_of_each_distribution_holds_one_value(small):
         attributes = dict(f["parameters/ice.friction"].attrs)
     assert attributes["source"] in ("a book, p. 3", b"a book, p. 3") and b"triangular from 0.1 to 0.5" in np.bytes_(
         attributes["distribution"])
+
+
+def test_the_base_case_may_lie_at_the_end_of_a_range(small, tmp_path):
+    """No member of a hypercube does; a key that follows the one varied is there, too. Red: converge.json "of another
+    case", and the remedy to run converge on the base case."""
+    study = STUDY | {"samples": 8, "repeats": 1, "parameters": {"ice.friction": {"from": 0.1, "to": 0.5}}}
+    write_case(tmp_path, changed(BASE, ice__friction=0.1), "base.yml")
+    write_case(tmp_path, study, "study.yml")
+    assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
+    base = parse_case(call("check", "base.yml", "--scale", "1", cwd=tmp_path).stdout)
+    e = Members(tmp_path / "out")
+    texts = compared.cases(e)
+    def refused(**values):
+        found = {"rows": [], "values": base | {k.replace("__", "."): v for k, v in values.items()}}
+        return "refused" in (budget.numerics(e, found, texts) or {})
+    assert base["ice.friction"] == base["body.friction"] == "0.1" and not refused()
+    assert refused(ice__friction="0.09") and refused(ice__size="9 m") and not refused(ice__friction="0.3")
+    assert Members(small[0] / "out").base["ice.thickness"] and not refused(body__friction="0.3")
 
 
 @pytest.mark.slow

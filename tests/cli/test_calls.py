@@ -14,7 +14,8 @@ from bergtow._calls import called
 from bergtow._interrupts import held
 from bergtow.study import runs as case_runs
 
-LONG = changed(TOW, run__dt=0.005, run__duration=60, output__window_start=15, domain__length=22, ice__concentration=0.5)
+LONG = changed(TOW, run__dt=0.005, run__duration=60, output__window_start=15, domain__length=22, ice__concentration=0.5,
+               estimate__length_scale=20)
 STUDY = {"base": "case.yml", "repeats": 2, "sampling": "latin-hypercube", "samples": 8, "seed": 3,
          "parameters": {"ice.concentration": {"from": 0.4, "to": 0.5, "distribution": "uniform", "source": "a test"}}}
 WORDS = {"design": ["case.yml", "--concentrations", 0.5, "--fields", 2, "--no-pdf", "--no-replay", "--keep-width"],

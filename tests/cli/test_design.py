@@ -297,7 +297,7 @@ def test_a_field_that_failed_is_no_end_of_the_budget(tmp_path, monkeypatch):
 def test_ice_that_no_seed_changes_gets_one_field(ice, asked, fields, tmp_path, monkeypatch, capsys):
     """Every other one would be the same run. Red: open water was refused for its study's repeats, which the user has
     not written."""
-    monkeypatch.setattr(design.answer, "plan", lambda *a: {"core_s": 1.0})
+    monkeypatch.setattr(design.answer, "plan", lambda *a: {"core_s": 1.0, "gives": "return_level"})
     monkeypatch.setattr(design.answer_text, "plan", lambda plan: "the plan")
     a = cli.arguments("design", tmp_path / "case.yml", "-o", tmp_path, "--fields", "9")
     a.concentrations = asked

@@ -16,6 +16,7 @@ from made_up_ensemble import FAILED, WAITING, member
 
 from bergtow import cli
 from bergtow.errors import RunError
+from bergtow.plot import design_value as plot_design
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import method as report_method
 from bergtow.result.members import Members
@@ -139,6 +140,20 @@ def test_the_answer_is_the_design_statement(tmp_path):
     assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
     one = s | {"conditions": s["conditions"][:1]}  # no chart of one point
     assert "figure" not in [b["kind"] for b in report_ensemble.answer(e, one, [], {})]
+
+
+@pytest.mark.parametrize("n", [2, 6, 12])
+def test_labels_of_conditions_are_within_the_picture(n):
+    """Those of two parameters are long and slanted. Red: the concentration of the first was outside."""
+    tow = {"value": 9e5, "interval_95": [8e5, 1e6], "largest": 8e5, "mean": 5e5, "units": "N", "start_up": None}
+    figure = plot_design.draw([{"label": f"concentration {10 * k} %, tow speed {0.065 * k:g} m/s, thickness {k} m",
+                                "values": {"a": k, "b": -k}, "design": {"tension": None, "tow": tow}}
+                               for k in range(n)], {"a", "b"}, str, lambda key: 1)
+    figure.draw_without_rendering()
+    for label in figure.axes[0].get_xticklabels():
+        box = label.get_window_extent()
+        assert len(label.get_text()) > 30 and box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.width
+    assert figure.axes[0].get_position().width > 0.6 and figure.axes[0].get_position().height > 0.3
 
 
 def test_conditions_without_a_value_are_named_beside_the_largest():

@@ -417,10 +417,14 @@ def test_members_without_a_folder_are_reported(tmp_path, capsys):
 def test_the_law_of_the_speed_is_found(plain):
     e = Members(plain[0])
     for words, some in plot_sweep.groups(e, "tow.speed"):
-        exponent, low, high, _ = plot_sweep.power_law([c.values["tow.speed"] for c in some],
-                                                      [e.mean[c.finished] for c in some])
+        exponent, low, high = stat_mean.power_of_conditions([c.values["tow.speed"] for c in some], [
+            dict(zip(e.seed[c.finished].tolist(), e.mean[c.finished])) for c in some])
         assert exponent == pytest.approx(2, abs=0.1) and low < 2 < high and words.startswith("concentration")
     figure = plot_ensemble.draw_sweep(e, "tow.speed")
+    [note] = [t.get_text() for t in figure.axes[0].texts if "exponent" in t.get_text()]
+    [drawn] = [line for line in figure.axes[0].lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 1]
+    by_hand = np.polyfit(np.log(drawn.get_xdata()), np.log(drawn.get_ydata()), 1)[0]
+    assert f" {by_hand:.2g} (" in note
     law = next(line for line in figure.axes[0].lines if line.get_color() == plot_ensemble.style.TOW)
     x, y = law.get_data()
     assert np.polyfit(np.log(x), np.log(y), 1)[0] == pytest.approx(2)

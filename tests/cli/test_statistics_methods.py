@@ -75,6 +75,42 @@ def test_95_percent_of_the_intervals_over_conditions_hold_the_mean(shared):
     assert np.isnan(stat_mean.mean_of_conditions([{1: 2.0}, {1: 3.0, 2: 4.0}])[1:]).all()
 
 
+@pytest.mark.parametrize("levels, n", [((1, 4, 16), 2), ((1, 4, 16), 4), ((1, 1, 1), 6)])
+def test_the_interval_over_conditions_knows_which_of_them_scatters(levels, n):
+    """Fields scatter in proportion to their mean, so that the fastest tow has nearly all of the variance. Red: freedom
+    of all fields together, with which two fields each held the mean in 86 % of the draws."""
+    rng, hit = np.random.default_rng(14), []
+    for _ in range(TRIALS):
+        x = np.array(levels)[:, None] * (1 + 0.3 * rng.normal(size=(len(levels), n)))
+        _, low, high = stat_mean.mean_of_conditions([{(k, r): v for r, v in enumerate(row)} for k, row in enumerate(x)])
+        hit.append(low <= np.mean(levels) <= high)
+    assert 0.93 <= np.mean(hit) <= 0.97
+    assert stat_mean.mean_of_conditions([{1: 2.0, 2: 2.0}, {3: 4.0, 4: 4.0}]) == (3.0, 3.0, 3.0)
+
+
+@pytest.mark.parametrize("scatter, n, shared", [((0.9, 0.3), 8, False), ((0.3, 0.3), 4, False), ((0.9, 0.3), 8, True)])
+def test_the_exponent_is_that_of_the_means(scatter, n, shared):
+    """Fields whose mean is the square of the speed, and which scatter more at one speed. Red: the slope of the
+    logarithms of the fields, on average 2.6, whose interval holds 2 in 87 % of the draws."""
+    rng, hit, found = np.random.default_rng(15), [], []
+    for _ in range(TRIALS // 2):
+        level = rng.uniform(size=n)  # of a field that both speeds share
+        x = [v ** 2 * stats.gamma.ppf(level if shared else rng.uniform(size=n), s ** -2) * s ** 2
+             for v, s in zip((1, 2), scatter)]
+        exponent, low, high = stat_mean.power_of_conditions([1, 2], [
+            {(0 if shared else k, r): v for r, v in enumerate(y)} for k, y in enumerate(x)])
+        assert exponent == pytest.approx(np.log2(x[1].mean() / x[0].mean()))
+        hit.append(low <= 2 <= high)
+        found.append(exponent)
+    assert 0.93 <= np.mean(hit) <= 0.97 and np.mean(found) == pytest.approx(2, abs=0.12)
+    alone = stat_mean.power_of_conditions([1, 2], [{1: 1.0}, {1: 4.0}])
+    assert alone[0] == pytest.approx(2) and np.isnan(alone[1:]).all()
+    one_hit = stat_mean.power_of_conditions([1, 2], [{1: 1.0, 2: 0.0}, {1: 4.0, 2: 4.0}])
+    assert one_hit[0] == pytest.approx(3) and np.isnan(one_hit[1:]).all()  # no exponent without the first field
+    assert stat_mean.power_of_conditions([1, 2], [{1: 0.0, 2: 0.0}, {1: 4.0, 2: 4.0}]) is None
+    assert stat_mean.power_of_conditions([2, 2], [{1: 1.0}, {2: 4.0}]) is None
+
+
 def test_the_studentised_bootstrap_follows_skewness():
     x = np.random.default_rng(9).lognormal(0, 1, (600, 20))
     truth, rng = np.exp(0.5), np.random.default_rng(10)

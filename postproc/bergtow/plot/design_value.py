@@ -7,6 +7,8 @@ from bergtow.stats import design_value
 
 import numpy as np
 
+EDGE = 0.01  #: of the picture, left free beside labels
+FEW = 7      #: more labels of several lines are too close at a small slant
 LIMIT = 4.0  #: upper ends of intervals are cut off at this multiple of the largest value
 
 
@@ -36,6 +38,20 @@ def _draw(axes, x, some, factor, top, colour, label):
     beyond = np.array(high) > top
     if beyond.any():
         axes.plot(x[at][beyond], np.full(beyond.sum(), top) / factor, "^", color=colour, markersize=7, zorder=5)
+
+
+def _make_room(figure, axes):
+    """Move the axes up, and to the right, until the slanted labels below them are within the picture."""
+    figure.draw_without_rendering()
+    width, height = figure.bbox.size
+    boxes, here = [t.get_window_extent() for t in axes.get_xticklabels()], axes.get_position()
+    ticks = [axes.transData.transform((x, 0))[0] / width for x in axes.get_xticks()]
+    left = [here.x0]
+    for box, tick in zip(boxes, ticks):  # a label follows its tick, which moves less than the left side
+        share = (tick - here.x0) / here.width
+        if box.x0 < EDGE * width and share < 1:
+            left.append((tick - box.x0 / width + EDGE - share * here.x1) / (1 - share))
+    figure.subplots_adjust(left=max(left), bottom=here.y0 + max(0, EDGE - min(box.y0 for box in boxes) / height))
 
 
 def draw(conditions, numeric, axis_label, times):
@@ -73,9 +89,12 @@ def draw(conditions, numeric, axis_label, times):
                                      if np.isfinite(v)]
     axes.set_ylim(0, 1.08 * min(top, max([largest, *(d["largest"] for d in tows if d), *ends])) / factor)
     axes.set_ylabel(f"force ({unit})")
-    axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [c["label"] for c in conditions],
-                    **({} if key else {"rotation": 20, "ha": "right"}))
+    axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [c["label"].replace(", ", ",\n")
+                                                                         for c in conditions],
+                    **({} if key else {"rotation": 20 if len(x) <= FEW else 45, "ha": "right"}))
     axes.set_xlabel(axis_label(key) if key else "")
     axes.grid(True, axis="y")
+    if not key:
+        _make_room(figure, axes)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=9, borderaxespad=0.2, handletextpad=0.4)
     return figure

@@ -122,31 +122,19 @@ def force_limits(e, some_groups, log):
     return style.force_limits(np.concatenate(means), around, log)
 
 
-def power_law(x, means):
-    """(exponent, low, high, factor) of mean = factor x^exponent over fields: regression of ln mean on ln x, 95 %; None
-    if undefined."""
-    lx, y = np.log(np.repeat(x, [len(y) for y in means])), np.concatenate(means)
-    if len(set(lx)) < 2 or len(y) < 4 or y.min() <= 0:
-        return None
-    fit = scipy.stats.linregress(lx, np.log(y))
-    half = scipy.stats.t.ppf(0.975, len(y) - 2) * fit.stderr
-    return fit.slope, fit.slope - half, fit.slope + half, np.exp(fit.intercept)
-
-
 def draw_speed(axes, e, some, key, factor):
-    """Draw the law V² through the geometric mean of the fields, and the fitted exponent."""
+    """Draw the law V² through the middle of the means, and note the exponent that they follow."""
     x = np.array([c.values[key] for c in some])
-    means = [e.mean[c.finished] for c in some]
-    law = power_law(x, means)
+    means = [dict(zip(e.seed[c.finished].tolist(), e.mean[c.finished])) for c in some]
+    law = stat_mean.power_of_conditions(x, means)
     if law is None:
         return
-    v = np.geomspace(x.min(), x.max(), 50)
-    exponent, low, high, scale = law
-    weights = np.array([len(y) for y in means], dtype=float)
-    centre = np.exp(np.dot(weights, np.log(x)) / weights.sum())
-    axes.plot(v, scale * centre**exponent * (v / centre)**2 / factor, color=style.TOW, linewidth=1.2, dashes=(5, 2),
-              zorder=2.5, label="∝ V², through the middle of the fields")
-    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03), xycoords="axes fraction",
+    exponent, low, high = law
+    v, middle = np.geomspace(x.min(), x.max(), 50), scipy.stats.gmean([np.mean(list(c.values())) for c in means])
+    axes.plot(v, middle * (v / scipy.stats.gmean(x))**2 / factor, color=style.TOW, linewidth=1.2, dashes=(5, 2),
+              zorder=2.5, label="∝ V², through the middle of the means")
+    interval = f" ({low:.2g} to {high:.2g})" if np.isfinite([low, high]).all() else ""
+    axes.annotate(f"exponent of the means {exponent:.2g}{interval}", (0.98, 0.03), xycoords="axes fraction",
                   ha="right", fontsize=9, color=style.FAINT)
 
 

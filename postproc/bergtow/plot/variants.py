@@ -32,7 +32,7 @@ def change_of(means, base, paired, relative):
         low, high = stat_mean.t_interval((of - ratio * to) / unit)
         return change, (high - low) / 2
     a, b = (k ** 2 * x.var(ddof=1) / len(x) / unit ** 2 for k, x in ((1.0, of), (ratio, to)))
-    freedom = (a + b)**2 / (a**2 / (len(of) - 1) + b**2 / (len(to) - 1)) if a + b > 0 else 1
+    freedom = stat_mean.welch_freedom([a, b], [len(of), len(to)]) if a + b > 0 else 1
     return change, scipy.stats.t.ppf(0.5 + stat_mean.LEVEL / 2, freedom) * np.sqrt(a + b)
 
 

@@ -315,7 +315,7 @@ def beside(work, a, row, t):
         cases.insert(0, head or load_cases.head_sea(t, runs))
         if towed:
             cases = [start, *cases, load_cases.stop(t), load_cases.loss_of_thrust(t), load_cases.line_parted(t)]
-    return cases, ramp, ranges, runs.count
+    return cases, ramp, ranges, len(runs.done)
 
 
 def named(a, case):
@@ -475,6 +475,12 @@ def planned(a, case, found, began):
     work.core = answer.plan(work.program, a.file, a.set, n, a.jobs, np.inf, a.fields)["core_s"]
     left = set_ends(work, a, n) - time.monotonic()
     plan = answer.plan(work.program, a.file, a.set, n, a.jobs, left / 60, a.fields)
+    if plan["gives"] == "no_window" and found["window_start"] >= 0:
+        lacks = 3600 * (plan["least_window_hours"] - plan["window_hours"])
+        raise RunError(a.file, f"has a window of {3600 * plan['window_hours']:g} s, and a load needs "
+                       f"{answer.stat_load.LEAST_SCALES} time scales, {3600 * plan['least_window_hours']:.4g} s",
+                       f"lengthen run.duration to {math.ceil(found['duration'] + lacks - 1e-6)} s, or give the length "
+                       "scale of a model (estimate.length_scale)", CASE)
     print(alike or answer_text.plan(plan), flush=True)
     return work, plan | {"speed_m_s": found["speed"]}
 

@@ -271,10 +271,10 @@ NOT_STUDIED = {
 }
 
 
-def doubt(name, found, folder, texts):
-    """Why the result of a command does not belong to these members (texts: compared.cases of them), or no longer
-    belongs to the ensemble in its folder; "" if it does."""
-    if why := compared.misfit(found, texts):
+def doubt(name, found, folder, texts, base):
+    """Why the result of a command does not belong to these members (texts: compared.cases of them, base: Members.base),
+    or no longer belongs to the ensemble in its folder; "" if it does."""
+    if why := compared.misfit(found, texts, base):
         return f"studied for another case: {why}"
     if name == "converge" and (at := compared.alone(found, texts)):
         return f"studied only at {at}: it tells nothing about the other tows of this report"
@@ -293,7 +293,7 @@ def results_beside(e, also):
         for folder in (e.path, *also):
             found = answers.read(name, folder)
             if found is not None:
-                out[name] = found | {"doubt": doubt(name, found, folder, texts)}
+                out[name] = found | {"doubt": doubt(name, found, folder, texts, e.base)}
                 break
     return out
 

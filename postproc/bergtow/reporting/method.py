@@ -204,7 +204,7 @@ def _convergence(found, e):
     open, and that were only compared at other values. A quantity has one verdict: if the time step of the case is 2 s,
     it is that of 2 s against 1 s, and not also that of 1 s against 0.5 s."""
     texts = compared.cases(e)
-    if why := compared.misfit(found, texts):
+    if why := compared.misfit(found, texts, e.base):
         return f"studied for another case: {why}"
     own = compared.values(e, texts)
     verdicts = compared.verdicts(found["rows"], own)

@@ -134,11 +134,12 @@ def _among(value, some):
     return between or not all(_differ(value, text) for text in some)
 
 
-def misfit(found, texts):
+def misfit(found, texts, base):
     """Why a result belongs to a different case than the members (texts of cases()): a key of the ice, the body, the
-    tow, water or air has a value that none of them has. "" if it belongs to them, or does not name its case."""
+    tow, water or air has a value that none of them has. "" if it belongs to them, or does not name its case. base:
+    Members.base: the base case of a hypercube often lies at the end of a range, where no member does."""
     for key, value, some in _physical_values(found, texts):
-        if not _among(value, some):
+        if not _among(value, some) and _differ(value, base.get(key, "")):
             return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"
     return ""
 

@@ -24,7 +24,7 @@ from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.result import at_least, integrity
 from bergtow.result.hdf5 import opened, plain
-from bergtow.result.run import Run, least, within
+from bergtow.result.run import Run, least, parse_case, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
 #: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean,
@@ -232,6 +232,13 @@ class Members:
     def sampled(self):
         """True for a Latin hypercube, False for a grid."""
         return "sampling: latin-hypercube" in self.study.split("# base case")[0]
+
+    @cached_property
+    def base(self):
+        """{key: text} of the case of which a Latin hypercube varies keys; {} of a grid, which has the values that it
+        names."""
+        text = self.study.partition("# base case")[2].partition("\n")[2]
+        return parse_case(text) if self.sampled else {}
 
     # ---- members
 

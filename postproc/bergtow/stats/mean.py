@@ -37,23 +37,55 @@ def t_interval(x, level=LEVEL):
     return np.mean(x, axis=0) - half, np.mean(x, axis=0) + half
 
 
-def mean_of_conditions(conditions, level=LEVEL):
-    """(mean, low, high) of the mean of the means of several conditions; the bounds are NaN if a condition has fewer
-    than two fields. conditions: [{field: value}]. Values of one field are correlated, whichever conditions they belong
-    to: with m conditions the field moves the mean by d = sum over its conditions of (x - mean) / (n m), and the
-    variance is the sum of d^2 n / (n - 1). With one condition this is t_interval."""
-    counts, moved = [len(c) for c in conditions], {}
-    mean = np.mean([np.mean(list(c.values())) for c in conditions])
+def welch_freedom(variances, counts):
+    """Degrees of freedom of a sum of means, by Welch and Satterthwaite. variances: of the means; not all zero."""
+    u = np.asarray(variances)
+    return u.sum() ** 2 / np.sum(u ** 2 / (np.asarray(counts) - 1))
+
+
+def sum_over_conditions(conditions, term, level=LEVEL):
+    """(value, low, high) of the sum of term(k, mean of condition k); the bounds are NaN if a condition has fewer than
+    two fields, or a term is not finite without one of them. conditions: [{field: value}].
+
+    The jackknife over fields: values of one field are correlated, whichever conditions they belong to, so without it
+    the sum changes by d, the sum of the changes of its terms, and the variance is the sum of d^2 (n - 1) / n. For one
+    mean this is t_interval. Freedom where no field is shared: by Welch and Satterthwaite, since one condition may have
+    nearly all of the variance, as the fastest of several tows."""
+    counts, moved, variances = [len(c) for c in conditions], {}, []
+    value = sum(term(k, np.mean(list(c.values()))) for k, c in enumerate(conditions))
     if min(counts) < 2:
-        return mean, np.nan, np.nan
-    for c, n in zip(conditions, counts):
-        own = np.mean(list(c.values()))
-        for field, x in c.items():
-            moved[field] = moved.get(field, 0.0) + (x - own) / (n * len(counts)) * np.sqrt(n / (n - 1))
-    apart = len(moved) == sum(counts)  # no two conditions share a field
-    free = sum(counts) - len(counts) if apart else min(counts) - 1
+        return value, np.nan, np.nan
+    for k, (c, n) in enumerate(zip(conditions, counts)):
+        x = np.array(list(c.values()))
+        without = term(k, (x.sum() - x) / (n - 1))
+        d = (without - without.mean()) * np.sqrt((n - 1) / n)
+        variances.append(np.sum(d * d))
+        for field, by in zip(c, d):
+            moved[field] = moved.get(field, 0.0) + by
+    apart = len(moved) == sum(counts) and any(variances)  # no two conditions share a field
+    free = welch_freedom(variances, counts) if apart else min(counts) - 1
     half = scipy.stats.t.ppf(0.5 + level / 2, free) * np.sqrt(sum(d * d for d in moved.values()))
-    return mean, mean - half, mean + half
+    return value, value - half, value + half
+
+
+def mean_of_conditions(conditions, level=LEVEL):
+    """(mean, low, high) of the mean of the means of several conditions, as sum_over_conditions()."""
+    return sum_over_conditions(conditions, lambda _, mean: mean / len(conditions), level)
+
+
+def power_of_conditions(x, conditions, level=LEVEL):
+    """(exponent, low, high) of the law x^exponent through the means of conditions at these x, as sum_over_conditions();
+    None if undefined.
+
+    The slope of ln mean on ln x, each mean alike, is a sum over conditions. Rejected: the slope of the logarithms of
+    single fields, which is that of geometric means: another exponent where fields scatter more at one x (coverage of
+    both: docs/statistics.md)."""
+    away = np.log(x) - np.mean(np.log(x))
+    if not away.any() or min(np.mean(list(c.values())) for c in conditions) <= 0:
+        return None
+    def term(k, mean):
+        return away[k] / np.dot(away, away) * np.log(np.where(mean > 0, mean, np.nan))
+    return tuple(float(v) for v in sum_over_conditions(conditions, term, level))
 
 
 def studentised_interval(x, level=LEVEL, resamples=RESAMPLES, rng=None):

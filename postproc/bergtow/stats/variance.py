@@ -86,8 +86,8 @@ def _of_a_chain(chain):
 def relative_numerics(rows, own):
     """The numerical error, relative to the mean, from the rows of converge.json and the values that the study runs
     with, {quantity: value}: {"sd", NaN if nothing is known; "biases": {quantity: relative effect}; "unknown":
-    {quantity: why sd does not bound it}}; None without rows."""
-    squares, biases, unknown = [], {}, {}
+    {quantity: why sd does not bound it}; "within": those of them of which sd has what is known}; None without rows."""
+    squares, biases, unknown, within = [], {}, {}, []
     for name in QUANTITIES:
         chain = compared.chain(rows, name, own.get(name))
         if not chain:
@@ -98,8 +98,9 @@ def relative_numerics(rows, own):
         squares += [sd * sd] if sd > 0 or not why else []
         biases |= {name: float(bias)} if bias else {}
         unknown |= {name: why} if why else {}
-    return {"sd": float(np.sqrt(sum(squares))) if squares else np.nan, "biases": biases,
-            "unknown": unknown} if len(rows) else None
+        within += [name] if why and sd > 0 else []
+    return {"sd": float(np.sqrt(sum(squares))) if squares else np.nan, "biases": biases, "unknown": unknown,
+            "within": within} if len(rows) else None
 
 
 def _numerics(relative, mean):

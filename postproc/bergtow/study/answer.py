@@ -50,7 +50,8 @@ def plan(program, path, given, conditions, jobs, minutes, most):
 
     A fitted tail requires blocks, each stat_load.LEAST_GAPS times as long as the gap between clusters, two correlation
     times. Before any run the gap is taken as the time in which the body moves by its own length plus that of a floe,
-    after which it touches different ice: assumed, and reported as such."""
+    after which it touches different ice: assumed, and reported as such. A load is known only from a window of
+    stat_load.LEAST_SCALES time scales, however many fields there are."""
     found = json.loads(checked(program, path, given, "--json"))
     values = case_numbers(program, path, given)
     speed, slower = values["speed"], values["slower"]
@@ -60,12 +61,14 @@ def plan(program, path, given, conditions, jobs, minutes, most):
     gap = max((values["length"] + size) / speed if speed > 0 else 0.0, stat_loads.TIME_SCALE / slower)
     hours = stat_extreme.LEAST_BLOCKS * stat_load.LEAST_GAPS * gap / 3600
     needs = max(stat_profile.LEAST_FIELDS, math.ceil(3600 * hours / window)) if window > 0 else most + 1
+    least = stat_load.LEAST_SCALES * stat_loads.TIME_SCALE / slower
     core = found["cost"]["core_time_s"]
     gives = min(most, fields_in(60 * minutes, core, conditions, jobs))
     return {"needs_fields": needs, "needs_hours": hours, "needs_min": math.ceil(needs * conditions / jobs) * core / 60,
             "budget_fields": gives, "budget_hours": gives * window / 3600, "window_hours": window / 3600,
-            "core_s": core, "gap_s": gap, "conditions": conditions, "most_fields": most,
-            "gives": "return_level" if gives >= needs else "largest_of_n" if gives >= 1 else "nothing"}
+            "least_window_hours": least / 3600, "core_s": core, "gap_s": gap, "conditions": conditions,
+            "most_fields": most, "gives": "no_window" if window < (1 - 1e-9) * least else
+            "return_level" if gives >= needs else "largest_of_n" if gives >= 1 else "nothing"}
 
 
 def fields_in(seconds, member, conditions, jobs):
@@ -156,6 +159,7 @@ def condition(e, c, k, o):
     return {
         "id": name, "label": c.label, "values": c.values, "fields": len(c.finished), "hours": hours, "value": value,
         "gap_s": found and found["gap_s"], "time_scale_s": found and found["time_scale_s"],
+        "tow_hours": found and found["design"]["tow_hours"],
         "mean": {"id": f"{name}.mean", "n": float(means.mean()) if len(means) else np.nan,
                  "interval_95": stat_mean.t_interval(means)},
         "parts": [{"id": f"{name}.{part}", "part": part, "n": n, "share": n / value["n"] if value["n"] else np.nan}

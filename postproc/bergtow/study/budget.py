@@ -103,7 +103,7 @@ def numerics(e, converge, texts):
     Refused if converge.json belongs to another case."""
     if converge is None:
         return None
-    if why := compared.misfit(converge, texts):
+    if why := compared.misfit(converge, texts, e.base):
         return {"refused": f"converge.json is of another case, {why}; run `bergtow converge` on the base case"}
     return stat_budget.relative_numerics(converge["rows"], compared.values(e, texts))
 

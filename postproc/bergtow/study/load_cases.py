@@ -88,7 +88,7 @@ class Tow:
 
 @dataclass
 class Runs:
-    """The runs of load cases and ranges: study/runs.py, with a count, and without aborting if one fails."""
+    """The runs of load cases and ranges: study/runs.py, with those done, and without aborting if one fails."""
 
     runs: object
     fields: range           #: for paired runs, whose interval is that over these fields
@@ -96,7 +96,7 @@ class Runs:
     duration: float         #: s, of the case
     pace: float             #: core s / s of simulated time, measured in the fields of the case
     left_out: bool = False  #: make no runs
-    count: int = 0
+    done: set = field(default_factory=set)  #: (name, field) of the runs; several load cases take the same base
     own: dict = field(default_factory=dict)  #: {name: pace of these runs}: a head sea takes several times as long
 
     def make(self, some, fields=None):
@@ -118,7 +118,7 @@ class Runs:
                 return "budget"
             if any(why):
                 return "run_failed"
-            self.count += len(why)
+            self.done |= {(name, i) for i in here}
             if expected > 0:
                 self.own[name] = self.own.get(name, self.pace) * (time.monotonic() - began) / expected
         return None
@@ -264,9 +264,9 @@ def start(t, runs, say):
         return closed("value_not_above_mean")
     if t.case.get("tow.programme", "none") != "none":
         return closed("case_has_programme")
-    seconds, held, tried, reason = first, None, [], None
+    steps, held, tried, reason = math.ceil(first / t.scale), None, [], None
     for _ in range(RAMPS):
-        seconds = math.ceil(seconds / t.scale) * t.scale
+        seconds = steps * t.scale
         if t.speed * seconds / 2 > t.distance:
             reason = reason or "tow_too_short"
             break
@@ -281,11 +281,13 @@ def start(t, runs, say):
         say(f"a start with a ramp of {seconds / 60:.3g} min takes {quantity(n, 'N')}")
         if n <= t.value:
             held = tried[-1] | {"set": sets}
-            seconds *= SHORTER
+            steps = min(math.ceil(SHORTER * steps), steps - 1)
         elif held:
             break
         else:
-            seconds *= LONGER
+            steps = math.ceil(LONGER * steps)
+        if steps < 1 or any(x["ramp_s"] == steps * t.scale for x in tried):
+            break
     if held is None:
         found, ramp = closed(reason or "no_ramp_held")
         if tried:

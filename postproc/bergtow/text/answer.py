@@ -83,12 +83,16 @@ def minutes(s):
 # ---- the sentence
 
 
+def _own(a, key):
+    """A number of the conditions, in which times are those of the case; what is asked is at full scale."""
+    return next((c[key] for c in a["conditions"] if known(c.get(key))), a["asked"][key])
+
+
 def _over(a):
     """The time scale of a value, and its speed if other speeds were simulated, too: the design value is not theirs."""
-    scale = next((c["time_scale_s"] for c in a["conditions"] if known(c["time_scale_s"])), a["asked"]["time_scale_s"])
     asked = a["asked"]["speed_m_s"]
     at = any(known(c["speed_m_s"]) and abs(c["speed_m_s"] - asked) > 1e-6 * asked for c in a["conditions"])
-    return f"{f'at {speed(asked)} ' if at else ''}as a mean over {short(scale, 2)} s"
+    return f"{f'at {speed(asked)} ' if at else ''}as a mean over {short(_own(a, 'time_scale_s'), 2)} s"
 
 
 def _in_case(v, a):
@@ -101,7 +105,7 @@ def _in_case(v, a):
 
 def _needs(v, a, tow="The tow"):
     interval = ends(v["n"], v["interval_95"])
-    exceeded = f", which {percent(a['asked']['probability'])} of tows of {short(a['asked']['tow_hours'], 2)} h exceed" \
+    exceeded = f", which {percent(a['asked']['probability'])} of tows of {short(_own(a, 'tow_hours'), 2)} h exceed" \
         if v["kind"] == "return_level" else ""
     return (f"{tow} needs {force(v['n'])}{f' (95 % interval over fields: {interval} kN)' if interval else ''} "
             f"{_over(a)}{_in_case(v, a)}{exceeded}")
@@ -121,7 +125,7 @@ def _covers(v, a):
     return (f"{why}: the largest of {v['n_tows']} steady tows of "
             f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence at least "
             f"{percent(v['share_below'])} of such tows stay below it, whatever the distribution, and a tow of "
-            f"{short(a['asked']['tow_hours'], 2)} h bears more")
+            f"{short(_own(a, 'tow_hours'), 2)} h bears more")
 
 
 def _at_least(v, a):
@@ -293,7 +297,8 @@ def plan(p):
     each = f" ({p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min)"
     fields = each if p["window_hours"] > 0 else ""
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
-             "nothing": "not one"}[p["gives"]]
+             "nothing": "not one", "no_window": "none of which has a number if its window is as short as that"
+             }[p["gives"]]
     return (f"A design value needs about {short(p['needs_hours'], 2)} h of simulated tow after the start{fields}, "
             f"about {short(p['needs_min'], 2)} min of computing here. The budget allows {p['budget_fields']} fields, "
             f"{gives}. "

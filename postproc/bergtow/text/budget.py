@@ -76,8 +76,10 @@ def numerics_notes(found):
         said = (f" Bias: the values to which it was converged change the mean, {each}; together "
                 f"{of_mean(found, n['bias'], effect)}. It is not scatter: no number here is corrected for it, and "
                 "its square is in the last line and the shares.")
-    if n.get("unknown"):
-        said += f" Numerics without {', '.join(f'{name} ({why})' for name, why in n['unknown'].items())}."
+    within = n.get("within", ())
+    for words, there in (("with what is known so far of", True), ("without", False)):
+        some = [f"{name} ({why})" for name, why in n["unknown"].items() if (name in within) == there]
+        said += f" Numerics {words} {', '.join(some)}." if some else ""
     return said
 
 
