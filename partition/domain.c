@@ -197,23 +197,25 @@ static void check_balance(bt_world *world)
                  gain = steps * bt_division_gain(world, work / steps), bodies = (double)world->bodies.n_global,
                  lists = NEW_LISTS * most[BT_WORK_REST] / steps / (domain->undivided ? domain->comm->size : 1);
     const bool pays = DIVISION * bodies + lists <
-                      LASTS * (domain->undivided ? domain->lost + gain : domain->spared - gain);
+                      LASTS * (domain->undivided ? domain->time_lost + gain : domain->spared - gain);
     if (domain->undivided) {
-        domain->lost = bt_max(0, domain->lost + gain);
+        domain->time_lost = bt_max(0, domain->time_lost + gain);
         domain->for_one = !pays;
         domain->due = pays;
     } else {
-        if (isinf(domain->lost) && imbalance <= IMBALANCE) domain->lost = 0;
-        if (!isinf(domain->lost)) {
+        if (imbalance <= IMBALANCE) domain->cut_without_work = false;
+        if (!domain->cut_without_work) {
             domain->stats.checks++;
             domain->stats.imbalance += imbalance;
             domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
-            domain->fresh = bt_min(domain->fresh, imbalance); // a jam that has dissolved must not earn a credit
-            domain->lost += (imbalance - domain->fresh) * mean;
+            // a jam that has dissolved must not earn a credit
+            domain->imbalance_at_cut = bt_min(domain->imbalance_at_cut, imbalance);
+            domain->time_lost += (imbalance - domain->imbalance_at_cut) * mean;
         }
         domain->spared = bt_max(0, domain->spared - gain);
         domain->for_one = pays && !bt_division_is_forced(world);
-        domain->due = domain->for_one || domain->lost > DIVISION * bodies / domain->comm->size + lists;
+        domain->due = domain->for_one || domain->cut_without_work ||
+                      domain->time_lost > DIVISION * bodies / domain->comm->size + lists;
     }
     domain->wait = domain->wait < CHECK_STEPS / 2 ? 2 * domain->wait : CHECK_STEPS;
     if (domain->due) return;

@@ -30,7 +30,7 @@ static int body_shape_named(bt_body_shape shape, double length, double width, do
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err)
 {
     const size_t before = err->n;
-    if (!name || !bt_is_name(name, BT_MOST_LAW_NAME))
+    if (!name || !bt_is_name(name, BT_MAX_LAW_NAME))
         bt_errors_add(err, "shape \"%s\": the name must have only lower-case letters, digits and _, at most 40",
                       name ? name : "");
     for (int k = 0; err->n == before && bt_body_shapes[k]; k++)

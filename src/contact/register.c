@@ -30,8 +30,8 @@ static void check_numbers(const bt_contact_law *law, const char *name, bt_errors
 /// Check the series of the law: its work and its numbers.
 static void check_series(const bt_contact_law *law, const char *name, bt_errors *err)
 {
-    char work[BT_MOST_LAW_NAME + sizeof "_work"];
-    snprintf(work, sizeof work, "%.*s_work", BT_MOST_LAW_NAME, name);
+    char work[BT_MAX_LAW_NAME + sizeof "_work"];
+    snprintf(work, sizeof work, "%.*s_work", BT_MAX_LAW_NAME, name);
     if (!bt_series_may_be || !bt_series_may_be(work, 1 + law->n_numbers, err)) return;
     for (int k = 0; k < law->n_numbers; k++) {
         const bt_contact_number *number = &law->numbers[k];
@@ -47,7 +47,7 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME))
+    if (!bt_is_name(name, BT_MAX_LAW_NAME))
         bt_errors_add(err, "contact law \"%s\": the name must have only lower-case letters, digits and _, at most 40",
                       name);
     else if (is_known(name))

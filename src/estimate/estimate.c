@@ -167,7 +167,7 @@ bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = def->name ? def->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // taken by the summary for all curves
+    if (!bt_is_name(name, BT_MAX_LAW_NAME) || !strcmp(name, "curves")) // taken by the summary for all curves
         bt_errors_add(err, "estimate \"%s\": the name must have only lower-case letters, digits and _, at most "
                            "40", name);
     for (int k = 0; k < n_estimates; k++)

@@ -55,7 +55,7 @@ __attribute__((constructor(101))) static void begin(void)
 static void check_series(const bt_force_law *law, const char *name, bt_errors *err)
 {
     const char *of = law->part_of ? law->part_of : law->turns_only ? NULL : name;
-    if (law->part_of && !bt_is_name(law->part_of, BT_MOST_LAW_NAME))
+    if (law->part_of && !bt_is_name(law->part_of, BT_MAX_LAW_NAME))
         bt_errors_add(err, "force law %s: part_of \"%s\" is not a name of lower-case letters, digits and _, at most 40",
                       name, law->part_of);
     if (!of) return;
@@ -64,8 +64,8 @@ static void check_series(const bt_force_law *law, const char *name, bt_errors *e
         bt_errors_add(err, "force law %s: part_of \"%s\" is the force of one law; name a sum of laws, such as drag, or "
                       "a new one", name, of);
     if (there >= 0 || !bt_series_may_be) return;
-    char series[BT_MOST_LAW_NAME + sizeof "_force"];
-    snprintf(series, sizeof series, "%.*s_force", BT_MOST_LAW_NAME, of);
+    char series[BT_MAX_LAW_NAME + sizeof "_force"];
+    snprintf(series, sizeof series, "%.*s_force", BT_MAX_LAW_NAME, of);
     bt_series_may_be(series, 1, err);
 }
 
@@ -73,7 +73,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!bt_is_name(name, BT_MOST_LAW_NAME))
+    if (!bt_is_name(name, BT_MAX_LAW_NAME))
         bt_errors_add(err, "force law \"%s\": the name must have only lower-case letters, digits and _, at most "
                            "40", name);
     else if (bt_force_series_find(name) >= 0)
