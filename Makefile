@@ -304,7 +304,7 @@ test-long: deps-long ## tests that take minutes: intervals over fields, long tow
 	@! command -v clang-14 >/dev/null || $(AGAIN) tsan
 
 # FLAGS='-j 2 --only solve': tests/mutate.py --help
-mutate: deps-test ## wrong lines, one at a time, and which test tells each: hours; goes on where it ended
+mutate: deps-test ## mutation testing: one wrong line at a time, and the test that detects it: hours; can be resumed
 	$(PYTHON) tests/mutate.py $(FLAGS)
 
 STUDY := $(BUILD)/partition/study/partition_quality

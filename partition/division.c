@@ -12,7 +12,7 @@
 #define EXCHANGES 20e-6
 #define REST 5
 /// Largest number of bodies for a single rank: some gigabytes.
-enum { MOST_UNDIVIDED = 2000000 };
+enum { MAX_UNDIVIDED = 2000000 };
 
 int64_t bt_division_place(const bt_world *world, int32_t x, int32_t y)
 {
@@ -73,7 +73,7 @@ static void mark_under(bt_world *world)
         if (!movable_large(world, i)) continue;
         domain->movable = true;
         const bt_cell_range range =
-            bt_pairs_range(world, i, cells->margin_max + 4 * world->par.size + cells->reach + cells->allowance);
+            bt_pairs_range(world, i, cells->margin_max + 4 * world->par.size + cells->max_radius + cells->allowance);
         for (int32_t y = range.y0; y <= range.y1; y++)
             for (int32_t x = range.x0; x <= range.x1; x++) {
                 const int64_t p = bt_division_place(world, x, y);
@@ -135,7 +135,7 @@ static bt_cut_work *gather_work(bt_world *world)
 
 bool bt_division_is_forced(const bt_world *world)
 {
-    return world->domain->comm->divides || world->bodies.n_global > MOST_UNDIVIDED;
+    return world->domain->comm->divides || world->bodies.n_global > MAX_UNDIVIDED;
 }
 
 double bt_division_gain(const bt_world *world, double work)
@@ -152,7 +152,8 @@ static void cut_map(bt_world *world)
     bt_domain *domain = world->domain;
     const int n = domain->n_x * domain->n_y;
     bt_cut_work *work = gather_work(world);
-    domain->fresh = domain->lost = domain->spared = 0;
+    domain->imbalance_at_cut = domain->time_lost = domain->spared = 0;
+    domain->cut_without_work = false;
     domain->undivided = domain->distributed ? domain->for_one : !bt_division_is_forced(world);
     if (domain->undivided) {
         memset(domain->owner, 0, (size_t)n * sizeof *domain->owner);
@@ -188,7 +189,7 @@ static void cut_map(bt_world *world)
                                 .group = group};
         bt_cut_quality quality;
         bt_cut(&graph, domain->comm->size, TOLERANCE, domain->owner, &quality);
-        domain->fresh = quality.imbalance;
+        domain->imbalance_at_cut = quality.imbalance;
         for (int p = 0; p < n; p++)
             for (int i = start[p]; i < start[p + 1]; i++) {
                 all += edge[i];
@@ -201,12 +202,13 @@ static void cut_map(bt_world *world)
     free(work);
     MPI_Bcast(domain->owner, n, MPI_INT, 0, domain->comm->mpi);
     MPI_Bcast(&domain->stats.cut, 1, MPI_DOUBLE, 0, domain->comm->mpi);
-    MPI_Bcast(&domain->fresh, 1, MPI_DOUBLE, 0, domain->comm->mpi);
+    MPI_Bcast(&domain->imbalance_at_cut, 1, MPI_DOUBLE, 0, domain->comm->mpi);
     if (!domain->distributed && !domain->undivided) {
-        domain->lost = INFINITY; // the first division does not know the work
+        domain->cut_without_work = true;
     } else if (!domain->undivided) {
-        domain->stats.repartition_imbalance += domain->fresh;
-        domain->stats.worst_repartition_imbalance = bt_max(domain->stats.worst_repartition_imbalance, domain->fresh);
+        domain->stats.repartition_imbalance += domain->imbalance_at_cut;
+        domain->stats.worst_repartition_imbalance =
+            bt_max(domain->stats.worst_repartition_imbalance, domain->imbalance_at_cut);
         domain->stats.divisions++;
     }
 }

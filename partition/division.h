@@ -57,10 +57,9 @@ struct bt_domain {
     int64_t steps;           ///< since then
     int64_t wait;            ///< steps from that check to the next
     int64_t sweeps;          ///< in these steps
-    double fresh;            ///< imbalance that the last cut left, or less since then
-    /// time lost since then by imbalance beyond that, or by one rank with all cells, s, modelled; INFINITY: that cut
-    /// did not know the work
-    double lost;
+    double imbalance_at_cut; ///< imbalance that the last cut left, or less since then
+    double time_lost;        ///< since then by imbalance beyond that, or by one rank with all cells, s, modelled
+    bool cut_without_work;   ///< no work was known at that cut: another is due, unless its parts turn out equal
     double spared;           ///< time that one rank with all cells would have saved since then, s, modelled
     double exchange_s;       ///< wall time in exchanges since the last query
     bt_domain_stats stats;

@@ -187,31 +187,33 @@ void bt_domain_solve(bt_world *world, void (*solve)(bt_world *world), bt_vel *sh
 static void check_undivided(bt_world *world, double gain, double lists)
 {
     bt_domain *domain = world->domain;
-    domain->lost = bt_max(0, domain->lost + gain);
-    domain->due = DIVISION * (double)world->bodies.n_global + lists / domain->comm->size < LASTS * domain->lost;
+    domain->time_lost = bt_max(0, domain->time_lost + gain);
+    domain->due = DIVISION * (double)world->bodies.n_global + lists / domain->comm->size < LASTS * domain->time_lost;
     domain->for_one = !domain->due;
 }
 
 /// Each rank has cells. One takes them all once
 ///     division of all bodies + lists < LASTS × time that one rank would have saved since;
-/// they are cut anew once
+/// they are cut anew if the last cut did not know the work of the cells, and once
 ///     division of the bodies of a rank + lists < time lost by imbalance beyond that which the last cut left.
 /// mean: work of a rank since the last check, s.
 static void check_divided(bt_world *world, double gain, double lists, double mean, double imbalance)
 {
     bt_domain *domain = world->domain;
     const double division = DIVISION * (double)world->bodies.n_global;
-    if (isinf(domain->lost) && imbalance <= IMBALANCE) domain->lost = 0;
-    if (!isinf(domain->lost)) {
+    if (imbalance <= IMBALANCE) domain->cut_without_work = false;
+    if (!domain->cut_without_work) {
         domain->stats.checks++;
         domain->stats.imbalance += imbalance;
         domain->stats.worst_imbalance = bt_max(domain->stats.worst_imbalance, imbalance);
-        domain->fresh = bt_min(domain->fresh, imbalance); // a jam that has dissolved must not earn a credit
-        domain->lost += (imbalance - domain->fresh) * mean;
+        // a jam that has dissolved must not earn a credit
+        domain->imbalance_at_cut = bt_min(domain->imbalance_at_cut, imbalance);
+        domain->time_lost += (imbalance - domain->imbalance_at_cut) * mean;
     }
     domain->spared = bt_max(0, domain->spared - gain);
     domain->for_one = division + lists < LASTS * domain->spared && !bt_division_is_forced(world);
-    domain->due = domain->for_one || division / domain->comm->size + lists < domain->lost;
+    domain->due = domain->for_one || domain->cut_without_work ||
+                  division / domain->comm->size + lists < domain->time_lost;
 }
 
 /// Collective. Is a new division due? Adds the work counted since the last check to what the present division has cost;

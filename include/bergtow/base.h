@@ -50,8 +50,8 @@ typedef struct bt_note {
     char *values; ///< NULL = none; only for warnings
 } bt_note;
 
-/// Append a message (printf-style); err = NULL here and in the next three: nobody is to hear it. Aborts only when out
-/// of memory.
+/// Append a message (printf-style); err = NULL here and in the next three: the message is discarded. Aborts only
+/// when out of memory.
 void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 /// The same with a list of arguments.
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));

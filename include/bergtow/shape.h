@@ -26,7 +26,7 @@ typedef struct bt_moments {
 bt_moments bt_shape_moments(int n, const double *v);
 
 /// The same without ∫ r³ dA, which stays 0: its two asinh per edge are two thirds of the work, and only drag needs it.
-bt_moments bt_shape_extent(int n, const double *v);
+bt_moments bt_shape_area_moments(int n, const double *v);
 
 /// Only area and centroid, to the same bits; the others stay 0.
 bt_moments bt_shape_centroid(int n, const double *v);
@@ -38,7 +38,7 @@ const char *bt_shape_fault(int n, const double *v);
 /// Is a polygon faulty beyond the rounding of a valid outline when centred, shrunk or cut? Looser than bt_shape_fault.
 bool bt_shape_broken(int n, const double *v);
 
-/// Move the centroid to the origin, in place; returns the result of bt_shape_extent before the move.
+/// Move the centroid to the origin, in place; returns the result of bt_shape_area_moments before the move.
 bt_moments bt_shape_centre(int n, double *v);
 
 /// Width across the direction (ux, uy) (unit vector, body frame): extent of the projection on its normal, m.

@@ -89,7 +89,7 @@ def add_run(p, output):
 
 
 def add_force(p):
-    p.add_argument("--force", action="store_true", help="replace an existing file, whoever made it")
+    p.add_argument("--force", action="store_true", help="replace an existing file, even one that bergtow did not write")
 
 
 def output(a, default, allowed):

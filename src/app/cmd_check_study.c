@@ -18,8 +18,8 @@
 #include <string.h>
 
 enum {
-    MOST_ROWS = 24,   // conditions that are printed one by one
-    MOST_LISTED = 16, // values of a parameter that are printed
+    MAX_ROWS = 24,   // conditions that are printed one by one
+    MAX_LISTED = 16, // values of a parameter that are printed
     CELL = 48,
 };
 
@@ -135,7 +135,7 @@ static bt_status check_conditions(const bt_study *study, numbers *sums, bt_error
     }
     faults f = {0}, w = {0};
     int64_t k = 0;
-    for (; k < study->n_conditions && f.n < BT_MOST_COMPLAINTS; k++) {
+    for (; k < study->n_conditions && f.n < BT_MAX_COMPLAINTS; k++) {
         bt_errors here = {0}, warned = {0};
         status = worse(status, check_condition(study, k, &sums[k], &warned, &here));
         take_faults(&f, k, &here);
@@ -145,7 +145,7 @@ static bt_status check_conditions(const bt_study *study, numbers *sums, bt_error
     tell_faults(&w, study, warnings);
     if (status != BT_OK && k < study->n_conditions)
         bt_errors_add(err, "%s: conditions from %" PRId64 " on are not checked after %d errors; correct those first",
-                      study->path, k + 1, BT_MOST_COMPLAINTS);
+                      study->path, k + 1, BT_MAX_COMPLAINTS);
     return status;
 }
 
@@ -184,7 +184,7 @@ static void print_parameter(const bt_study *study, const bt_study_parameter *par
         free(distribution);
         return;
     }
-    const int shown = parameter->n > MOST_LISTED ? MOST_LISTED - 2 : parameter->n;
+    const int shown = parameter->n > MAX_LISTED ? MAX_LISTED - 2 : parameter->n;
     for (int i = 0; i < shown; i++) printf("%s%s", i ? ", " : "", parameter->value[i]);
     if (shown < parameter->n) printf(", ... %s (%d values)", parameter->value[parameter->n - 1], parameter->n);
     printf("\n");
@@ -309,7 +309,7 @@ static void print_study(const bt_study *study, const numbers *sums, const bt_err
         printf("                     in %" PRId64 " condition%s no ice depends on the seed (ice from a file, or none): "
                "the fields of each are one run\n",
                fixed, bt_plural(fixed));
-    if (study->n_conditions <= MOST_ROWS) print_table(study, sums);
+    if (study->n_conditions <= MAX_ROWS) print_table(study, sums);
     else print_range(study, sums);
     print_work(study, memory, disk, seconds, ranks);
     for (size_t i = 0; i < warnings->n; i++) printf("warning              %s\n", warnings->text[i]);

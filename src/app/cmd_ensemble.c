@@ -142,7 +142,7 @@ static const struct argp ensemble_argp = {
     .parser = parse,
     .args_doc = "STUDY.yml",
     .children = children,
-    .doc = "Run the members of a study. The same call continues where an earlier one ended, however it ended, and runs "
+    .doc = "Run the members of a study. Repeat the command to continue where it ended, for whatever reason, and to run "
            "members with missing or damaged results again. The exit code is 0 only when every member is finished and "
            "sound. Under mpirun the members are assigned to groups of ranks (`ranks` of the study); several calls may "
            "work on one folder."};

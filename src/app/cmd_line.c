@@ -145,7 +145,7 @@ static error_t parse_steps(int key, char *arg, struct argp_state *state)
 {
     bt_run_options *run = state->input;
     switch (key) {
-    case 't': run->threads = (int)bt_cmd_number(state, "--threads", arg, BT_MOST_THREADS); return 0;
+    case 't': run->threads = (int)bt_cmd_number(state, "--threads", arg, BT_MAX_THREADS); return 0;
     case 'q': run->quiet = true; return 0;
     case KEY_STEPS: run->max_steps = bt_cmd_number(state, "--steps", arg, 1000000000); return 0;
     case KEY_WALL: run->max_wall = duration(state, "--max-wall", arg); return 0;
@@ -160,8 +160,8 @@ static const struct argp_option steps_options[] = {
      0},
     {"steps", KEY_STEPS, "N", 0, "stop after N steps of this call; in an ensemble, stop each member after N", 0},
     {"max-wall", KEY_WALL, "TIME", 0,
-     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume continues, or for an "
-     "ensemble the same call",
+     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; continue with bergtow resume or, for "
+     "an ensemble, by repeating the command",
      0},
     {"quiet", 'q', NULL, 0, "print neither progress nor the final table", 0},
     {0},
@@ -227,8 +227,8 @@ int bt_cmd_end(const bt_comm *comm, bt_status status, bt_errors *err)
     const bool lost = fflush(stdout) != 0 || ferror(stdout);
     if (lost)
         bt_errors_add(err,
-                      "standard output: cannot be written; free some space, keep the reading program running to the "
-                      "end, or use the files of the result");
+                      "standard output: cannot be written; free some disk space, do not close the pipe early, or read "
+                      "the result files instead");
     if (lost && status == BT_OK) status = BT_ERR_IO;
     status = bt_comm_agree(comm, status);
     bt_comm_errors(comm, err);

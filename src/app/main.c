@@ -27,12 +27,14 @@ static const struct {
     {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true, true},
     {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false, false},
     {"field", "make the ice field of a case only", bt_cmd_field, false, true},
-    {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
+    {"ensemble",
+        "run the members of a study, many fields and conditions; repeat the command to resume", bt_cmd_ensemble,
      true, true},
     PYTHON("converge",
-           "find out how a result depends on the computation: width, length, time step, tolerance, start"),
+           "find out how a result depends on numerical settings: domain width and length, time step, tolerance, "
+           "start-up"),
     PYTHON("budget",
-           "find out how much of the scatter comes from the fields, each assumed value, and the computation"),
+           "find out how much of the scatter comes from the fields, each assumed value, and numerical error"),
     PYTHON("capability", "find out how fast a vessel can tow in given ice, and what ice stops it"),
     PYTHON("design", "write the report of the design tow force of a case or a study, as a page and as PDF"),
     PYTHON("route", "plan the path and the speed of a tow through known ice, and verify them by simulated tows"),
@@ -43,7 +45,7 @@ static const struct {
     PYTHON("report", "write the report of a run, with a replay, or of an ensemble, as a page or as PDF"),
     PYTHON("statistics", "statistics of an ensemble: design force, loads, intervals, in tables and files"),
     PYTHON("export",
-           "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, trajectories"),
+           "export floes, tracks and loads of a run to GIS formats: GeoPackage, GeoJSON, shapefile, trajectories"),
     PYTHON("contents", "list the contents of the folder of a run"),
     PYTHON("film", "make a film of a run"),
     PYTHON("plot-force", "draw the forces of a run against time"),
@@ -51,7 +53,7 @@ static const struct {
     PYTHON("plot-impacts", "draw the loads around the hull by panel, and the exceedance of peaks"),
     PYTHON("plot-resistance", "draw the mean ice resistance of runs against the concentration, beside the estimates"),
     PYTHON("plot-chains", "draw the force chains of one step"),
-    PYTHON("plot-ensemble", "draw the pictures of an ensemble that its study supports"),
+    PYTHON("plot-ensemble", "plot an ensemble: every picture for which its study has the data"),
 };
 enum { N_COMMANDS = sizeof commands / sizeof *commands };
 

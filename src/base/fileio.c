@@ -208,7 +208,7 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
 
 bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err)
 {
-    return read_text(path, what, BT_MOST_TEXT_BYTES, true, text, size, err);
+    return read_text(path, what, BT_MAX_TEXT_BYTES, true, text, size, err);
 }
 
 bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err)

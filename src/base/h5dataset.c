@@ -18,7 +18,7 @@
 
 // Description of datasets for programs that do not know bergtow.
 
-enum { MOST_AXES = 3, PATH = 200 };
+enum { MAX_AXES = 3, PATH = 200 };
 
 /// The name that netCDF gives a dimension without a coordinate.
 static const char no_variable[] = "This is a netCDF dimension but not a netCDF variable. %10" PRIu64;
@@ -58,9 +58,9 @@ void bt_h5_axes(bt_h5 *h5, const char *dataset, const char *axes)
 {
     if (h5->status != BT_OK || h5->file < 0) return;
     const hid_t d = H5Dopen2(h5->file, dataset, H5P_DEFAULT), space = H5Dget_space(d);
-    hsize_t now[MOST_AXES] = {0}, most[MOST_AXES] = {0};
+    hsize_t now[MAX_AXES] = {0}, most[MAX_AXES] = {0};
     const int rank = H5Sget_simple_extent_ndims(space);
-    bt_h5_check(h5, d >= 0 && rank >= 1 && rank <= MOST_AXES && H5Sget_simple_extent_dims(space, now, most) == rank);
+    bt_h5_check(h5, d >= 0 && rank >= 1 && rank <= MAX_AXES && H5Sget_simple_extent_dims(space, now, most) == rank);
     const char *word = axes;
     for (int k = 0; k < rank && h5->status == BT_OK; k++) {
         char axis[40];

@@ -8,7 +8,7 @@
 #include "bergtow/base.h"
 
 enum { BT_LONGEST_KEY = 64 };   ///< bytes of the longest name of a key, with the 0 at its end
-enum { BT_MOST_LAW_NAME = 40 }; ///< characters: names of its series append a word to it, and may have 48
+enum { BT_MAX_LAW_NAME = 40 }; ///< characters: names of its series append a word to it, and may have 48
 
 /// Is s a name: 1 to `most` lower-case letters, digits and _, not beginning with a digit?
 bool bt_is_name(const char *s, int most);

@@ -186,5 +186,5 @@ int bt_cores_share(const bt_comm *comm)
 void bt_limit_threads(void)
 {
     const int n = omp_get_max_threads(); // negative if OMP_NUM_THREADS is more than an int holds
-    if (n < 1 || n > BT_MOST_THREADS) omp_set_num_threads(BT_MOST_THREADS);
+    if (n < 1 || n > BT_MAX_THREADS) omp_set_num_threads(BT_MAX_THREADS);
 }

@@ -47,7 +47,7 @@ bool bt_cores_given(cpu_set_t *cores);
 /// them. No more than Slurm has promised a task of the step.
 int bt_cores_share(const bt_comm *comm);
 
-/// Lower the number of OpenMP threads to BT_MOST_THREADS: OMP_NUM_THREADS may hold any number.
+/// Lower the number of OpenMP threads to BT_MAX_THREADS: OMP_NUM_THREADS may hold any number.
 void bt_limit_threads(void);
 
 #endif

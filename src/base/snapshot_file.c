@@ -149,7 +149,7 @@ void bt_snapshot_create(bt_snapshot *snap, const char *path, bt_item_meaning *me
     if (bt_h5_create(&file->h, path, err) == BT_OK) bt_h5_describe_file(&file->h, NULL);
 }
 
-enum { MOST_COLUMNS = 1000 };
+enum { MAX_COLUMNS = 1000 };
 
 /// Type and shape of a dataset; false for a dataset that this program does not write.
 static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
@@ -163,7 +163,7 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
     const size_t bytes = H5Tget_size(t);
     // All that the dataset claims to hold must be stored: this program writes no dataset in part or compressed.
     const hsize_t stored = H5Dget_storage_size(d), numbers = bytes > 0 ? stored / bytes : 0;
-    good = good && size[1] >= 1 && size[1] <= MOST_COLUMNS &&
+    good = good && size[1] >= 1 && size[1] <= MAX_COLUMNS &&
            (size[0] == 0 ? stored == 0
                          : stored == numbers * bytes && numbers % size[1] == 0 && numbers / size[1] == size[0]);
     switch (H5Tget_class(t)) {

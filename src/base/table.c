@@ -11,7 +11,7 @@
 #include "base/largest.h"
 #include "base/units.h"
 
-enum { LONGEST_LINE = 255, MOST_COMPLAINTS = 10 };
+enum { LONGEST_LINE = 255, MAX_COMPLAINTS = 10 };
 static const double largest_speed = 100; // m/s, as for the keys of a constant current or wind
 
 void bt_table_free(bt_table *table)
@@ -74,7 +74,7 @@ static void read_lines(bt_table *table, char *rest, const char *end, const char 
     const size_t before = err->n;
     int64_t cap = 0;
     bool header = false;
-    for (int number = 1; err->n - before < MOST_COMPLAINTS && (line = next_line(&rest, end, &length)); number++) {
+    for (int number = 1; err->n - before < MAX_COMPLAINTS && (line = next_line(&rest, end, &length)); number++) {
         if (length > LONGEST_LINE || strlen(line) != length) {
             bt_errors_add(err, "%s:%d: %s; write t,u,v in each line", path, number,
                           length > LONGEST_LINE ? "is too long for a row of a table" : "contains a NUL character");
@@ -97,8 +97,8 @@ static void read_lines(bt_table *table, char *rest, const char *end, const char 
             bt_errors_add(err, "%s:%d: %s", path, number, fault);
             continue;
         }
-        if (table->n == BT_MOST_ROWS) {
-            bt_errors_add(err, "%s:%d: more than %d rows; use longer steps between them", path, number, BT_MOST_ROWS);
+        if (table->n == BT_MAX_ROWS) {
+            bt_errors_add(err, "%s:%d: more than %d rows; use longer steps between them", path, number, BT_MAX_ROWS);
             return;
         }
         if (table->n == cap)
@@ -115,7 +115,7 @@ bt_status bt_table_read(bt_table *table, const char *path, bt_errors *err)
     const size_t before = err->n;
     char *text;
     size_t size;
-    bt_status status = bt_file_read_to(path, "a CSV table", BT_MOST_TABLE_BYTES, &text, &size, err);
+    bt_status status = bt_file_read_to(path, "a CSV table", BT_MAX_TABLE_BYTES, &text, &size, err);
     if (status == BT_OK) read_lines(table, text, text + size, path, err);
     free(text);
     if (status == BT_OK && err->n > before) status = BT_ERR_CASE;

@@ -160,7 +160,7 @@ bt_idx bt_bodies_put(bt_bodies *bodies, const bt_body_def *def, bt_gid gid)
     bodies->gone[gid] = 0;
     bodies->offset[i + 1] = first + n_vertices;
     add_polygons(bodies, i, def);
-    bt_moments moments = bt_shape_extent(def->n_vertices, def->vertices);
+    bt_moments moments = bt_shape_area_moments(def->n_vertices, def->vertices);
     bodies->gid[i] = gid;
     bodies->pose[i] = (bt_pose){.x = def->x, .y = def->y, .yaw = def->yaw};
     bodies->vel[i] = bodies->vel_start[i] = bodies->vel_free[i] =

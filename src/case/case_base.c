@@ -126,11 +126,11 @@ static bt_status read_base(bt_case_files *files, const bt_node *value, int line,
         bt_errors_add(err, "%s:%d: base: %s is being read already: it, or its base, leads back here; remove one of "
                            "these keys",
                       from, line, twin->path);
-    else if (files->n > BT_MOST_BASES)
+    else if (files->n > BT_MAX_BASES)
         bt_errors_add(err, "%s:%d: base: more than %d files, each based on the next; write the keys into fewer "
                            "files", from,
-                      line, BT_MOST_BASES);
-    else status = bt_file_read_to(path, "a case file", BT_MOST_TEXT_BYTES, &text, &size, &why);
+                      line, BT_MAX_BASES);
+    else status = bt_file_read_to(path, "a case file", BT_MAX_TEXT_BYTES, &text, &size, &why);
     for (size_t i = 0; i < why.n; i++) bt_errors_add(err, "%s:%d: base: %s", from, line, why.text[i]);
     bt_errors_free(&why);
     if (status == BT_OK) {

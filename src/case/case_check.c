@@ -182,15 +182,15 @@ static void check_run(const bt_check *check)
     if (!bt_check_sound(check, "run.dt run.duration")) return;
     if (!(input->run.dt > 0) || !(input->run.duration > 0)) return;
     double steps = (double)bt_case_steps(input);
-    if (steps > BT_MOST_STEPS)
+    if (steps > BT_MAX_STEPS)
         bt_check_fault(check, "run.dt",
                        "makes %.3g steps of run.duration, more than the limit of %d; lengthen the step or shorten the "
                        "run",
-                       steps, BT_MOST_STEPS);
+                       steps, BT_MAX_STEPS);
     if (bt_check_sound(check, "output.frame_interval") && input->run.duration / input->output.frame_interval >
-        BT_MOST_FRAMES)
+        BT_MAX_FRAMES)
         bt_check_fault(check, "output.frame_interval", "makes %.3g frames, more than the limit of %d; lengthen it",
-                       input->run.duration / input->output.frame_interval, BT_MOST_FRAMES);
+                       input->run.duration / input->output.frame_interval, BT_MAX_FRAMES);
 }
 
 static void check_closing(const bt_check *check, const char *key, const char *boundary_key, double closing,
@@ -231,10 +231,10 @@ static void check_floes_made(const bt_check *check)
                                "domain.width"))
         return;
     const double n = bt_case_floes_made(input);
-    if (n > BT_MOST_FLOES)
+    if (n > BT_MAX_FLOES)
         bt_check_fault(check, power ? "ice.size_min" : "ice.size",
                        "makes about %.3g floes, more than the limit of %d; use larger floes or a smaller region", n,
-                       BT_MOST_FLOES);
+                       BT_MAX_FLOES);
 }
 
 static bool check_body(const bt_check *check, int *n, double *v)
@@ -480,7 +480,7 @@ bt_status bt_case_check(bt_case *input, bt_origin *from, bt_errors *err)
     bt_case_check_tables(&check);
     bt_case_lead_follow(input, n, v);
     bt_case_check_constraints(&check);
-    for (bt_idx i = 0; i < input->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&check, i);
+    for (bt_idx i = 0; i < input->n_floes && err->n - before < BT_MAX_COMPLAINTS; i++) check_floe(&check, i);
     if (err->n == before) bt_case_check_cost(&check);
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
@@ -491,7 +491,7 @@ void bt_case_warn_body(const bt_case *input, bt_errors *warnings)
     const int n = bt_case_waterline(input, v);
     if (!n) return;
     const double ratio =
-        bt_case_body_mass(input) / (input->water.density * bt_shape_extent(n, v).area * input->body.draft);
+        bt_case_body_mass(input) / (input->water.density * bt_shape_area_moments(n, v).area * input->body.draft);
     if (!(ratio >= 1 / BT_ODD_MASS && ratio <= BT_ODD_MASS))
         bt_warn(warnings, BT_WARN_ODD_MASS,
                       "%s: the body has %.3g times the mass of the water that its waterline and draft displace: is a "

@@ -33,7 +33,7 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
     const size_t before = err->n;
     bool taken = false;
     for (int k = 0; name && bt_body_shapes[k]; k++) taken = taken || !strcmp(bt_body_shapes[k], name);
-    bt_name_check("shape", name ? name : "", BT_MOST_LAW_NAME, taken, err);
+    bt_name_check("shape", name ? name : "", BT_MAX_LAW_NAME, taken, err);
     if (!outline) bt_errors_add(err, "shape %s: it has no function", name);
     if (n_added == BT_MAX_ADDED_SHAPES)
         bt_errors_add(err, "shape %s: there are %d of them; raise BT_MAX_ADDED_SHAPES", name, n_added);

@@ -93,7 +93,7 @@ char *bt_case_with_comments(const char *resolved, const char *digests, const cha
         fprintf(text.out, GIVEN "%.*s", (int)piece_length(at), at);
     fputs(given ? "\n" : "", text.out); // ends the last line, which may have no end of its own
     char *whole = bt_text_end(&text);
-    if (!given || strlen(whole) <= BT_MOST_TEXT_BYTES) return whole;
+    if (!given || strlen(whole) <= BT_MAX_TEXT_BYTES) return whole;
     free(whole); // a case that could not be read would be worse than one without its source
     return bt_case_with_comments(resolved, digests, NULL);
 }

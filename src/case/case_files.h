@@ -27,7 +27,7 @@ char *bt_case_digests(const bt_case *input);
 char *bt_case_digests_in(const bt_case *input, const char *text);
 
 /// The text of case.resolved.yml: the resolved case with the comment about itself; digests, those about its files
-/// (bt_case_digests), or NULL; given, the case as given, or NULL. With that the text may exceed BT_MOST_TEXT_BYTES, the
+/// (bt_case_digests), or NULL; given, the case as given, or NULL. With that the text may exceed BT_MAX_TEXT_BYTES, the
 /// most that is read: then it is left out. The caller frees it.
 char *bt_case_with_comments(const char *resolved, const char *digests, const char *given);
 

@@ -262,9 +262,9 @@ static void read_floes(reader *in)
     in->c->floes = bt_alloc((size_t)list->n, sizeof *in->c->floes);
     const size_t before = in->err->n;
     for (int i = 0; i < list->n; i++) {
-        if (in->err->n - before >= BT_MOST_COMPLAINTS) {
+        if (in->err->n - before >= BT_MAX_COMPLAINTS) {
             bt_errors_add(in->err, "%s:%d: floes[%d]: the rest is not checked after %d errors; correct those first",
-                          in->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
+                          in->path, list->item[i]->line, i, BT_MAX_COMPLAINTS);
             return;
         }
         bt_floe_def floe = {.line = list->item[i]->line};

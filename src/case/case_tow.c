@@ -485,7 +485,7 @@ static void check_fastening(const bt_check *check)
         return;
     for (int b = 0; b < input->tow.line.branches; b++) {
         const double off = outside_of(n, v, at[b][0], at[b][1]);
-        if (off > BESIDE_HULL * 2 * bt_shape_extent(n, v).radius && bt_check_sound(check, keys[b]))
+        if (off > BESIDE_HULL * 2 * bt_shape_area_moments(n, v).radius && bt_check_sound(check, keys[b]))
             bt_check_fault(check, key[b],
                            "the line is fastened at (%g, %g) m from the centroid of the waterline, %.3g m outside the "
                            "hull; give a point of the hull in the body's own axes, or leave it out to use the "

@@ -132,7 +132,7 @@ void bt_case_list_keys(void *stream)
           "floes: is a list of floes given by hand; each is a map with these keys\n\n",
           out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
-    fputs("\nA case file may build on another one, and keep or replace its keys\n\n", out);
+    fputs("\nA case file may be based on another case file and override its keys\n\n", out);
     list_keys(out, &bt_base_key, 1);
     fputs("\nA study file, for bergtow ensemble, has these keys in place of sections; maps are shown in "
           "cases/studies/*.yml\n\n",

@@ -16,8 +16,8 @@
 static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS,
                     BYTES_PER_PART = 450, BASE_BYTES = 30e6;
 // The history doubles as it grows. HDF5 keeps some memory for each entry of the series and each frame, up to a bound.
-static const double GROWN = 1.25, BYTES_PER_ENTRY = 810, MOST_OF_ENTRIES = 110e6, BYTES_PER_FRAME = 140e3,
-                    MOST_OF_FRAMES = 60e6;
+static const double GROWN = 1.25, BYTES_PER_ENTRY = 810, MAX_ENTRY_BYTES = 110e6, BYTES_PER_FRAME = 140e3,
+                    MAX_FRAME_BYTES = 60e6;
 // on rank 0 while it writes a checkpoint: contacts in transit, and a column of the bodies
 static const double CHECKPOINT_BYTES_PER_FLOE = 300;
 // on rank 0 while it makes the ice, before there is a run: cells of the tessellation, the world that shakes the floes
@@ -101,8 +101,8 @@ double bt_cost_memory(const bt_case *input, double n_floes, double parts, int si
     const double run = (BASE_BYTES + (BYTES_PER_FLOE * n_floes + BYTES_PER_PART * parts) / size +
                         FIELD_BYTES_PER_FLOE * n_floes) * ranks_here +
                        CHECKPOINT_BYTES_PER_FLOE * n_floes + GROWN * steps_kept(input) +
-                       bt_min(MOST_OF_ENTRIES, BYTES_PER_ENTRY * entries_of(input)) +
-                       bt_min(MOST_OF_FRAMES, BYTES_PER_FRAME * bt_cost_frames(input));
+                       bt_min(MAX_ENTRY_BYTES, BYTES_PER_ENTRY * entries_of(input)) +
+                       bt_min(MAX_FRAME_BYTES, BYTES_PER_FRAME * bt_cost_frames(input));
     return bt_max(run, BASE_BYTES * ranks_here + MAKING_BYTES_PER_FLOE * bt_case_floes_made(input));
 }
 
@@ -174,16 +174,16 @@ void bt_case_check_cost(const bt_check *check)
         return;
     const double n = bt_case_expected_floes(input) + input->n_floes, work = bt_cost_seconds(input),
                  result = bt_cost_disk_of(input, n, bt_cost_corners(input, NULL, n), 2).result;
-    if (work > BT_MOST_CORE_SECONDS)
+    if (work > BT_MAX_CORE_SECONDS)
         bt_check_fault(check, "run.duration",
                        "about %.2g floes for %.2g steps need about %.2g s on one core, more than the limit of %g s; "
                        "shorten the run, lengthen run.dt, or use larger floes or a smaller region",
-                       n, (double)bt_case_steps(input), work, BT_MOST_CORE_SECONDS);
-    if (result > BT_MOST_RESULT_BYTES)
+                       n, (double)bt_case_steps(input), work, BT_MAX_CORE_SECONDS);
+    if (result > BT_MAX_RESULT_BYTES)
         bt_check_fault(check, "output.frame_interval",
                        "frames and series take about %.2g bytes, more than the limit of %g bytes; lengthen "
                        "output.frame_interval, or raise output.sample_every",
-                       result, BT_MOST_RESULT_BYTES);
+                       result, BT_MAX_RESULT_BYTES);
 }
 
 double bt_cost_machine(void)
@@ -205,11 +205,11 @@ bt_status bt_cost_fits(const bt_case *input, double n_floes, const bt_comm *comm
 {
     const double need = bt_cost_memory(input, n_floes, 0, comm->size, comm->ranks_here),
                  result = bt_cost_disk_of(input, n_floes, bt_cost_corners(input, NULL, n_floes), 2).result;
-    if (result > BT_MOST_RESULT_BYTES) { // a field that was read; with other ice the case is refused
+    if (result > BT_MAX_RESULT_BYTES) { // a field that was read; with other ice the case is refused
         return bt_fail(err, BT_ERR_CASE,
                        "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, more than "
                        "the limit of %g bytes; lengthen it, or raise output.sample_every",
-                       bt_case_name(input), n_floes, result, BT_MOST_RESULT_BYTES);
+                       bt_case_name(input), n_floes, result, BT_MAX_RESULT_BYTES);
     }
     if (need <= machine) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,

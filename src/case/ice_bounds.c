@@ -65,7 +65,7 @@ const char *bt_ice_floe_fault(const bt_ice_floe *floe, char why[BT_ICE_WHY], bt_
         return why;
     }
     *part = BT_ICE_OUTLINE;
-    const bt_moments moments = bt_shape_extent(floe->n, floe->v);
+    const bt_moments moments = bt_shape_area_moments(floe->n, floe->v);
     // The range of ice.size holds for the mean alone: a single floe of a law, or a piece, may be larger or smaller.
     if (!(moments.area > 0) || !(2 * moments.radius <= bounds->length.hi)) {
         snprintf(why, BT_ICE_WHY,

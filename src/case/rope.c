@@ -11,7 +11,7 @@
 
 // The elastic catenary; equations in bergtow/catenary.h.
 
-enum { MOST_STEPS = 200 }; // of Newton's method, which takes fewer than 40
+enum { MAX_STEPS = 200 }; // of Newton's method, which takes fewer than 40
 
 double bt_catenary_span(double length, double stiffness, double weight, double pull)
 {
@@ -39,7 +39,7 @@ double bt_catenary_pull(double length, double stiffness, double weight, double s
     const double half = 0.5 * weight * length, e = half / stiffness, s = span / length;
     double u = fmax(8 / (s * s), 2 * e / s);
     if (s > 1) u = fmin(u, e / (s - 1));
-    for (int k = 0; k < MOST_STEPS; k++) {
+    for (int k = 0; k < MAX_STEPS; k++) {
         const double next = u - (bt_asinh(u) + e - s * u) / (1 / sqrt(1 + u * u) - s);
         if (!(next < u && next > 0)) break;
         u = next;

@@ -195,9 +195,10 @@ bt_key bt_case_keys[] = {
          "share of the flow along a side that counts in the moment of form drag on floes; 0: pressure only, see "
          "body.drag.tangential"),
     REAL("ice.drag.sheltering", ice.sheltering, RATIO, "5.556", "[0, 100]",
-         "length over which the lee of a floe's edge fades / height of the edge, 1/s. At the distance D behind another "
-         "floe, the form drag of an edge is 1 - exp(-s D/height) of that in the free stream; height: draft in water, "
-         "freeboard in air. The default is s = 0.18 [Hanssen-Bauer & Gjessing 1988; Steele et al. 1989; Tsamados et "
+         "length over which the lee of a floe's edge fades / height of the edge (draft in water, freeboard in air). "
+         "With "
+         "the value 1/s, an edge at the distance D behind another floe has 1 - exp(-s D/height) of its form drag in "
+         "the free stream. The default is s = 0.18 [Hanssen-Bauer & Gjessing 1988; Steele et al. 1989; Tsamados et "
          "al. 2014]; s = 0.5 [Luepkes et al. 2012] is 2; 0 = none: every edge feels the free stream. The default "
          "lowers the drag of floes close to others, and so the load on a body that pushes them"),
     CHOICE("ice.start", ice.start, starts, "drift",
@@ -303,7 +304,7 @@ bt_key bt_case_keys[] = {
      .range_first = "[0, 1e9]",
      .offset_count = offsetof(bt_case, tow.n_programme),
      .least = 1,
-     .most = BT_MOST_POINTS,
+     .most = BT_MAX_POINTS,
      .doc = "speed over time, [[time, speed], ...], in place of speed and ramp: linear between the points, constant "
             "outside them"},
     {.name = "tow.waypoints",
@@ -314,7 +315,7 @@ bt_key bt_case_keys[] = {
      AT(tow.waypoints),
      .offset_count = offsetof(bt_case, tow.n_waypoints),
      .least = 1,
-     .most = BT_MOST_POINTS,
+     .most = BT_MAX_POINTS,
      .doc = "[[x, y], ...] on the path of the towing end (mode speed: of the body, which keeps its yaw) from its "
             "start; after the last point it continues straight ahead"},
     REAL("tow.turn_radius", tow.turn_radius, LENGTH, "0 m", "[0, 1e6]",

@@ -10,7 +10,7 @@
 #include "case/case_derived.h"
 #include "bergtow/shape.h"
 
-#define MOST_POINTS 20000.0 // of a track that is searched for its wake: each is compared with all before it
+#define MAX_POINTS 20000.0 // of a track that is searched for its wake: each is compared with all before it
 
 static double between(const bt_track *track, int64_t i, int64_t j)
 {
@@ -64,7 +64,7 @@ static int64_t first_in_wake(const bt_track *track, const double period[2], doub
     if (!(period[0] > 0 || period[1] > 0)) return track->n;
     double way = 0;
     for (int64_t i = 1; i < track->n; i++) way += isnan(track->x[i - 1]) ? 0 : between(track, i - 1, i);
-    const double apart = bt_max(0.5 * size, way / MOST_POINTS);
+    const double apart = bt_max(0.5 * size, way / MAX_POINTS);
     int64_t *kept = bt_alloc((size_t)(way / apart) + 2, sizeof *kept), n = 0, last = 0, found = track->n;
     for (int64_t i = 0; i < track->n && found == track->n; i++) {
         if (isnan(track->x[i]) || (n > 0 && between(track, last, i) < 0.25 * apart)) continue;

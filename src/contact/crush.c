@@ -15,7 +15,7 @@
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01
 #define NEAR 0.5 // of the penetration at which the overlap was evaluated: if it ends below this share, evaluate again
-#define MOST_DEPTH 0.3 // of the mean floe size: deeper, unchanged outlines are no longer a valid model
+#define MAX_DEPTH 0.3 // of the mean floe size: deeper, unchanged outlines are no longer a valid model
 
 // --- numbers ---------------------------------------------------------------------------------------------------------
 
@@ -40,7 +40,7 @@ static const bt_law_total totals[] = {
     [STEPS] = {CRUSHING, BT_TOTAL_STEPS, "crushing_steps", .key = "crushing_steps", .units = "1",
                .description = "steps with contact points that crush"},
     [MOST] = {CRUSHING, BT_TOTAL_MAX, "max_crushing", .key = "max_crushing_contacts", .units = "1",
-              .description = "most of them at once"},
+              .description = "largest number of crushing contact points at once"},
 };
 
 static void setup(const bt_case *input, double own[BT_MAX_CONTACT_OWN])
@@ -56,7 +56,8 @@ static char *check(const bt_case *input, double thickness, double size)
     if (!(input->ice.crushing_pressure > 0)) return NULL;
     const double line = input->ice.crushing_pressure * thickness;
     return bt_text_of(
-        "crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n",
+        "crushing             limit %.4g N per m of contact, %.4g N at first contact, %.4g N over the width of a mean "
+        "floe\n",
         line, line * input->ice.crushing_least * thickness, line * size);
 }
 
@@ -72,7 +73,7 @@ static char *result(const bt_case *input, const bt_total_value *total, double ic
 static void warn(const bt_total_value *total, double size, bt_errors *warnings)
 {
     const double depth = total[DEPTH].real;
-    if (depth <= MOST_DEPTH * size) return;
+    if (depth <= MAX_DEPTH * size) return;
     bt_warn(warnings, BT_WARN_CRUSHED,
             "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses stay as they "
             "were, so the model no longer holds",

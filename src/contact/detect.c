@@ -161,7 +161,8 @@ static double spread_large(bt_world *world, const bt_vel *v, const bt_vel *v2)
         movable = movable || bodies->motion[l] == BT_DYNAMIC;
         if (s == 0) continue;
         fastest = bt_max(fastest, s);
-        const bt_cell_range range = bt_pairs_range(world, l, bt_margin_for(world, s) + cells->reach + cells->allowance);
+        const bt_cell_range range =
+            bt_pairs_range(world, l, bt_margin_for(world, s) + cells->max_radius + cells->allowance);
         raise(cells, range.x0, range.x1, range.y0, range.y1, s);
     }
     return movable ? fastest : 0;
@@ -365,7 +366,7 @@ void bt_contacts_detect(bt_world *world, bool again)
     for (bt_idx j = 0; j < cells->n_busy; j++) {
         const bt_idx k = cells->busy[j];
         bt_cell *cell = &cells->cell[k];
-        cell->fresh = false;
+        cell->just_detected = false;
         if (!cell->own) continue;
         const bool active = cells->bound[k] > 0;
         if (!active) {
@@ -376,7 +377,7 @@ void bt_contacts_detect(bt_world *world, bool again)
         if (again && cell->active && bt_margin_holds(world, cell->margin, cells->bound[k])) continue;
         cell->active = true;
         cell->margin = bt_margin_for(world, cells->bound[k]);
-        cell->fresh = true;
+        cell->just_detected = true;
         due[n_due++] = k;
     }
     // inside a parallel region of the caller, one thread does the pass and keeps its number

@@ -21,7 +21,8 @@ static const bt_law_number numbers[] = {
     [PAIRS] = {"rafting", "1", "pairs of floes that lie over each other", BT_KEEP_LAST, .key = "rafting_pairs"},
     [AREA] = {"rafted_area", "m2", "area where floes lie over each other, pair by pair, at the start of the step",
               BT_KEEP_LAST, .key = "rafted_area_m2"},
-    [LARGEST] = {"rafted_largest", "m2", "the largest such area of one pair", BT_KEEP_MAX, .largest = true,
+    [LARGEST] = {"rafted_largest", "m2",
+        "largest area where two floes of a pair lie over each other", BT_KEEP_MAX, .largest = true,
                  .key = "largest_rafted_pair_m2"},
     [ENERGY] = {"rafted_energy", "J",
                 "potential energy of floes that lie over each other, above that of floes side by side", BT_KEEP_LAST,
@@ -35,17 +36,17 @@ static const bt_law_number numbers[] = {
                        BT_KEEP_SUM, .key = "raft_friction_work_j"},
 };
 
-enum { ALL_PAIRS, ALL_AREA = BT_RAFT_TOTAL_AREA, MOST_AREA, LARGEST_PAIR, ALL_ENERGY,
+enum { ALL_PAIRS, ALL_AREA = BT_RAFT_TOTAL_AREA, MAX_AREA, LARGEST_PAIR, ALL_ENERGY,
        ALL_EDGE_WORK, ALL_FRICTION_WORK };
 static const bt_law_total totals[] = {
     [ALL_PAIRS] = {PAIRS, BT_TOTAL_LAST, "rafting", "rafting_pairs", "1",
                    "pairs of floes that lie over each other, at the end"},
     [ALL_AREA] = {AREA, BT_TOTAL_LAST, "rafted_area", "rafted_area_m2", "m2",
-                  "area where they do, pair by pair, at the end"},
-    [MOST_AREA] = {AREA, BT_TOTAL_MAX, "max_rafted_area", "max_rafted_area_m2", "m2",
-                   "the largest such area of a step"},
+                  "area where floes lie over each other, pair by pair, at the end"},
+    [MAX_AREA] = {AREA, BT_TOTAL_MAX, "max_rafted_area", "max_rafted_area_m2", "m2",
+                   "largest area where floes lie over each other in a step, pair by pair"},
     [LARGEST_PAIR] = {LARGEST, BT_TOTAL_MAX, "rafted_largest", "largest_rafted_pair_m2", "m2",
-                      "the largest area of one pair"},
+                      "largest area where two floes of a pair lie over each other"},
     [ALL_ENERGY] = {ENERGY, BT_TOTAL_LAST, "rafted_energy", "rafted_energy_j", "J",
                     "potential energy of floes that lie over each other, above that of floes side by side, at the end"},
     [ALL_EDGE_WORK] = {EDGE_WORK, BT_TOTAL_SUM, "raft_edge_work", "raft_edge_work_j", "J",

@@ -39,8 +39,8 @@ static bool is_named_before(const bt_contact_law *law, int k, const char *work)
 /// Check the series of the law: its work and its numbers.
 static void check_series(const bt_contact_law *law, const char *name, bt_errors *err)
 {
-    char work[BT_MOST_LAW_NAME + sizeof "_work"];
-    snprintf(work, sizeof work, "%.*s_work", BT_MOST_LAW_NAME, name);
+    char work[BT_MAX_LAW_NAME + sizeof "_work"];
+    snprintf(work, sizeof work, "%.*s_work", BT_MAX_LAW_NAME, name);
     if (!bt_series_may_be || !bt_series_may_be(work, 1 + law->n_numbers, err)) return;
     for (int k = 0; k < law->n_numbers; k++) {
         const bt_contact_number *number = &law->numbers[k];
@@ -58,7 +58,7 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    bt_name_check("contact law", name, BT_MOST_LAW_NAME, is_known(name), err);
+    bt_name_check("contact law", name, BT_MAX_LAW_NAME, is_known(name), err);
     if (!law->on || !law->bound) bt_errors_add(err, "contact law %s: it needs the functions `on` and `bound`", name);
     if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "contact law %s: describe it in one line (`doc`)", name);
     if (law->n_keys < 0 || law->n_keys > BT_MAX_CONTACT_OWN)

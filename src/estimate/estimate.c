@@ -169,7 +169,7 @@ bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
     const char *name = def->name ? def->name : "";
     bool taken = !strcmp(name, "curves"); // by the summary, for all curves
     for (int k = 0; k < n_estimates; k++) taken = taken || !strcmp(estimates[k].name, name);
-    bt_name_check("estimate", name, BT_MOST_LAW_NAME, taken, err);
+    bt_name_check("estimate", name, BT_MAX_LAW_NAME, taken, err);
     if (!def->label || !def->formula || !def->source)
         bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
     if (!def->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);

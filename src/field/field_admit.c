@@ -15,15 +15,15 @@
 void bt_refuse(bt_refusals *refusals, const char *fmt, ...)
 {
     refusals->status = BT_ERR_CASE;
-    if (refusals->said > BT_MOST_MESSAGES) return;
+    if (refusals->said > BT_MAX_MESSAGES) return;
     char text[640];
     va_list ap;
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    if (refusals->said++ == BT_MOST_MESSAGES)
+    if (refusals->said++ == BT_MAX_MESSAGES)
         bt_errors_add(refusals->err, "%s: more of the same; only the first %d are shown", refusals->path,
-                      BT_MOST_MESSAGES);
+                      BT_MAX_MESSAGES);
     else bt_errors_add(refusals->err, "%s: %s", refusals->path, text);
 }
 

@@ -5,7 +5,7 @@
 
 #include "bergtow/field.h"
 
-enum { BT_MOST_MESSAGES = 10 }; ///< faults of a file reported one by one
+enum { BT_MAX_MESSAGES = 10 }; ///< faults of a file reported one by one
 
 /// Faults of one file; only the first few are reported in words.
 typedef struct bt_refusals {

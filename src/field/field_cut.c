@@ -11,7 +11,7 @@
 // The concentration of a part differs from that of the whole field (theory.md gives the measured scatter). Floes that
 // were cut, and those whose centroid is in the strip of width s along a cut side, are scaled about their centroids by a
 // common factor, each as far as it has room, until Σ area = concentration × ice area. s is the least multiple of the
-// mean diameter for which no area changes by more than MOST_CHANGE. In the widest strip the limit is LAST_CHANGE, which
+// mean diameter for which no area changes by more than MAX_CHANGE. In the widest strip the limit is LAST_CHANGE, which
 // small domains with few floes need.
 //
 // Rejected: removing or adding whole floes at random, which leaves an error of half a floe; scaling all floes, which
@@ -26,7 +26,7 @@
 
 static const double LEAST_PART = 0.1;   // least part kept / area of its floe
 static const double SHORT_EDGE = 0.02;  // shortest edge kept / diameter of a part
-static const double MOST_CHANGE = 0.25; // of a floe's area, while the strip can be widened
+static const double MAX_CHANGE = 0.25; // of a floe's area, while the strip can be widened
 static const double LAST_CHANGE = 0.5;  // the same in the widest strip
 static const double WIDEST = 0.25;      // strip / ice region across a cut: at least half of the region keeps its floes
 static const double TOLERANCE = 0.005;  // relative, of the concentration
@@ -80,10 +80,10 @@ static int part_within(const axis axes[2], double clearance, int n, double *v, b
 static void add_part(const bt_region *region, const axis axes[2], const bt_field *from, const double *outline, bt_idx i,
                      double dx, double dy, bt_field *to, bool **parted)
 {
-    enum { MOST_CLEARED = 8 * BT_MAX_VERTICES };
+    enum { MAX_CLEARED = 8 * BT_MAX_VERTICES };
     const int all = (int)(from->offsets[i + 1] - from->offsets[i]);
     const double x = from->pose[3 * i] + dx, z = from->pose[3 * i + 1] + dy, *own = outline + 2 * from->offsets[i];
-    double v[2 * MOST_CLEARED], radius = 0;
+    double v[2 * MAX_CLEARED], radius = 0;
     for (int k = 0; k < all; k++) {
         v[2 * k] = x + own[2 * k], v[2 * k + 1] = z + own[2 * k + 1];
         radius = bt_max(radius, bt_hypot(own[2 * k], own[2 * k + 1]));
@@ -101,7 +101,7 @@ static void add_part(const bt_region *region, const axis axes[2], const bt_field
         to->pose[3 * k] = x, to->pose[3 * k + 1] = z;
     } else {
         bt_moments moments = {0};
-        if (n >= 3) moments = bt_shape_extent(n, v);
+        if (n >= 3) moments = bt_shape_area_moments(n, v);
         if (moments.area < LEAST_PART * from->area[i]) return;
         n = bt_tessellation_clean(n, v, SHORT_EDGE * 2 * sqrt(moments.area / BT_PI), BT_MAX_VERTICES);
         moments = bt_shape_centre(n, v);
@@ -146,7 +146,7 @@ static double scale_strip(const bt_region *region, const axis axes[2], const boo
     for (field->strip = bt_min(size, widest);; field->strip = bt_min(field->strip + size, widest)) {
         for (bt_idx i = 0; i < field->n; i++)
             held[i] = !parted[i] && !(to_cut(axes, field->pose + 3 * i) < field->strip);
-        const double change = field->strip < widest ? MOST_CHANGE : LAST_CHANGE,
+        const double change = field->strip < widest ? MAX_CHANGE : LAST_CHANGE,
                      low = bt_field_area_at(field, clearance, held, 1 - change),
                      high = bt_field_area_at(field, clearance, held, 1 + change);
         if ((low <= wanted && wanted <= high) || field->strip == widest) {

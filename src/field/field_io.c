@@ -259,19 +259,19 @@ static void read_floes(reader *in, bt_field *field)
 {
     hsize_t n_offsets = 0, n_vertices = 0, n_pose = 0, n_thickness = 0, n_area = 0;
     bt_field_free(field);
-    field->offsets = read_dataset(in, "/floes/offsets", true, 0, BT_MOST_FLOES + 1, &n_offsets);
+    field->offsets = read_dataset(in, "/floes/offsets", true, 0, BT_MAX_FLOES + 1, &n_offsets);
     if (in->r.status == BT_OK && n_offsets < 1)
         bt_refuse(&in->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
     hsize_t n = n_offsets ? n_offsets - 1 : 0;
     field->vertices = read_dataset(in, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
     check_offsets(in, field->offsets, n, n_vertices);
-    field->pose = read_dataset(in, "/floes/pose", false, 3, BT_MOST_FLOES, &n_pose);
+    field->pose = read_dataset(in, "/floes/pose", false, 3, BT_MAX_FLOES, &n_pose);
     same_length(in, "/floes/pose", n_pose, n);
-    field->thickness = read_dataset(in, "/floes/thickness", false, 0, BT_MOST_FLOES, &n_thickness);
+    field->thickness = read_dataset(in, "/floes/thickness", false, 0, BT_MAX_FLOES, &n_thickness);
     same_length(in, "/floes/thickness", n_thickness, n);
     double *stored_area = NULL;
     if (in->r.status == BT_OK && H5Lexists(in->file, "/floes/area", H5P_DEFAULT) > 0) {
-        stored_area = read_dataset(in, "/floes/area", false, 0, BT_MOST_FLOES, &n_area);
+        stored_area = read_dataset(in, "/floes/area", false, 0, BT_MAX_FLOES, &n_area);
         same_length(in, "/floes/area", n_area, n);
     }
     field->ice_area = read_ice_area(in);

@@ -104,8 +104,8 @@ static bool unpacked(bt_field *field, const char *name, const char *bytes, size_
     memcpy(&h, bytes, sizeof h);
     bt_checksum_digest_text(bytes + sealed, size - sealed, digest);
     if (memcmp(h.magic, MAGIC, sizeof MAGIC) || memcmp(h.digest, digest, sizeof digest) ||
-        memcmp(h.name, name, sizeof h.name) || h.field.n < 0 || h.field.n > BT_MOST_FLOES || h.field.cap_vertices < 0 ||
-        h.field.cap_vertices > BT_MOST_FLOES * (int64_t)BT_MAX_VERTICES)
+        memcmp(h.name, name, sizeof h.name) || h.field.n < 0 || h.field.n > BT_MAX_FLOES || h.field.cap_vertices < 0 ||
+        h.field.cap_vertices > BT_MAX_FLOES * (int64_t)BT_MAX_VERTICES)
         return false;
     bt_field_room(field, &h.field);
     bt_field_array p[BT_FIELD_ARRAYS];

@@ -124,10 +124,10 @@ static bt_status draw_targets(const bt_case *input, const bt_sizes *sizes, doubl
                               bt_errors *err)
 {
     double expected = wanted / bt_sizes_mean_area(sizes);
-    if (expected > BT_MOST_FLOES)
+    if (expected > BT_MAX_FLOES)
         return bt_fail(err, BT_ERR_CASE,
             "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
-            bt_case_name(input), bt_sizes_mean(sizes), expected, BT_MOST_FLOES);
+            bt_case_name(input), bt_sizes_mean(sizes), expected, BT_MAX_FLOES);
     size_t cap = 64;
     *target = bt_alloc(cap, sizeof **target);
     *n = 0;

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double MOST_GROWTH = 20; // of a body by the clearance: a body that needs more is a line
+static const double MAX_GROWTH = 20; // of a body by the clearance: a body that needs more is a line
 
 static void place(int n, double *v, double x, double y, double yaw)
 {
@@ -95,15 +95,15 @@ static void box_about(int n, const double *v, double clearance, double box[8])
 static bool add_obstacle(bt_region *region, int n, const double *v, bool part)
 {
     double lx = region->x1 - region->x0, ly = region->y1 - region->y0;
-    bt_moments moments = bt_shape_extent(n, v);
+    bt_moments moments = bt_shape_area_moments(n, v);
     // Scaling about the centroid by 1 + clearance/inradius moves every edge out by at least the clearance.
     double grow = 1 + region->clearance / bt_max(moments.inradius, 1e-9 * moments.radius);
-    const bool sliver = grow > MOST_GROWTH;
+    const bool sliver = grow > MAX_GROWTH;
     if (sliver && !part) return false;
     double box[8], r = moments.radius * grow;
     if (sliver) {
         box_about(n, v, region->clearance, box);
-        r = bt_shape_extent(4, box).radius + moments.radius;
+        r = bt_shape_area_moments(4, box).radius + moments.radius;
     }
     // First bring a body far outside a periodic domain back, so that adjacent images suffice.
     double wx = moments.cx, wy = moments.cy;

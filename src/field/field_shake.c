@@ -83,7 +83,7 @@ static void add_floes(bt_world *world, const bt_case *input, const bt_field *fie
     for (bt_idx i = 0; i < field->n; i++) {
         int nv = (int)(field->offsets[i + 1] - field->offsets[i]);
         const double *v = field->vertices + 2 * field->offsets[i];
-        bt_moments moments = bt_shape_extent(nv, v);
+        bt_moments moments = bt_shape_area_moments(nv, v);
         bt_rng rng = bt_rng_start(input->ice.seed, BT_RNG_SHAKE, stage << 32 | i);
         double speed = sqrt(median / moments.area), heading = 2 * BT_PI * bt_rng_uniform(&rng),
                spin = bt_rng_uniform(&rng) < 0.5 ? -1 : 1;

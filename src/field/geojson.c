@@ -103,7 +103,7 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     const json_t *ring = json_array_get(polygon, 0);
     if (!json_is_array(ring))
         *why = "its coordinates are not a list of rings; write [[[east, north], [east, north], ...]]";
-    else if (json_array_size(ring) > BT_MOST_RING)
+    else if (json_array_size(ring) > BT_MAX_RING)
         *why = "it has more than 10000 vertices; `bergtow outlines` simplifies it";
     else return ring;
     return NULL;
@@ -324,13 +324,13 @@ static void look_for_thickness(reader *in, const json_t *properties)
 static void take_feature(void *context, size_t index, const json_t *feature)
 {
     reader *in = context;
-    if (index >= BT_MOST_FLOES) return; // read_features refuses them
+    if (index >= BT_MAX_FLOES) return; // read_features refuses them
     if (index + 1 >= in->cap_features)
         in->feature = bt_realloc(in->feature, in->cap_features = 256 + 3 * in->cap_features / 2, sizeof *in->feature);
     map_feature *out = &in->feature[index];
     const int64_t first = index ? out->vertex : 0;
-    if (first + BT_MOST_RING > in->cap_vertices)
-        in->ring = bt_realloc(in->ring, 2 * (size_t)(in->cap_vertices = BT_MOST_RING + 3 * first / 2),
+    if (first + BT_MAX_RING > in->cap_vertices)
+        in->ring = bt_realloc(in->ring, 2 * (size_t)(in->cap_vertices = BT_MAX_RING + 3 * first / 2),
                               sizeof *in->ring);
     const json_t *properties = json_object_get(feature, "properties");
     json_t *id = json_object_get(feature, "id"), *thickness = json_object_get(properties, "thickness");
@@ -530,8 +530,8 @@ static void read_features(reader *in, const json_t *root, size_t n)
                   "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
         return;
     }
-    if (n == 0 || n > BT_MOST_FLOES) {
-        bt_refuse(&in->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", n, BT_MOST_FLOES);
+    if (n == 0 || n > BT_MAX_FLOES) {
+        bt_refuse(&in->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", n, BT_MAX_FLOES);
         return;
     }
     choose_coordinates(in, root);

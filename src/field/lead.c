@@ -182,7 +182,7 @@ static void mark(const strip *s, const bt_field *field, uint8_t *taken, bt_lead_
     for (bt_idx i = 0; i < field->n; i++) {
         const int n = (int)(field->offsets[i + 1] - field->offsets[i]);
         const double *v = outline + 2 * field->offsets[i];
-        taken[i] = overlaps(s, n, v, bt_shape_extent(n, v).radius, field->pose[3 * (size_t)i],
+        taken[i] = overlaps(s, n, v, bt_shape_area_moments(n, v).radius, field->pose[3 * (size_t)i],
                             field->pose[3 * (size_t)i + 1]);
         if (!taken[i]) continue;
         st->taken++;
@@ -221,11 +221,11 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
     const double most =
         lead->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * lead->floe_size * lead->floe_size) : 0;
     bt_status status = BT_OK;
-    if (most > BT_MOST_FLOES)
+    if (most > BT_MAX_FLOES)
         status = bt_fail(err, BT_ERR_CASE,
             "%s: lead.floe_size: %g m makes up to %.3g pieces, more than the limit of %d; use larger pieces, or a "
             "narrower or shorter lead",
-            lead->name, lead->floe_size, most, BT_MOST_FLOES);
+            lead->name, lead->floe_size, most, BT_MAX_FLOES);
     if (status == BT_OK) {
         bt_field out;
         bt_field_init(&out);

@@ -116,11 +116,11 @@ static bt_status refuse_text(const char *path, const char *text, size_t size, bt
     int64_t lists = 0;
     const char *c = text, *end = text + size;
     while ((c = memchr(c, '[', (size_t)(end - c)))) c++, lists++;
-    if (lists <= BT_MOST_LISTS) return BT_OK;
+    if (lists <= BT_MAX_LISTS) return BT_OK;
     return bt_fail(err, BT_ERR_CASE, "%s: holds %" PRId64
                    " lists (vertices), more than the limit of %d; simplify the outlines, or cut them into several "
                    "files",
-                   path, lists, BT_MOST_LISTS);
+                   path, lists, BT_MAX_LISTS);
 }
 
 bt_status bt_features_read(const char *path, bt_feature_visit *visit, void *context, json_t **root, size_t *n,
@@ -129,7 +129,7 @@ bt_status bt_features_read(const char *path, bt_feature_visit *visit, void *cont
     char *text = NULL;
     size_t size;
     *root = NULL, *n = 0;
-    bt_status status = bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &text, &size, err);
+    bt_status status = bt_file_read_to(path, "a GeoJSON file of outlines", BT_MAX_OUTLINE_BYTES, &text, &size, err);
     if (status == BT_OK) status = refuse_text(path, text, size, err);
     if (status == BT_OK) {
         json_error_t why;

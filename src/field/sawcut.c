@@ -51,7 +51,7 @@ static void add_cell(bt_tessellation *cells, const bt_region *region, double x0,
     }
     if (n < 3) return;
     // Drop what an obstacle leaves of a piece if it is too small or too narrow.
-    bt_moments moments = bt_shape_extent(n, v);
+    bt_moments moments = bt_shape_area_moments(n, v);
     if (moments.area < 0.25 * whole || moments.inradius < 0.2 * bt_min(x1 - x0, y1 - y0) / 2) return;
     if ((cells->n & (cells->n - 1)) == 0) { // full at powers of two
         size_t cap = cells->n ? 2 * (size_t)cells->n : 1;

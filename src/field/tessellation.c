@@ -366,7 +366,7 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *region, bt_idx n, co
         if (m < 3) continue;
         double full = bt_shape_centroid(m, v).area;
         m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI), BT_TESSELLATION_VERTICES);
-        bt_moments mo = bt_shape_extent(m, v);
+        bt_moments mo = bt_shape_area_moments(m, v);
         if (mo.inradius < SLIVER * sqrt(mo.area / BT_PI) || mo.area < 0.1 * target[i] * share) continue;
         cells.nv[i] = m;
         memcpy(cells.v[i], v, 2 * (size_t)m * sizeof *v);

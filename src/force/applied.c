@@ -20,7 +20,7 @@ enum { ACTS }; // own[]
 
 /// Input and answer of a force in the present step. Its texts stay in place to the end of the program.
 typedef struct slot {
-    char name[BT_MOST_LAW_NAME + 1];
+    char name[BT_MAX_LAW_NAME + 1];
     char doc[200];
     bt_force_law law;
     bt_applied_force *force;
@@ -176,7 +176,7 @@ bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *fo
         arrays->law = (bt_force_law){
             .name = arrays->name, .doc = arrays->doc, .rests = rests, .begin = begin, .add = add, .context = arrays};
         const bool fits = !name || strlen(name) < sizeof arrays->name;
-        if (!fits) bt_errors_add(err, "force %s: the name is longer than %d letters", name, BT_MOST_LAW_NAME);
+        if (!fits) bt_errors_add(err, "force %s: the name is longer than %d letters", name, BT_MAX_LAW_NAME);
         if (!fits || bt_force_register(&arrays->law, err) != BT_OK) {
             free(arrays);
             return BT_ERR_USAGE;

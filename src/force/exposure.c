@@ -547,7 +547,7 @@ static int rings_of(const bt_world *world, double side, int32_t wrap)
 {
     const bt_cells *cells = world->cells;
     if (wrap == 1) return 0;
-    return (int)bt_max(1, ceil((world->par.lee_reach + 2 * cells->reach + 2 * cells->allowance) / side));
+    return (int)bt_max(1, ceil((world->par.lee_reach + 2 * cells->max_radius + 2 * cells->allowance) / side));
 }
 
 void bt_exposure_look(bt_world *world)

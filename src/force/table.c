@@ -55,17 +55,17 @@ __attribute__((constructor(101))) static void begin(void)
 static void check_series(const bt_force_law *law, const char *name, bt_errors *err)
 {
     const char *of = law->part_of ? law->part_of : law->turns_only ? NULL : name;
-    if (law->part_of && !bt_is_name(law->part_of, BT_MOST_LAW_NAME))
+    if (law->part_of && !bt_is_name(law->part_of, BT_MAX_LAW_NAME))
         bt_errors_add(err, "force law %s: part_of \"%s\" is not a name of lower-case letters, digits and _, at most %d",
-                      name, law->part_of, BT_MOST_LAW_NAME);
+                      name, law->part_of, BT_MAX_LAW_NAME);
     if (!of) return;
     const int there = bt_force_series_find(of);
     if (there >= 0 && bt_force_series_of[there].law)
         bt_errors_add(err, "force law %s: part_of \"%s\" is the force of one law; name a sum of laws, such as drag, or "
                       "a new one", name, of);
     if (there >= 0 || !bt_series_may_be) return;
-    char series[BT_MOST_LAW_NAME + sizeof "_force"];
-    snprintf(series, sizeof series, "%.*s_force", BT_MOST_LAW_NAME, of);
+    char series[BT_MAX_LAW_NAME + sizeof "_force"];
+    snprintf(series, sizeof series, "%.*s_force", BT_MAX_LAW_NAME, of);
     bt_series_may_be(series, 1, err);
 }
 
@@ -73,7 +73,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    bt_name_check("force law", name, BT_MOST_LAW_NAME, bt_force_series_find(name) >= 0, err);
+    bt_name_check("force law", name, BT_MAX_LAW_NAME, bt_force_series_find(name) >= 0, err);
     if (!law->add) bt_errors_add(err, "force law %s: it has no function `add`", name);
     if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "force law %s: describe it in one line (`doc`)", name);
     if (law->n_keys < 0 || law->n_keys > BT_MAX_FORCE_OWN)

@@ -78,7 +78,7 @@ static bt_moments moments(int n, const double *v, bool cubic)
 
 bt_moments bt_shape_moments(int n, const double *v) { return moments(n, v, true); }
 
-bt_moments bt_shape_extent(int n, const double *v) { return moments(n, v, false); }
+bt_moments bt_shape_area_moments(int n, const double *v) { return moments(n, v, false); }
 
 const char *bt_ring_fault(int n, const double *v, double near, double *extent)
 {
@@ -133,7 +133,7 @@ bool bt_shape_broken(int n, const double *v) { return fault_of(n, v, 1e-12, 1e-6
 
 bt_moments bt_shape_centre(int n, double *v)
 {
-    bt_moments moments = bt_shape_extent(n, v);
+    bt_moments moments = bt_shape_area_moments(n, v);
     for (int i = 0; i < n; i++) {
         v[2 * i] -= moments.cx;
         v[2 * i + 1] -= moments.cy;

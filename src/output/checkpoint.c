@@ -34,7 +34,7 @@ static const row rows[] = {
     {"about/ranks", "1", "MPI ranks of the run", "one"},
     {"about/threads", "1", "threads of each rank", "one"},
     {"clock/phases", "s", "wall time of each phase of the steps", "phase"},
-    {"clock/shared", "s", "of it, in passes that several threads share", "phase"},
+    {"clock/shared", "s", "wall time of each phase in multithreaded passes", "phase"},
     {"clock/wall_time", "s", "wall time of the run so far", "one"},
     {"case/resolved", NULL, "the case with every key, in SI units", "one"},
     {"case/current", "s, m/s, m/s", "table of the current: time, x, y", "current_row time_x_y"},
@@ -54,7 +54,7 @@ static const row rows[] = {
     {"run/frames_due", "1", "frames that are due so far", "one"},
     {"run/unconverged_in_a_row", "1", "steps without convergence one after the other", "one"},
     {"run/locked_steps", "1", "steps without a solution", "one"},
-    {"run/energy_limit", "J", "of the bodies, by guard.energy and what drives them at the start; 0 without", "one"},
+    {"run/energy_limit", "J", "largest kinetic energy of the bodies allowed by guard.energy; 0 = no limit", "one"},
     // the ice as it was
     {"field/offsets", "1", "floe i has the vertices offsets[i] up to offsets[i + 1]", "floe_end"},
     {"field/vertices", "m", "outlines, frame of the floe, anticlockwise about the centroid", "floe_vertex xy"},
@@ -62,7 +62,7 @@ static const row rows[] = {
     {"field/thickness", "m", "thickness of each floe", "floe"},
     {"field/area", "m2", "area of each floe", "floe"},
     {"field/crs", NULL, "coordinate reference system of the map", "one"},
-    {"field/nearly", NULL, "such names, the first few", "one"},
+    {"field/nearly", NULL, "property names close to `thickness`, the first few", "one"},
 };
 
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes)

@@ -24,9 +24,9 @@
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw
 //                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no
 //                       cell is known to rest
-//   bt_cells          S corner, sides, allowance, reach, heaviest, rebounds, margin_max, box, wrap, relabel: labels
-//                       decide which cell owns a contact, and so the order of the sweeps. They are older than the
-//                       poses, and cannot be made from them
+//   bt_cells          S corner, sides, allowance, max_radius, heaviest, rebounds, margin_max, box, wrap, relabel:
+//                       labels decide which cell owns a contact, and so the order of the sweeps. They are older than
+//                       the poses, and cannot be made from them
 //                     D cell array, at, n_in_cells, labelled
 //                     - moved, moved_any, speed, bound, awake, busy, order, share, still
 //                     not needed: asleep (a cell at rest is found to be so again)

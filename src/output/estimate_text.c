@@ -61,17 +61,17 @@ typedef struct conditions_item {
 #define OF_ESTIMATE(...) {BT_JSON_AT(0, estimate_item, __VA_ARGS__)}
 const bt_json_key bt_estimate_keys[] = {
     OF_ESTIMATE("force_n", e.force, "N", "force against the tow; null where the formula has no value"),
-    OF_ESTIMATE("low_n", e.low, "N", "lower end of its range"),
-    OF_ESTIMATE("high_n", e.high, "N", "upper end of its range"),
+    OF_ESTIMATE("low_n", e.low, "N", "lower end of the range of the force"),
+    OF_ESTIMATE("high_n", e.high, "N", "upper end of the range of the force"),
     OF_ESTIMATE("simulated_over_estimate", ratio, "1",
-                "mean ice resistance of the run / force; it tells something where `compares`"),
+                "mean ice resistance of the run / force; meaningful only if `compares` is true"),
     OF_ESTIMATE("valid", e.valid, "1", "the formula is meant for these conditions"),
     OF_ESTIMATE("compares", e.compares, "1",
                 "a run is compared with it: it is valid, depends on the concentration, and does not depend on a speed "
                 "that changes in the window"),
     OF_ESTIMATE("note", e.note, "", "regime, or why it is not valid"),
     OF_ESTIMATE("formula", formula, "", "the formula"),
-    OF_ESTIMATE("source", source, "", "where it is from"),
+    OF_ESTIMATE("source", source, "", "source of the formula"),
 };
 const int bt_n_estimate_keys = sizeof bt_estimate_keys / sizeof *bt_estimate_keys;
 
@@ -81,14 +81,17 @@ const bt_json_key bt_condition_keys[] = {
     OF_CONDITIONS("thickness_m", in.thickness, "m", "mean thickness of the ice, weighted with area"),
     OF_CONDITIONS("floe_radius_m", in.floe_radius, "m", "mean radius of the floes, weighted with area"),
     OF_CONDITIONS("width_m", in.width, "m",
-                  "width of the body across the tow: its course in the window, before a run that of the first leg"),
+                  "width of the body across its mean course in the window; before a run, across the first leg of the "
+                  "tow"),
     OF_CONDITIONS("speed_m_s", in.speed, "m/s",
-                  "speed of the body through undisturbed ice: of a run the mean over its window, else as ordered"),
-    OF_CONDITIONS("speed_along_m_s", in.along, "m/s", "its part along the tow"),
+                  "speed of the body through undisturbed ice: mean over the window; before a run, as ordered"),
+    OF_CONDITIONS("speed_along_m_s", in.along, "m/s", "component of speed_m_s along the tow"),
     OF_CONDITIONS("ordered_speed_m_s", in.ordered, "m/s",
-                  "the part along the tow as the case orders it: the mean of the window, before a run the largest"),
-    OF_CONDITIONS("water_speed_m_s", in.water_speed, "m/s", "speed of the body through the water, by the same rule"),
-    OF_CONDITIONS("length_scale", in.length_scale, "1", "P* was divided by it, and P_s by its square"),
+                  "speed along the tow as the case orders it: mean over the window; before a run, the largest"),
+    OF_CONDITIONS("water_speed_m_s", in.water_speed, "m/s",
+        "speed of the body through the water: mean over the window; before a run, as ordered"),
+    OF_CONDITIONS("length_scale", in.length_scale, "1",
+        "full scale / scale of the case: P* is divided by it, and P_s by its square"),
     OF_CONDITIONS("strength_n_m", strength, "N/m", "strength of the ice P"),
     OF_CONDITIONS("capture_strength_n_m", in.p_s, "N/m", "strength P_s from which the ice captures the body"),
 };

@@ -118,7 +118,7 @@ bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_
         const int n = outline_of(world, k, &v);
         rows[i][0] = n;
         rows[i][1] = roster->thickness[l.row[i]];
-        rows[i][2] = k < 0 ? bt_shape_extent(n, v).area : bodies->area[k];
+        rows[i][2] = k < 0 ? bt_shape_area_moments(n, v).area : bodies->area[k];
     }
     bt_status status = bt_comm_rows_by_gid(comm, l.first, l.n, l.row, 3, &rows[0][0], &block[0][0], err);
     int64_t *offsets = bt_alloc((size_t)l.count + 1, sizeof *offsets);

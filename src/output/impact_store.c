@@ -62,7 +62,8 @@ static void create_panels(bt_impact_store *store, const bt_panels *panels, bool 
               "panel k reaches from point k to k + 1, frame of the towed body");
     bt_h5_put(h5, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle, "panel xy", "m",
               "middle of each panel, frame of the towed body");
-    bt_h5_put(h5, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal, "panel xy", "1", "outward normal there");
+    bt_h5_put(h5, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal, "panel xy", "1",
+              "outward normal at the middle of each panel");
     free(start);
     free(middle);
     free(normal);

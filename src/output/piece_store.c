@@ -22,11 +22,13 @@ enum { TIME, PARENT, GENERATION, MODE, RATIO, THICKNESS, CRACK };
 static const column splits[BT_SPLIT_COLUMNS] = {
     [TIME] = {"/splits/time", false, 0, "split", "s", "end of the step in which the floe split"},
     [PARENT] = {"/splits/parent", true, 0, "split", "1", "the floe: a row of /floes, or from n_floes on a piece"},
-    [GENERATION] = {"/splits/generation", true, 0, "split", "1", "of the pieces; 1 of those of a floe of /floes"},
-    [MODE] = {"/splits/mode", true, 0, "split", "1", "1 = opened at the load, 2 = bent at the far end, 3 = burst"},
+    [GENERATION] = {"/splits/generation", true, 0, "split", "1",
+        "generation of the pieces; 1 if a floe of /floes split"},
+    [MODE] = {"/splits/mode", true, 0, "split", "1", "1 = opened at a contact, 2 = bent, 3 = burst"},
     [RATIO] = {"/splits/ratio", false, 0, "split", "1", "stress over strength"},
     [THICKNESS] = {"/splits/thickness", false, 0, "split", "m", "thickness of the floe"},
-    [CRACK] = {"/splits/crack", false, 4, "split end_of_crack", "m", "x, y of the end at the load, then of the other"},
+    [CRACK] = {"/splits/crack", false, 4, "split end_of_crack", "m",
+        "x, y of the crack's end at the load, then of its other end"},
 };
 
 /// A column of the pieces in the frames, and its name where ParaView draws it; the first one is of integers.

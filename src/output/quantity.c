@@ -36,9 +36,9 @@ const char *const bt_applies_names[BT_APPLIES_KINDS] = {
     [BT_APPLIES_WINDOW] = "with a moving window",
 };
 
-enum { MOST_NAME = 48, MOST_KEY = 80 }; // a force law may have 40 letters; with _force 46
+enum { MAX_NAME = 48, MAX_KEY = 80 }; // a force law may have 40 letters; with _force 46
 static bt_quantity added[BT_MAX_ADDED];
-static char added_keys[BT_MAX_ADDED][MOST_KEY];
+static char added_keys[BT_MAX_ADDED][MAX_KEY];
 static int n_added;
 
 static bool is_taken(const char *name)
@@ -54,12 +54,12 @@ static bool is_taken(const char *name)
 }
 
 /// Key mean_NAME_n for a mean in N, with the suffix for units of the other keys of summary.json.
-static void make_key(const bt_quantity *quantity, char key[MOST_KEY])
+static void make_key(const bt_quantity *quantity, char key[MAX_KEY])
 {
-    int n = snprintf(key, MOST_KEY, "%s_%s", bt_keep_names[quantity->keep], quantity->name);
+    int n = snprintf(key, MAX_KEY, "%s_%s", bt_keep_names[quantity->keep], quantity->name);
     if (!strcmp(quantity->units, "1")) return;
-    if (n + 1 < MOST_KEY) key[n++] = '_';
-    for (const char *u = quantity->units; *u && n + 1 < MOST_KEY; u++)
+    if (n + 1 < MAX_KEY) key[n++] = '_';
+    for (const char *u = quantity->units; *u && n + 1 < MAX_KEY; u++)
         key[n++] = isalnum((unsigned char)*u) ? (char)tolower((unsigned char)*u) : '_';
     key[n] = '\0';
 }
@@ -76,7 +76,7 @@ static char *in_words(const char *name)
 /// Report in err why there cannot be a series of this name, or `more` of them.
 static void registry_check(const char *name, int more, bt_errors *err)
 {
-    bt_name_check("quantity", name, MOST_NAME, is_taken(name), err);
+    bt_name_check("quantity", name, MAX_NAME, is_taken(name), err);
     if (n_added + more > BT_MAX_ADDED)
         bt_errors_add(err, "quantity %s: a program can add at most %d, and all are in use; use the name of a force "
                       "whose simulation has ended, or raise BT_MAX_ADDED", name, BT_MAX_ADDED);
@@ -95,7 +95,7 @@ static bt_status add_series(const bt_quantity *quantity, bt_errors *err)
         bt_errors_add(err, "quantity %s: give it one of `of_world` and `of_floe`", name);
     if ((unsigned)quantity->keep >= BT_KEEP_KINDS || (unsigned)quantity->applies >= BT_APPLIES_KINDS ||
         (unsigned)quantity->role >= BT_ROLE_KINDS)
-        bt_errors_add(err, "quantity %s: keep, applies or role is none of its kinds", name);
+        bt_errors_add(err, "quantity %s: `keep`, `applies` or `role` has an unknown value", name);
     if (err->n > before) return BT_ERR_USAGE;
     bt_quantity *own = &added[n_added];
     *own = *quantity;

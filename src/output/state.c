@@ -59,7 +59,7 @@ static const bt_state_row cells_rows[] = {
     CELLS(F64, side_x, "m", FINITE, "side of a cell, x"),
     CELLS(F64, side_y, "m", FINITE, "side of a cell, y"),
     CELLS(F64, allowance, "m", ANY, "how far a centroid may be outside its cell"),
-    CELLS(F64, reach, "m", NOT_NEGATIVE, "largest radius of a floe"),
+    BT_STATE_ONE(bt_cells, "reach", F64, max_radius, "m", NOT_NEGATIVE, "largest radius of a floe"),
     CELLS(F64, heaviest, "kg", NOT_NEGATIVE, "mass of the heaviest floe"),
     CELLS(U8, rebounds, "1", ANY, "1 = some body has a restitution"),
     CELLS(F64, margin_max, "m", ANY, "largest margin of the search for pairs that the cells allow"),
@@ -104,7 +104,7 @@ static const bt_state_row tow_rows[] = {
 static const bt_state_row window_rows[] = {
     WINDOW(F64, 1, start, "m", "one", FINITE, "place of the rear end at first, along the tow"),
     WINDOW(I64, 1, renewed, "1", "one", COUNT, "floes renewed in all"),
-    WINDOW(I64, 1, kept, "1", "one", COUNT, "floes that went round as they were, in all"),
+    WINDOW(I64, 1, kept, "1", "one", COUNT, "floes that came round unchanged, in all"),
     WINDOW(I64, 1, missed, "1", "one", COUNT, "places ahead that stayed empty, in all"),
     WINDOW(I64, 1, waiting, "1", "one", COUNT, "floes that waited to be renewed when the window last moved"),
     WINDOW(I64, 1, renewed_now, "1", "one", COUNT, "floes renewed in the last step"),
@@ -113,7 +113,7 @@ static const bt_state_row window_rows[] = {
     WINDOW(F64, 3, brought, "kg m/s, kg m/s, J", "one momentum_energy", FINITE,
         "momentum x, y and kinetic energy of the floes brought in, in all"),
     WINDOW(F64, 1, most, "m", "one", FINITE, "largest distance of the body through undisturbed ice, along the tow"),
-    WINDOW(F64, 1, overtaken, "m", "one", FINITE, "by how much it fell behind that, at most"),
+    WINDOW(F64, 1, overtaken, "m", "one", FINITE, "largest distance that the body fell behind that"),
     BT_STATE_ONE(bt_window, "rear_in_ice", F64, rear, "m", FINITE,
         "place of the rear end now, along the tow, in a frame that drifts with undisturbed ice"),
 };
@@ -131,23 +131,23 @@ static const bt_state_row undisturbed_rows[] = {
     {label, BT_ITEM_##type, 1, offsetof(bt_split_totals, member), units_, meaning_, "one", BT_ROW_##check, \
      "splitting." key_}
 const bt_state_row bt_split_total_rows[] = {
-    SPLIT_TOTAL("near", I64, by_mode[BT_SPLIT_NEAR], "near", "1", COUNT, "of them opened at a load"),
-    SPLIT_TOTAL("far", I64, by_mode[BT_SPLIT_FAR], "far", "1", COUNT, "of them bent"),
+    SPLIT_TOTAL("near", I64, by_mode[BT_SPLIT_OPENED], "near", "1", COUNT, "splits by a crack opened at a contact"),
+    SPLIT_TOTAL("far", I64, by_mode[BT_SPLIT_BENT], "far", "1", COUNT, "splits by bending"),
     SPLIT_TOTAL("burst", I64, by_mode[BT_SPLIT_BURST], "burst", "1", COUNT,
-        "of them burst by a load along the crack"),
+        "splits by bursting under a load along the crack"),
     SPLIT_TOTAL("steps", I64, steps, "steps", "1", COUNT, "steps with a split"),
     SPLIT_TOTAL("crack_length", F64, crack_length, "crack_length_m", "m", NOT_NEGATIVE, "length of all cracks"),
     SPLIT_TOTAL("work", F64, work, "fracture_work_j", "J", NOT_NEGATIVE,
         "work of fracture, which is not taken from the motion: toughness squared / modulus, times the cracks' areas"),
     SPLIT_TOTAL("deferred", I64, deferred, "deferred", "1", COUNT,
         "times a floe was left to the next step after the last round: its load may be too high"),
-    SPLIT_TOTAL("too_small", I64, too_small, "refused_size", "1", COUNT,
+    SPLIT_TOTAL("too_small", I64, refused_size, "refused_size", "1", COUNT,
         "times a floe was kept whole because a piece would have been too small or too slender"),
-    SPLIT_TOTAL("too_old", I64, too_old, "refused_generation", "1", COUNT,
+    SPLIT_TOTAL("too_old", I64, refused_generation, "refused_generation", "1", COUNT,
         "times a floe of the last generation was kept whole"),
-    SPLIT_TOTAL("rafted", I64, rafted, "refused_rafted", "1", COUNT,
+    SPLIT_TOTAL("rafted", I64, refused_rafted, "refused_rafted", "1", COUNT,
         "times a floe was kept whole that lay over or under others"),
-    SPLIT_TOTAL("no_id", I64, no_id, "refused_reserve", "1", COUNT,
+    SPLIT_TOTAL("no_id", I64, refused_reserve, "refused_reserve", "1", COUNT,
         "times a floe was kept whole because no ids were left"),
     SPLIT_TOTAL("unconverged", I64, unconverged, "unconverged_steps", "1", COUNT,
         "steps that did not converge, and so split nothing"),
@@ -161,10 +161,11 @@ const int bt_n_split_total_rows = BT_N_OF(bt_split_total_rows);
 static const bt_state_row split_columns[] = {
     SPLIT(I64, 1, step, "1", "split", COUNT, "steps done before the one in which each floe split"),
     SPLIT(I64, 1, parent, "1", "split", COUNT, "id of the floe"),
-    SPLIT(I64, 1, generation, "1", "split", COUNT, "of the pieces"),
-    SPLIT(I64, 1, mode, "1", "split", COUNT, "1 = opened at a load, 2 = bent, 3 = burst"),
+    SPLIT(I64, 1, generation, "1", "split", COUNT, "generation of the pieces"),
+    SPLIT(I64, 1, mode, "1", "split", COUNT,
+        "1 = crack opened at a contact, 2 = bent, 3 = burst under a load along the crack"),
     SPLIT(F64, 2, near, "m", "split xy", FINITE, "end of the crack at the load"),
-    SPLIT(F64, 2, far, "m", "split xy", FINITE, "its other end"),
+    SPLIT(F64, 2, far, "m", "split xy", FINITE, "other end of the crack"),
     SPLIT(F64, 1, thickness, "m", "split", NOT_NEGATIVE, "thickness of the floe"),
     SPLIT(F64, 1, ratio, "1", "split", NOT_NEGATIVE, "stress over strength"),
     SPLIT(F64, 2, area, "m2", "split piece", NOT_NEGATIVE, "areas of the pieces"),
@@ -200,7 +201,7 @@ static const bt_state_row body_columns[] = {
     BODY("path", F64, 1, path, "m", "body", NOT_NEGATIVE,
         "length of path of the fastest point of the outline, through the water's frame"),
     BODY("exposure", F64, 3, exposure, "1", "body component", SHARE,
-        "share of a floe's drag that its neighbours leave: skin, form in water, form in air"),
+        "fraction of a floe's drag that remains beside its neighbours: skin, form in water, form in air"),
     BODY("cell", I32, 2, cell, "1", "body xy", ANY, "cell of each body, x and y"),
     BODY("copy", I32, 1, copy, "1", "body", FAR, "which repetition of the place, in lengths of the period along x"),
     BODY("lap", I32, 1, lap, "1", "body", FAR, "periods along x that the body lies above its pose, which is wrapped"),
@@ -601,8 +602,8 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
     bt_status status = bt_comm_agree(comm, snap->faulty ? BT_ERR_CASE : BT_OK);
     if (status == BT_OK && !same_constants(&made, &world->par, !world->environment))
         status = bt_fail(err, BT_ERR_CASE,
-            "%s: the case it holds makes other constants of the step now; it was written by another version "
-            "of the program: use that one",
+            "%s: this version of the program derives other step constants from the case in this checkpoint; resume "
+            "with the version that wrote it",
             snap->path);
     if (status != BT_OK) {
         free(memory);

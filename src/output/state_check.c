@@ -45,7 +45,7 @@ static void want_ice(bt_snapshot *snap, const char *name, int64_t row, const cha
 
 void bt_state_check_field(const bt_field *field, int64_t n_offsets, int64_t n_vertices, bt_snapshot *snap)
 {
-    bt_snapshot_want(snap, n_offsets >= 1 && n_offsets <= BT_MOST_FLOES + 1, "field/offsets", -1,
+    bt_snapshot_want(snap, n_offsets >= 1 && n_offsets <= BT_MAX_FLOES + 1, "field/offsets", -1,
                      "has a number of rows that no field has");
     if (snap->faulty) return;
     bt_snapshot_want(snap, field->offsets[0] == 0 && field->offsets[n_offsets - 1] == n_vertices, "field/offsets", -1,
@@ -126,11 +126,11 @@ static void check_cells(const bt_world *world, bt_snapshot *snap)
     bt_snapshot_want(snap, cells->margin_max > 0 && isfinite(cells->margin_max), "cells/margin_max", -1,
                      "is not a margin");
     // Allow for rounding: another build may have computed the radii.
-    bt_snapshot_want(snap, cells->reach >= widest * (1 - 1e-9), "cells/reach", -1,
+    bt_snapshot_want(snap, cells->max_radius >= widest * (1 - 1e-9), "cells/reach", -1,
                      "is less than the radius of a floe");
     double slack = INFINITY;
-    if (cells->wrap_x != 1) slack = bt_min(slack, cells->side_x - 2 * cells->reach - cells->margin_max);
-    if (cells->wrap_y != 1) slack = bt_min(slack, cells->side_y - 2 * cells->reach - cells->margin_max);
+    if (cells->wrap_x != 1) slack = bt_min(slack, cells->side_x - 2 * cells->max_radius - cells->margin_max);
+    if (cells->wrap_y != 1) slack = bt_min(slack, cells->side_y - 2 * cells->max_radius - cells->margin_max);
     bt_snapshot_want(snap, slack > 0 && cells->allowance == 0.5 * slack, "cells/allowance", -1,
                      "is not what sides, reach and margin leave");
 }
@@ -256,7 +256,7 @@ static void check_split(const bt_world *world, const bt_split_record *record, in
     const bt_splitting *splitting = world->splitting;
     const bool known = record->parent >= 0 && record->parent < world->bodies.n_global && there[record->parent];
     bt_snapshot_want(snap, known, "splits/parent", k, "is not a floe that is there");
-    bt_snapshot_want(snap, record->step < world->step && record->mode >= BT_SPLIT_NEAR &&
+    bt_snapshot_want(snap, record->step < world->step && record->mode >= BT_SPLIT_OPENED &&
                      record->mode <= BT_SPLIT_BURST, "splits/mode", k,
                      "is not a split of the steps done");
     if (snap->faulty) return;

@@ -283,7 +283,7 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
 {
     bt_path path;
     char why[200];
-    for (int k = 0; k < 2; k++) steady->led[k] = distance_towed(history, input, k ? steady->end : steady->start);
+    for (int k = 0; k < 2; k++) steady->path_at[k] = distance_towed(history, input, k ? steady->end : steady->start);
     if (input->tow.n_waypoints == 0 || input->tow.mode == BT_TOW_NONE || !bt_case_tow_path(input, &path, why)) return;
     bool turned = false;
     for (int k = 0; k < path.n_marks; k++) {
@@ -291,9 +291,9 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
                      arc = 0.5 * input->tow.turn_radius * turn;
         const bool vessel = input->tow.mode == BT_TOW_THRUST && isfinite(passed);
         const double mark = vessel ? distance_towed(history, input, passed) : path.mark[k], slack = 1e-9 * mark;
-        turned = turned || (turn > BT_TURN && mark < steady->led[1]);
-        if (!(turn > BT_TURN) || mark - arc >= steady->led[1] - slack ||
-            mark + arc + distance_to_follow(input, turn) <= steady->led[0] + slack)
+        turned = turned || (turn > BT_TURN && mark < steady->path_at[1]);
+        if (!(turn > BT_TURN) || mark - arc >= steady->path_at[1] - slack ||
+            mark + arc + distance_to_follow(input, turn) <= steady->path_at[0] + slack)
             continue;
         char when[60] = "to which it begins to turn";
         if (isfinite(passed)) snprintf(when, sizeof when, "passed at %g s", passed);
@@ -301,7 +301,7 @@ static void judge_course(bt_steady *steady, const bt_history *history, const bt_
                 "the course changes by %.3g deg at way-point %d, %s, within the window%s: end the run earlier, begin "
                 "the window later, or read the series",
                 turn * 180 / BT_PI, k + 1, when,
-                mark + arc > steady->led[0] + slack ? "" : " for the body, which follows its line");
+                mark + arc > steady->path_at[0] + slack ? "" : " for the body, which follows its line");
         steady->turns = true;
     }
     bt_path_free(&path);

@@ -77,7 +77,7 @@ typedef struct bt_steady {
     bool given;                   ///< start given by output.window_start, not found
     int64_t first, n;             ///< steps
     int64_t put_off;              ///< steps from the earliest possible start to the first
-    double led[2];                ///< path of the towing end at start and end, m (bt_path_at); mode speed: of the body
+    double path_at[2];            ///< path of the towing end at start and end, m (bt_path_at); mode speed: of the body
     bool turns;                   ///< the course of the tow changes within the window, or that of the body behind it
     bool changes_speed;           ///< the ordered speed changes within the window
     bt_reported series[BT_N_REPORTED];

@@ -233,10 +233,10 @@ static void warn_of_splits(bt_summary *summary, const bt_run_totals *totals)
                 "%lld times a floe was left to split in the next step, after %d rounds: loads of these steps may be "
                 "too high",
                 (long long)p->deferred, BT_SPLIT_ROUNDS);
-    if (p->no_id > 0)
+    if (p->refused_reserve > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_RESERVE,
                 "%lld times a floe could not split, after %lld splits had used up all ids; raise ice.splitting.reserve",
-                (long long)p->no_id, (long long)totals->splitting->reserve / 2);
+                (long long)p->refused_reserve, (long long)totals->splitting->reserve / 2);
     if (p->unconverged > 0)
         bt_warn(&summary->warnings, BT_WARN_SPLIT_UNCONVERGED,
                 "in %lld of %lld steps the loads had not converged, so no floe split; raise solver.max_sweeps or lower "
@@ -314,8 +314,8 @@ static void order_window(bt_summary *summary, const bt_history *history, const b
             straight.tow.speed = (to - from) / (steady->end - steady->start);
         if (input->tow.n_waypoints > 0 && bt_case_tow_path(input, &path, why)) {
             double a[2], b[2], first[2], last[2];
-            bt_path_at(&path, steady->led[0], a, first);
-            bt_path_at(&path, steady->led[1], b, last);
+            bt_path_at(&path, steady->path_at[0], a, first);
+            bt_path_at(&path, steady->path_at[1], b, last);
             straight.tow.direction = bt_atan2(first[1] + last[1], first[0] + last[0]);
             // at a prescribed speed a body keeps its yaw; on a line it follows its course, as in src/case/arch.c
             if (input->tow.mode != BT_TOW_SPEED) straight.body.yaw += straight.tow.direction - input->tow.direction;

@@ -151,17 +151,20 @@ static void print_forces(const bt_summary *summary, const bt_case *input)
 static void print_splits(const bt_splitting *splitting, int64_t n_steps)
 {
     const bt_split_totals *totals = &splitting->total;
-    printf("  splits              %lld: %lld at a load, %lld bent, %lld burst; cracks of %.4g m, work %.4g J\n",
-           (long long)splitting->n, (long long)totals->by_mode[BT_SPLIT_NEAR], (long long)totals->by_mode[BT_SPLIT_FAR],
-           (long long)totals->by_mode[BT_SPLIT_BURST], totals->crack_length, totals->work);
+    const long long opened = totals->by_mode[BT_SPLIT_OPENED], bent = totals->by_mode[BT_SPLIT_BENT],
+                    burst = totals->by_mode[BT_SPLIT_BURST];
+    printf("  splits              %lld: %lld opened at a contact, %lld bent, %lld burst; cracks of %.4g m, work %.4g "
+           "J\n",
+           (long long)splitting->n, opened, bent, burst, totals->crack_length, totals->work);
     if (splitting->n > 0)
         printf("    sizes             floes of %.3g m (median) into pieces of %.3g m, the smallest of %.3g m; in "
                "%.2g %% of the steps\n",
                bt_splitting_size(splitting, true, 0.5), bt_splitting_size(splitting, false, 0.5),
                bt_splitting_size(splitting, false, 0), 100.0 * (double)totals->steps / (double)n_steps);
-    printf("    times kept whole  %lld by size, %lld by generation, %lld rafted, %lld without an id; %lld deferred\n",
-           (long long)totals->too_small, (long long)totals->too_old, (long long)totals->rafted,
-           (long long)totals->no_id, (long long)totals->deferred);
+    printf("    times not split   %lld piece too small or slender, %lld last generation, %lld rafted, %lld out of ids; "
+           "%lld left to the next step\n",
+           (long long)totals->refused_size, (long long)totals->refused_generation, (long long)totals->refused_rafted,
+           (long long)totals->refused_reserve, (long long)totals->deferred);
 }
 
 void bt_summary_print(const bt_summary *summary, const bt_history *history, const bt_case *input,

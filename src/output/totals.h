@@ -12,11 +12,11 @@
 /// Parts of the wall time of a call: X(name, of what).
 #define BT_CALL_PARTS(X)                                                                                               \
     X(program, "the start of the program, its libraries, and the case or checkpoint read")                             \
-    X(ice, "making or reading the ice, the lead in it, and its way to all ranks")                                      \
+    X(ice, "making or reading the ice, the lead in it, and its distribution to all ranks")                             \
     X(world, "bodies, velocities at the start, the check that nothing overlaps, the first cells")                      \
     X(record, "the folder and the result file, with the bodies in it")                                                 \
     X(steps, "the steps, with frames and checkpoints: phases_s has them all")                                          \
-    X(end, "the last look at the state, the numbers of the whole run, the files closed")
+    X(end, "the final check of the state, the summary, and closing the files")
 
 /// Wall time of the call by parts, s.
 typedef struct bt_call {

@@ -23,7 +23,7 @@
 #include <stdlib.h>
 
 /// Limit of the factor on f1 in ice so dense that the front would run away; assumed.
-#define MOST_COMPACTION 10.0
+#define MAX_COMPACTION 10.0
 
 /// Add a piece of an edge within one row, 0 <= x <= nx.
 static void add_piece(double *row, int nx, double xa, double xb, double dy)
@@ -232,8 +232,8 @@ void bt_route_ice_terms(const bt_route_ice *ice, const bt_route_task *task, int6
     for (int a = 0; a < BT_ROUTE_TERMS; a++) term[a] = 0;
     const double unit = (1 + task->added_mass) * v * v, cover = ice->mean[BT_ICE_COVER][k];
     const double near = unit * (ice->mean[BT_ICE_MASS][k] + ice->mean[BT_ICE_FLOES][k] / task->width);
-    const double packed = cover < task->jam_cover ? bt_min(MOST_COMPACTION, 1 / (1 - cover / task->jam_cover))
-                                                  : MOST_COMPACTION;
+    const double packed = cover < task->jam_cover ? bt_min(MAX_COMPACTION, 1 / (1 - cover / task->jam_cover))
+                                                  : MAX_COMPACTION;
     double most = isfinite(task->rafting) && cover > 0 ? task->rafting * ice->mean[BT_ICE_RAFT][k] / cover : INFINITY;
     most -= term[1] = bt_min(unit * ice->field[BT_ICE_MASS][k], most);
     most -= term[2] = bt_min(near * (packed - 1), most);

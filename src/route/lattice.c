@@ -23,7 +23,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST_HEADINGS = 32, MOST_MOVES = 7 };
+enum { MAX_HEADINGS = 32, MAX_MOVES = 7 };
 #define UNITS 1e5 ///< units of cost in the least cost of a spacing
 #define THERE 0.75 ///< largest distance of a goal node from the goal, spacings
 #define UNREACHED INT32_MAX
@@ -46,10 +46,10 @@ struct bt_lattice {
     double h, ax, ay;
     int i0, j0, nx, ny, n_headings, per_place;
     double step;             ///< largest angle between neighbouring headings, rad
-    int vector[MOST_HEADINGS][2];
-    double unit[MOST_HEADINGS][2];
-    move of[MOST_HEADINGS][MOST_MOVES];
-    int n_moves[MOST_HEADINGS];
+    int vector[MAX_HEADINGS][2];
+    double unit[MAX_HEADINGS][2];
+    move of[MAX_HEADINGS][MAX_MOVES];
+    int n_moves[MAX_HEADINGS];
     double per_step;         ///< least length of a move / its steps, m (steps_of)
     int fine, pad, wide, high; ///< q = h/fine; slices beside the lattice; slices along x and y
     float *across;           ///< [high][wide][n_headings/2][n_speeds] mean load of a slice, N: one cache line a place

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_STATES 1.5e6 ///< of a lattice with the spacing chosen here
-#define MOST_CELLS 3e6  ///< times speeds, of a raster with the cells chosen here
+#define MAX_STATES 1.5e6 ///< of a lattice with the spacing chosen here
+#define MAX_CELLS 3e6  ///< times speeds, of a raster with the cells chosen here
 #define REPELS 1.3      ///< factor of the cost near routes already found; then its square, and so on
 enum { TRIES = 4, ARRIVALS = 40, ROUNDS = 4, SWEEPS = 12 };
 
@@ -524,9 +524,9 @@ static bt_lattice *lattice_of(bt_planner *planner)
     }
     if (!isnan(task->start_heading)) bt_sincos(task->start_heading, &ay, &ax);
     else if (far > 0) ax = x / far, ay = y / far;
-    if (!(h > 0)) h = bt_max(task->width / 4, sqrt(area * task->headings / MOST_STATES));
+    if (!(h > 0)) h = bt_max(task->width / 4, sqrt(area * task->headings / MAX_STATES));
     if (far > h) h = far / ceil(far / h - 1e-9);
-    if (!(cell > 0)) cell = bt_max(task->width / 8, sqrt(area * task->n_speeds / MOST_CELLS));
+    if (!(cell > 0)) cell = bt_max(task->width / 8, sqrt(area * task->n_speeds / MAX_CELLS));
     return bt_lattice_make(planner, ax, ay, h, h / ceil(h / cell - 1e-9));
 }
 

@@ -59,14 +59,15 @@ static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status stat
 {
     entry->settled = true;
     if (bt_member_record_failure(entry->folder, status, why, NULL) != BT_OK &&
-        ensemble->lost++ < BT_MOST_REPORTED)
+        ensemble->lost++ < BT_MAX_REPORTED)
         bt_errors_add(ensemble->err,
                       "member %s failed (%d): %s; this could not be recorded, so the next call tries it again",
                       entry->m.name, (int)status, why->n ? why->text[0] : "no reason given");
 }
 
-/// May this group run suspects? A suspect that ends the program would also end another member run beside it, at every
-/// call, until both are given up. So suspects are run one at a time, when nothing else is left to begin.
+/// May this group run suspects: members whose process has died before? A suspect that ends the program would also end
+/// another member run beside it, at every call, until both are given up. So suspects are run one at a time, when
+/// nothing else is left to begin.
 static bool may_take_suspects(bt_ensemble *ensemble)
 {
     if (ensemble->alone >= 0) return true;

@@ -72,12 +72,13 @@ static const struct {
     {"/members/id", "1", "number of the member in the study, from 1", offsetof(table, id)},
     {"/members/condition", "1", "which condition of the study, from 0", offsetof(table, condition)},
     {"/members/repeat", "1", "which field of the condition, from 0", offsetof(table, repeat)},
-    {"/members/seed", "1", "seed of its field", offsetof(table, seed)},
+    {"/members/seed", "1", "seed of the member's field", offsetof(table, seed)},
     {"/members/status", "1", "0 waiting, 1 finished, 2 failed", offsetof(table, status)},
     {"/members/name", NULL, "folder of the member", offsetof(table, name)},
-    {"/members/state_hash", NULL, "hash of the state at its end", offsetof(table, hash)},
-    {"/members/reason", NULL, "why it failed, died or is not sound", offsetof(table, reason)},
-    {"/members/hole", NULL, "failed, no_solution, died, unsound or unreadable", offsetof(table, hole)},
+    {"/members/state_hash", NULL, "hash of the state at the end of the run", offsetof(table, hash)},
+    {"/members/reason", NULL, "why the member failed, died or is not sound", offsetof(table, reason)},
+    {"/members/hole", NULL,
+        "why the member has no numbers: failed, no_solution, died, unsound or unreadable", offsetof(table, hole)},
 };
 enum { N_COLUMNS = sizeof columns / sizeof *columns };
 
@@ -239,7 +240,7 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
         bt_h5_put(h5, "/events/subject", H5T_NATIVE_INT64, n, 0, subject, "event", "1",
                   "which branch (line_broken) or way-point (waypoint), from 1");
         bt_h5_put(h5, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value, "event", NULL,
-                  "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)");
+                  "tension N (line_broken), speed of the body m/s (adrift), distance along the path m (waypoint)");
     }
     void *arrays[] = {member, time, value, subject, kind};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);

@@ -185,7 +185,7 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
 
 static void print_warnings(bt_errors *list)
 {
-    const size_t more = list->n > BT_MOST_REPORTED ? list->n - BT_MOST_REPORTED : 0;
+    const size_t more = list->n > BT_MAX_REPORTED ? list->n - BT_MAX_REPORTED : 0;
     for (size_t k = 0; k < list->n - more; k++) bt_errors_warn("%s", list->text[k]);
     if (more) bt_errors_warn("warning: and %zu more members that are not sound; see journal.jsonl", more);
 }
@@ -346,16 +346,16 @@ static bt_status tell_member(bt_ensemble *ensemble, const bt_entry *entry, count
                                                          &damage)
                                 : BT_OK;
     if (sound != BT_OK) {
-        if (n->unsound++ < BT_MOST_REPORTED)
+        if (n->unsound++ < BT_MAX_REPORTED)
             bt_errors_add(err, "member %s is not sound: %s; %s", entry->m.name, damage.text[0],
-                          sound == BT_ERR_IO ? "correct that, and call again" : "the same call runs it again");
+                          sound == BT_ERR_IO ? "correct that, and call again" : "repeat the command to run it again");
         status = BT_ERR_IO;
     } else if (state == BT_MEMBER_FINISHED) {
         n->finished++;
         if (bt_checkpoint_there(entry->folder)) bt_checkpoint_remove(entry->folder); // killed before its removal
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
-        if (n->failed++ < BT_MOST_REPORTED)
+        if (n->failed++ < BT_MAX_REPORTED)
             bt_errors_add(err, "member %s failed (%d): %s%s", entry->m.name, code, why ? why : "no reason recorded",
                           code == BT_ERR_IO ? "; the next call tries it again" : "");
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
@@ -396,23 +396,25 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
         const bt_status of = tell_member(ensemble, &ensemble->list[i], &n, err);
         if (worst == BT_OK) worst = of;
     }
-    if (n.failed > BT_MOST_REPORTED)
+    if (n.failed > BT_MAX_REPORTED)
         bt_errors_add(err, "and %" PRId64 " more failed member%s; see %s/members/*/failed.txt",
-                      n.failed - BT_MOST_REPORTED, bt_plural(n.failed - BT_MOST_REPORTED), ensemble->o->dir);
-    if (n.unsound > BT_MOST_REPORTED)
-        bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MOST_REPORTED,
-                      bt_plural(n.unsound - BT_MOST_REPORTED));
+                      n.failed - BT_MAX_REPORTED, bt_plural(n.failed - BT_MAX_REPORTED), ensemble->o->dir);
+    if (n.unsound > BT_MAX_REPORTED)
+        bt_errors_add(err, "and %" PRId64 " more unsound member%s", n.unsound - BT_MAX_REPORTED,
+                      bt_plural(n.unsound - BT_MAX_REPORTED));
     if (status == BT_ERR_SIGNAL && n.left == 0) status = BT_OK; // it came after the last member
     if (status != BT_OK) worst = status;
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped; the same call continues with the %" PRId64 " remaining member%s", n.left,
+        bt_errors_add(err, "stopped; repeat the command to continue with the %" PRId64 " remaining member%s", n.left,
                       bt_plural(n.left));
     else if (n.at_work)
         bt_errors_add(err,
-                      "%" PRId64 " member%s still running in other processes; the same call takes in those that finish",
+                      "%" PRId64
+                          " member%s still running in other processes; repeat the command later to include their "
+                      "results",
                       n.at_work, bt_plural(n.at_work));
     else if (n.left && worst == BT_OK)
-        bt_errors_add(err, "%" PRId64 " member%s left; the same call runs the rest", n.left, bt_plural(n.left));
+        bt_errors_add(err, "%" PRId64 " member%s left; repeat the command to run the rest", n.left, bt_plural(n.left));
     if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
     if (!ensemble->o->quiet) {
         printf("%" PRId64 " member%s finished, %" PRId64 " failed, %" PRId64 " left", n.finished, bt_plural(n.finished),

@@ -34,7 +34,7 @@ void bt_member_forget_attempts(const char *folder);
 bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err);
 void bt_member_forget_failure(const char *folder);
 
-enum { BT_MOST_REPORTED = 10 }; ///< most failed members to report one by one
+enum { BT_MAX_REPORTED = 10 }; ///< most failed members to report one by one
 
 typedef struct bt_entry {
     bt_member m;

@@ -64,8 +64,9 @@ void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *
     bt_h5_put(h5, BT_PATH(group, "member"), H5T_NATIVE_INT64, (hsize_t)notes->n, 0, notes->member, axis, "1",
               "number of the member in the study, from 1");
     write_texts(h5, group, "code", axis, notes->n, (const char *const *)notes->code, what);
-    write_texts(h5, group, "text", axis, notes->n, (const char *const *)notes->text, "the same for readers");
-    write_texts(h5, group, "values", axis, notes->n, (const char *const *)notes->values, "values in it, as JSON");
+    write_texts(h5, group, "text", axis, notes->n, (const char *const *)notes->text, "message text");
+    write_texts(h5, group, "values", axis, notes->n, (const char *const *)notes->values,
+        "values in the message, as JSON");
 }
 
 void bt_member_notes_free(bt_member_notes *notes)
@@ -98,7 +99,7 @@ void bt_warning_codes_write(bt_h5 *h5)
 
 #define RECORD "finished"
 static const char *const files[] = {"summary.json", "result.h5", "case.resolved.yml"};
-enum { N_FILES = sizeof files / sizeof *files, MOST_TEXT = 1024 };
+enum { N_FILES = sizeof files / sizeof *files, MAX_TEXT = 1024 };
 _Static_assert((int)BT_DIGEST_TEXT == (int)BT_CHECKSUM_DIGEST, "the same digest");
 
 void bt_member_records_begin(bt_member_records *records, const bt_study *s, const char study[BT_DIGEST_TEXT])
@@ -132,16 +133,16 @@ static uint64_t stamp(const char *folder)
 }
 
 /// Make the record of the present files. Errors: BT_ERR_CASE, a file is missing; BT_ERR_IO.
-static bt_status make(const bt_member_records *records, const char *name, const char *folder, char text[MOST_TEXT],
+static bt_status make(const bt_member_records *records, const char *name, const char *folder, char text[MAX_TEXT],
                       bt_errors *err)
 {
-    int n = snprintf(text, MOST_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, records->study);
+    int n = snprintf(text, MAX_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, records->study);
     for (int k = 0; k < N_FILES; k++) {
         char digest[BT_CHECKSUM_DIGEST];
         int64_t bytes;
         const bt_status status = bt_checksum_digest_file(BT_PATH(folder, files[k]), digest, &bytes, err);
         if (status != BT_OK) return status;
-        n += snprintf(text + n, (size_t)(MOST_TEXT - n), "%s: %" PRId64 " bytes, xxh128 %s\n", files[k], bytes, digest);
+        n += snprintf(text + n, (size_t)(MAX_TEXT - n), "%s: %" PRId64 " bytes, xxh128 %s\n", files[k], bytes, digest);
     }
     return BT_OK;
 }
@@ -195,7 +196,7 @@ bool bt_member_is_whole(const char *folder, int64_t n_steps)
 bt_status bt_member_record_write(bt_member_records *records, int64_t m, const char *name, const char *folder,
                                  bt_errors *err)
 {
-    char text[MOST_TEXT];
+    char text[MAX_TEXT];
     bt_status status = bt_checksum_check(BT_PATH(folder, "result.h5"), BT_CHECKSUM_RESULT, NULL, err);
     if (status == BT_OK) status = check_summary(folder, err);
     if (status == BT_OK) status = make(records, name, folder, text, err);
@@ -243,12 +244,12 @@ bt_status bt_member_record_check(bt_member_records *records, int64_t m, const ch
     const uint64_t now = stamp(folder);
     if (now && records->seen[m] == now) return BT_OK;
     const char *path = BT_PATH(folder, RECORD);
-    char text[MOST_TEXT], digest[BT_CHECKSUM_DIGEST], *kept = NULL;
+    char text[MAX_TEXT], digest[BT_CHECKSUM_DIGEST], *kept = NULL;
     size_t size = 0;
     int64_t bytes;
     bt_errors why = {0};
     bt_status status = bt_checksum_digest_file(path, digest, &bytes, &why); // is there a readable record?
-    if (status == BT_OK) status = bt_file_read_to(path, "a record", MOST_TEXT, &kept, &size, &why);
+    if (status == BT_OK) status = bt_file_read_to(path, "a record", MAX_TEXT, &kept, &size, &why);
     if (status == BT_OK) status = make(records, name, folder, text, &why);
     if (status == BT_OK && (size != strlen(text) || memcmp(kept, text, size))) {
         report(folder, kept, text, &why);

@@ -138,7 +138,7 @@ bt_status bt_running_checkpoint(bt_running *running, const char *name, bt_errors
 
 static void check_table(const bt_table *table, const char *name, bt_snapshot *snap)
 {
-    bt_snapshot_want(snap, table->n <= BT_MOST_ROWS, name, -1, "has more rows than a table can have");
+    bt_snapshot_want(snap, table->n <= BT_MAX_ROWS, name, -1, "has more rows than a table can have");
     for (int64_t i = 0; i < table->n && !snap->faulty; i++)
         bt_snapshot_want(snap, bt_table_row_sound(table, i), name, i,
                          "is not later than the row before, or not a velocity");
@@ -177,7 +177,7 @@ bt_status bt_running_load_field(bt_field *field, bt_lead_stats *lead, bt_snapsho
 static void check_frames(const bt_running *running, bt_snapshot *snap)
 {
     const int64_t step = bt_snapshot_int(snap, "world/step"), first = bt_running_draws(running->c);
-    bt_snapshot_want(snap, running->frames >= first && running->frames <= BT_MOST_STEPS, "record/frames", -1,
+    bt_snapshot_want(snap, running->frames >= first && running->frames <= BT_MAX_STEPS, "record/frames", -1,
                      "is not a number of frames up to here");
     if (!first) {
         bt_snapshot_want(snap, running->frames_due == 1, "run/frames_due", -1, "is not that of a run without frames");
@@ -197,9 +197,9 @@ static void check_counters(const bt_running *running, bt_snapshot *snap)
     BT_WALL_PHASES(ADD)
 #undef ADD
     check_frames(running, snap);
-    bt_snapshot_want(snap, running->guard.in_a_row >= 0 && running->guard.in_a_row <= BT_MOST_STEPS,
+    bt_snapshot_want(snap, running->guard.in_a_row >= 0 && running->guard.in_a_row <= BT_MAX_STEPS,
                      "run/unconverged_in_a_row", -1, "is not a number of steps");
-    bt_snapshot_want(snap, running->guard.locked >= 0 && running->guard.locked <= BT_MOST_STEPS, "run/locked_steps", -1,
+    bt_snapshot_want(snap, running->guard.locked >= 0 && running->guard.locked <= BT_MAX_STEPS, "run/locked_steps", -1,
                      "is not a number of steps");
     bt_snapshot_want(snap, !(running->guard.energy < 0), "run/energy_limit", -1, "is not an energy");
     bt_snapshot_want(snap, isfinite(sum), "clock/phases", -1, "are not all finite");

@@ -221,7 +221,7 @@ static void add_floes_by_hand(const bt_case *input, bt_world *world, bt_roster *
         floe_def(input, n, v, floe->thickness, &def);
         bt_parts parts;
         if (!bt_outline_convex(n, v) && bt_outline_split(n, v, &parts)) def.parts = &parts;
-        def.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * roster->mean_size;
+        def.large = bt_shape_area_moments(n, v).radius > 0.5 * LARGE_RATIO * roster->mean_size;
         roster->thickness[bt_roster_row(roster, bt_world_add(world, &def))] = floe->thickness;
     }
     free(outline);

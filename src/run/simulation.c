@@ -152,10 +152,10 @@ static bt_status check_numbers(const bt_simulation_options *options, bt_errors *
     if (options->n_set < 0 || (options->n_set > 0 && !options->set))
         return bt_fail(err, BT_ERR_USAGE,
                        "n_set: %d is not a number of texts; give 0 with set NULL, or their number", options->n_set);
-    if (options->threads >= 0 && options->threads <= BT_MOST_THREADS) return BT_OK;
+    if (options->threads >= 0 && options->threads <= BT_MAX_THREADS) return BT_OK;
     return bt_fail(err, BT_ERR_USAGE,
                    "threads: %d are not available; give 1 to %d, or 0 for run.threads of the case or all cores",
-                   options->threads, BT_MOST_THREADS);
+                   options->threads, BT_MAX_THREADS);
 }
 
 /// Common end of create and resume.
@@ -185,7 +185,7 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
     bt_status status = check_numbers(options, &err);
     if (!options->dir) bt_errors_add(&err, "no folder to continue in; name the folder of the run in the options (dir)");
     else if (options->path || options->text || options->n_set > 0)
-        bt_errors_add(&err, "%s holds the case to continue; path, text and set are for another simulation",
+        bt_errors_add(&err, "%s already contains the case of this run; leave path, text and set empty when resuming",
                       options->dir);
     if (err.n > 0) status = BT_ERR_USAGE;
     else status = bt_resume_begin(&resume, bt_comm_world(), &sim->o, &err);
@@ -573,7 +573,7 @@ static char *limits_json(void)
     bt_json_number(&json, "window_drift", BT_STEADY_MATERIAL);
     bt_json_number(&json, "locking_body_widths", BT_ARCH_LOCKING);
     bt_json_number(&json, "map_farthest_m", BT_MAP_FARTHEST);
-    bt_json_int(&json, "threads", BT_MOST_THREADS);
+    bt_json_int(&json, "threads", BT_MAX_THREADS);
     bt_json_int(&json, "contact_columns", BT_CONTACT_COLUMNS);
     bt_json_string(&json, "map_local_crs", BT_MAP_LOCAL_NAME);
     bt_json_numbers(&json, "map_ice_free_deg", 2, (const double[]){BT_MAP_FREE_SOUTH, BT_MAP_FREE_NORTH});

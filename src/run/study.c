@@ -401,7 +401,7 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
     size_t size;
     bt_status status = BT_OK;
     if (access(path, F_OK) == 0)
-        status = bt_file_read_to(path, "a list of files", BT_MOST_TEXT_BYTES, &kept, &size, err);
+        status = bt_file_read_to(path, "a list of files", BT_MAX_TEXT_BYTES, &kept, &size, err);
     bt_text text;
     bt_text_begin(&text);
     fputs(kept ? kept : "", text.out);
@@ -421,8 +421,8 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         fprintf(text.out, "%s: %s", file->path, line);
         added++;
         if (old)
-            bt_errors_warn("warning: %s: nothing in %s records what it held when members were made with "
-                           "it; it is used as it is now", file->path, dir);
+            bt_errors_warn("warning: %s: %s has no digest of this file from when its members were run, so a "
+                           "later change cannot be detected; the present contents are used", file->path, dir);
     }
     char *now = bt_text_end(&text);
     if (status == BT_OK && added) status = bt_file_write(path, now, err);

@@ -96,10 +96,10 @@ void bt_study_read_list(const bt_study_reader *reader, const bt_node *list, int 
 {
     if (list->n == 0)
         bt_study_complain(reader, line, "%s: the list is empty; give at least one value", parameter->name);
-    if (list->n > BT_MOST_VALUES) { // each is compared with all previous ones
+    if (list->n > BT_MAX_VALUES) { // each is compared with all previous ones
         bt_study_complain(reader, line, "%s: %d values, more than the limit of %d; give fewer, or a "
                                         "range", parameter->name,
-                          list->n, BT_MOST_VALUES);
+                          list->n, BT_MAX_VALUES);
         return;
     }
     parameter->value = bt_alloc((size_t)list->n, sizeof *parameter->value);
@@ -268,7 +268,7 @@ void bt_study_read_range(const bt_study_reader *reader, const bt_node *map, int 
             good = good && read;
             bt_case_free(&scratch);
         } else if (!strcmp(map->key[i], "n")) {
-            bt_study_read_whole(reader, value, at, "n", 2, BT_MOST_VALUES, &n);
+            bt_study_read_whole(reader, value, at, "n", 2, BT_MAX_VALUES, &n);
         } else if (!strcmp(map->key[i], "scale")) {
             if (!bt_study_is_scalar(reader, value, at, "scale")) continue;
             parameter->logarithmic = !strcmp(value->text, "log");

@@ -13,7 +13,7 @@
 #include "partition/domain.h"
 
 #define GAIN 0.8        // factor below which ROUNDS rounds must bring the sum of squares
-#define MOST_CAP 0.98
+#define MAX_CAP 0.98
 #define NARROWER 1.25   // factor on the distance of the cap from 1, and on the length of a round
 #define WIDER 1.5
 #define LEAST_CAP 0.3   // below this: no momentum
@@ -22,7 +22,7 @@
 #define FAR 4           // tolerances: with a larger residual the iteration continues beyond the limit of work
 #define LEAST_LOWERED 0.5 // least factor on the update that ends a round
 #define LEAST_SWEEP 0.01 // share of the contacts that a sweep costs in itself, in the limit of work
-enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MORE = 2 };
+enum { ROUNDS = 3, MAX_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MAX_MORE = 2 };
 
 // Squares, in units where the squared tolerance is 2²⁰, have twelve digits from 10⁻⁷ times the tolerance on. The sum of
 // a cell is cut off at 2⁴⁵, some 6,000 times the tolerance, or lower in a field of so many cells that the total would
@@ -354,8 +354,8 @@ static void adapt(pace *a, const bt_problem *problem, double misfit)
     a->mark = misfit;
     if (first || (gained && a->cap == 1)) return;
     if (gained) {
-        a->cap = bt_min(MOST_CAP, 1 - (1 - a->cap) / NARROWER);
-        a->length = (int)bt_min(MOST_LENGTH, NARROWER * a->length);
+        a->cap = bt_min(MAX_CAP, 1 - (1 - a->cap) / NARROWER);
+        a->length = (int)bt_min(MAX_LENGTH, NARROWER * a->length);
         return;
     }
     a->length = problem->length;
@@ -432,7 +432,7 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
             settled = true;
         }
         if (spent(problem, work) < limit || bt_min(best, work->residual) <= FAR * problem->tolerance) continue;
-        if (problem->plain || !problem->keep || more++ == MOST_MORE) continue;
+        if (problem->plain || !problem->keep || more++ == MAX_MORE) continue;
         a = (pace){.cap = problem->cap, .mark = INFINITY, .length = problem->length};
         all = false;
         fast = spent(problem, work) + HARD * all_work, limit = fast + NO_MOMENTUM * all_work;

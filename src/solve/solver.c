@@ -382,7 +382,7 @@ static bool warm_start(bt_world *world)
 static void residual_of_more(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     bt_cell *cell = &world->cells->cell[k];
-    if (!cell->fresh) return;
+    if (!cell->just_detected) return;
     bt_solver_begin_cell(world, cell);
     bt_solver_residual_of_cell(world, k, context, totals);
     const bool same = bt_contacts_load(cell) == cell->load;

@@ -179,7 +179,7 @@ static void choose_cells(bt_world *world, double margin)
         most[4] = bt_max(most[4], bodies->radius[i]);
     }
     if (world->exchange) world->exchange->maxima(world, most, 8);
-    cells->reach = most[4];
+    cells->max_radius = most[4];
     cells->heaviest = most[5];
     cells->rebounds = most[6] > 0;
     cells->margin_max = bt_max(2 * bt_max(margin, bt_margin_for(world, most[7])), 0.25 * world->par.size);
@@ -187,7 +187,7 @@ static void choose_cells(bt_world *world, double margin)
     cells->x0 = world->par.x0 + (world->par.period_x > 0 ? 0 : world->drift_x);
     cells->y0 = world->par.y0 + (world->par.period_y > 0 ? 0 : world->drift_y);
     double side = bt_max((world->par.cell > 0 ? world->par.cell : CELL_DIAMETERS) * world->par.size,
-                         2 * cells->reach + cells->margin_max + 0.5 * world->par.size);
+                         2 * cells->max_radius + cells->margin_max + 0.5 * world->par.size);
     if (!(side > 0)) side = 1;
     for (;; side *= 2) { // a floe far out must not cost memory: larger cells, at most 4 per floe
         cells->side_x = side_along(side, world->par.period_x, &cells->wrap_x);
@@ -207,8 +207,8 @@ static void choose_cells(bt_world *world, double margin)
     }
     // In a direction that one cell spans there are no neighbours, and centroids may lie anywhere.
     double slack = INFINITY;
-    if (cells->wrap_x != 1) slack = bt_min(slack, cells->side_x - 2 * cells->reach - cells->margin_max);
-    if (cells->wrap_y != 1) slack = bt_min(slack, cells->side_y - 2 * cells->reach - cells->margin_max);
+    if (cells->wrap_x != 1) slack = bt_min(slack, cells->side_x - 2 * cells->max_radius - cells->margin_max);
+    if (cells->wrap_y != 1) slack = bt_min(slack, cells->side_y - 2 * cells->max_radius - cells->margin_max);
     cells->allowance = 0.5 * slack;
 }
 

@@ -101,11 +101,11 @@ typedef struct bt_cell {
     int32_t x, y;                   ///< coordinates
     bt_idx first, end;              ///< its bodies in storage
     bt_idx right, above, diagonal;  ///< cells +x, +y, +xy: index, −1 = none
-    bool own;                       ///< this rank solves its contacts and answers for its bodies (large ones: rank 0)
+    bool own;                       ///< this rank solves its contacts and counts its bodies (large ones: rank 0)
     bool border;                    ///< some body of its block is held by other ranks too
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are processed in this step
-    bool fresh;                     ///< visited by the last detection
+    bool just_detected;             ///< visited by the last detection
     uint64_t load;                  ///< bt_contacts_load before a repeated detection
     double margin;                  ///< m, of this step's detection
     bt_pair_search search;
@@ -149,7 +149,7 @@ typedef struct bt_cells {
     double x0, y0;                  ///< corner of cell (0, 0) m, moving with the water
     double side_x, side_y;          ///< m
     double allowance;               ///< largest distance of a centroid outside its cell, m
-    double reach;                   ///< largest radius of a floe in a cell, over all ranks, m
+    double max_radius;              ///< largest radius of a floe in a cell, over all ranks, m
     double heaviest;                ///< largest mass, kg
     bool rebounds;                  ///< some body has a restitution
     double margin_max;              ///< largest margin that these cells allow, m

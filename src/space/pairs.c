@@ -288,7 +288,7 @@ static size_t pairs_of_large(const bt_world *world, double clearance_small, doub
             if (near(&world->par, box, other, clearance_large)) append(world, scratch, &n, l, o, clearance_large);
         }
         if (bodies->motion[l] != BT_DYNAMIC) continue;
-        const bt_cell_range range = bt_pairs_range(world, l, clearance_small + ts->reach + ts->allowance);
+        const bt_cell_range range = bt_pairs_range(world, l, clearance_small + ts->max_radius + ts->allowance);
         for (int32_t y = range.y0; y <= range.y1; y++)
             for (int32_t x = range.x0; x <= range.x1; x++) {
                 const bt_idx k = bt_cells_at(ts, x, y);

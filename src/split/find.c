@@ -254,7 +254,7 @@ static double demand(const search *s, const bt_section *section, bt_split_mode *
     const double l = section->length, hl = s->floe->thickness * l, b = bt_min(section->width, l);
     const double strength = s->floe->factor * bt_split_strength(s->law, l, false);
     double worst = 0;
-    *mode = BT_SPLIT_FAR;
+    *mode = BT_SPLIT_BENT;
     for (int k = 0; k < 2; k++) {
         const bt_section_end *end = &section->at[k], *opposite = &section->at[1 - k];
         const double pair = 4 * end->opening / hl, share = bt_min(1, end->bearing / b);
@@ -262,7 +262,7 @@ static double demand(const search *s, const bt_section *section, bt_split_mode *
             (section->normal + (k ? 6 : -6) * section->moment / l - FAR_RELIEF * opposite->inertial) / hl - pair;
         double ratio = bt_max(0, rest) / strength;
         if (pair > 0) ratio += (pair + bt_min(0, rest)) / (s->floe->factor * bt_split_strength(s->law, l, true));
-        if (ratio > worst) worst = ratio, *mode = pair > 0 ? BT_SPLIT_NEAR : BT_SPLIT_FAR;
+        if (ratio > worst) worst = ratio, *mode = pair > 0 ? BT_SPLIT_OPENED : BT_SPLIT_BENT;
         const double burst = (BURST_HELD * (1 - share * sqrt(share)) * (end->thrust - end->inertial) +
                               BURST_FREE * (1 - share) * end->inertial) /
                              (s->floe->thickness * b * strength);

@@ -7,8 +7,8 @@
 
 /// Where the crack starts.
 typedef enum {
-    BT_SPLIT_NEAR = 1, ///< at a wedge that pushes it open
-    BT_SPLIT_FAR,      ///< at an edge under bending tension, mostly far from the load
+    BT_SPLIT_OPENED = 1, ///< at a wedge that pushes it open
+    BT_SPLIT_BENT,      ///< at an edge under bending tension, mostly far from the load
     BT_SPLIT_BURST,    ///< inside, across a force along the section
 } bt_split_mode;
 

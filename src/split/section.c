@@ -252,7 +252,7 @@ bool bt_split_cut(int n, const double *outline, double area, double polar, const
     const bt_chord back = {chord->b, chord->a};
     const int n_left = bt_chord_piece(n, outline, chord, left), n_right = bt_chord_piece(n, outline, &back, right);
     if (n_left < 3 || n_right < 3 || n_left > BT_MAX_VERTICES || n_right > BT_MAX_VERTICES) return false;
-    const bt_moments of_left = bt_shape_extent(n_left, left), of_right = bt_shape_extent(n_right, right);
+    const bt_moments of_left = bt_shape_area_moments(n_left, left), of_right = bt_shape_area_moments(n_right, right);
     const bool left_first = of_left.area >= of_right.area - EQUAL * area;
     const bt_moments *moments = left_first ? &of_left : &of_right;
     const double rest = area - moments->area;

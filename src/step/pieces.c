@@ -66,7 +66,7 @@ double bt_splitting_polar(const bt_world *world, bt_idx i)
     const bt_splitting *splitting = world->splitting;
     const bt_gid k = bodies->gid[i] - splitting->first;
     if (is_piece(splitting, bodies->gid[i])) return bt_splitting_birth(splitting, k)->polar[k % 2];
-    return bt_shape_extent(bt_body_corners(bodies, i), bodies->vertices + 2 * bodies->offset[i]).polar;
+    return bt_shape_area_moments(bt_body_corners(bodies, i), bodies->vertices + 2 * bodies->offset[i]).polar;
 }
 
 void bt_splitting_append(bt_splitting *splitting, const bt_split_record *record, const double *vertex)

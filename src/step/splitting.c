@@ -326,7 +326,7 @@ typedef struct {
     size_t n, n_vertices;
 } found_list;
 
-typedef enum { NONE, SPLITS, TOO_SMALL, TOO_OLD, RAFTED } verdict;
+typedef enum { NONE, SPLITS, TOO_SMALL, LAST_GENERATION, RAFTED } verdict;
 
 typedef struct {
     bt_idx floe;
@@ -358,7 +358,7 @@ static judged judge(const bt_world *world, bt_idx i, load_row *row, size_t n)
     if (load != few) free(load);
     if (splits) {
         out.verdict = rafted ? RAFTED : bt_splitting_generation(splitting, gid) >= splitting->generations
-                      ? TOO_OLD : SPLITS;
+                      ? LAST_GENERATION : SPLITS;
         if (out.verdict != SPLITS) out.best.refused_ratio = bt_max(out.best.refused_ratio, out.best.ratio);
     } else if (out.best.refused_ratio > 1) out.verdict = TOO_SMALL;
     return out;
@@ -456,7 +456,7 @@ static found_list of_all(const bt_world *world, found_list *mine)
 
 // --- the step --------------------------------------------------------------------------------------------------------
 
-enum { N_DEFERRED, N_TOO_SMALL, N_TOO_OLD, N_RAFTED, N_COUNTS };
+enum { N_DEFERRED, N_SIZE, N_GENERATION, N_RAFTED, N_COUNTS };
 
 /// This rank's floes that split under the loads of this solution. *most: largest ratio of a floe that cannot.
 static found_list find(bt_world *world, bt_sum count[N_COUNTS], double *most)
@@ -477,8 +477,8 @@ static found_list find(bt_world *world, bt_sum count[N_COUNTS], double *most)
             j->verdict = TOO_SMALL;
             *most = bt_max(*most, j->best.ratio);
         }
-        if (j->verdict == TOO_SMALL) bt_sum_add(&count[N_TOO_SMALL], 1);
-        if (j->verdict == TOO_OLD) bt_sum_add(&count[N_TOO_OLD], 1);
+        if (j->verdict == TOO_SMALL) bt_sum_add(&count[N_SIZE], 1);
+        if (j->verdict == LAST_GENERATION) bt_sum_add(&count[N_GENERATION], 1);
         if (j->verdict == RAFTED) bt_sum_add(&count[N_RAFTED], 1);
     }
     free(result);
@@ -527,10 +527,10 @@ bool bt_splitting_step(bt_world *world, int round)
         const int64_t left = (int64_t)found.n - no_id;
         bt_domain_reduce(world, &all);
         splitting->total.deferred += left;
-        splitting->total.no_id += no_id;
-        splitting->total.too_small += (int64_t)bt_sum_value(&all.sum[N_TOO_SMALL]);
-        splitting->total.too_old += (int64_t)bt_sum_value(&all.sum[N_TOO_OLD]);
-        splitting->total.rafted += (int64_t)bt_sum_value(&all.sum[N_RAFTED]);
+        splitting->total.refused_reserve += no_id;
+        splitting->total.refused_size += (int64_t)bt_sum_value(&all.sum[N_SIZE]);
+        splitting->total.refused_generation += (int64_t)bt_sum_value(&all.sum[N_GENERATION]);
+        splitting->total.refused_rafted += (int64_t)bt_sum_value(&all.sum[N_RAFTED]);
         splitting->total.largest_refused = bt_max(splitting->total.largest_refused, all.most);
     }
     free(found.row);

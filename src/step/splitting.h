@@ -52,10 +52,10 @@ typedef struct bt_split_totals {
     int64_t by_mode[BT_SPLIT_MODES];
     // how often a floe was not split; the same floe counts in every step
     int64_t deferred;           ///< waited for the next step
-    int64_t too_small;          ///< a piece would have been too small or too slender
-    int64_t too_old;            ///< of the last generation
-    int64_t no_id;              ///< no ids were left
-    int64_t rafted;             ///< lay over or under others
+    int64_t refused_size;       ///< a piece would have been too small or too slender
+    int64_t refused_generation; ///< of the last generation
+    int64_t refused_reserve;    ///< no ids were left
+    int64_t refused_rafted;     ///< lay over or under others
     int64_t unconverged;        ///< steps that did not converge and so split nothing
     int64_t steps;              ///< steps with a split
     double crack_length;        ///< m

@@ -302,7 +302,7 @@ void bt_world_step(bt_world *world)
     if (world->tow)
         memcpy(world->forces->towed_at, (const double[]){world->tow->travel_x, world->tow->travel_y},
                sizeof world->forces->towed_at);
-    bt_tow_lead(world);
+    bt_tow_prescribe(world);
     bt_exposure_begin(world); // of floes, only in some steps
     clock_phase(world, &st->phases.forces, &t0);
     solve_split(world); // U2

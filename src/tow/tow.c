@@ -330,7 +330,7 @@ static void follow_path(bt_tow *tow, double x, double y)
     tow->end_speed = moves ? far / tow->dt : 0;
 }
 
-void bt_tow_lead(bt_world *world)
+void bt_tow_prescribe(bt_world *world)
 {
     bt_tow *tow = world->tow;
     if (!tow || world->towed < 0) return;

@@ -132,7 +132,7 @@ static inline bool bt_tow_has_line(const bt_tow *tow)
 double bt_tow_speed(const bt_tow *tow, double time);
 
 /// At the start of a step, before the forces: set the speed of the programme, and the velocity of a prescribed body.
-void bt_tow_lead(bt_world *world);
+void bt_tow_prescribe(bt_world *world);
 
 /// At the start of a step, after the free velocities: move the end and set up the line rows.
 void bt_tow_begin(bt_world *world);

@@ -259,7 +259,7 @@ def test_a_study_that_is_cut_short_is_taken_as_far_as_it_is_a_fair_sample(tmp_pa
     assert (found["members"], found["conditions"], found["waiting"], found["left_out"]) == (30, 20, 9, 1)
     assert np.isfinite(found["mean_95"]).all()
     said = written(budget_text.content(plain(found | {"numerics": None})))
-    assert said.startswith("WARNING: 9 of 40 members are still to come") and "beyond the first gap 1 are done" in said
+    assert said.startswith("WARNING: 9 of 40 members are still to come") and "not used yet: 1 after" in said
     with pytest.raises(RunError, match="too few members for a budget: 0 conditions, needs 8"):
         budget.of_ensemble(Members(with_status(tmp_path / "b", lambda c, r: r == 0 and c >= 8)))
 
@@ -338,7 +338,7 @@ def test_a_failed_member_that_is_not_in_the_sample_takes_no_interval_from_it(tmp
     assert np.isfinite([*found["mean_95"], *found["fields"]["sd_95"]]).all()
     assert list(found["failed"]) == found["failed_beyond"] == ["c016-r001"]
     said = written(budget_text.content(plain(found | {"numerics": None})))
-    assert "c016-r001: it diverged). They lie beyond the first gap" in said and "no intervals" not in said
+    assert "c016-r001: it diverged). They lie after the first unfinished" in said and "no intervals" not in said
 
 
 def test_a_budget_knows_of_which_state_of_the_study_it_is(tmp_path):

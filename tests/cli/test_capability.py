@@ -123,10 +123,10 @@ def test_what_contradicts_the_bracket_is_reported():
         return capability.found_of(capability.Condition("case", "the case", np.nan, {}, tried(counts)))
     hole = {0.2: (6, 6), 0.3875: (2, 4), 0.575: (0, 4), 0.7625: (0, 4), 0.95: (6, 6)}
     one = found(hole)
-    assert not one["resolved"] and one["why"] == "perhaps not monotonic: at 0.575 0 of 4 make it"
+    assert not one["resolved"] and one["why"] == "perhaps not monotonic: at 0.575 0 of 4 succeed"
     assert np.isnan(one["estimate"])
-    assert found(hole | {0.575: (0, 6)})["why"] == "not monotonic: at 0.95 6 of 6 make it"
-    assert found({0.2: (6, 6), 0.575: (3, 4), 0.95: (6, 6)})["why"] == "every value of the range makes it"
+    assert found(hole | {0.575: (0, 6)})["why"] == "not monotonic: at 0.95 6 of 6 succeed"
+    assert found({0.2: (6, 6), 0.575: (3, 4), 0.95: (6, 6)})["why"] == "every value of the range passes"
     fine = found({0.2: (6, 6), 0.5: (6, 6), 0.54: (0, 6), 0.75: (0, 4), 0.95: (0, 6)})
     assert fine["resolved"] and fine["why"] == ""
 
@@ -459,7 +459,7 @@ def test_its_block_for_a_report(tmp_path):
     block = analysis.chapter("capability", answers.read("capability", tmp_path))
     said = written(block["parts"], True)
     assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in said
-    assert "| stood still | failed |" in said and "| 2 of 2 | – | 1 |" in said
+    assert "| stood still | failed runs |" in said and "| 2 of 2 | – | 1 |" in said
     assert "150 kN" in said and "4 runs failed" in said
     assert "WARNING" not in said  # of an earlier program: nothing tells
     hard |= {"body_widths": 31.2, "body_widths_needed": 77.0}

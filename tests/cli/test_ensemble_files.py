@@ -87,7 +87,7 @@ def test_a_folder_of_an_earlier_version_is_taken_and_it_is_said(tmp_path):
     before = len(journal(tmp_path))
     result = ensemble(tmp_path)
     assert result.returncode == DONE and len(journal(tmp_path)) == before
-    assert f"{tmp_path}/current.csv: nothing in all records what it held when members were made" in result.stderr
+    assert f"{tmp_path}/current.csv: all has no digest of this file from when its members were run" in result.stderr
     assert ensemble(tmp_path).stderr == ""
     write(tmp_path, current=0.02)
     assert refused(tmp_path, "current.csv")

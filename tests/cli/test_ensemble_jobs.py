@@ -120,7 +120,7 @@ def test_no_job_outlives_the_call(folder, number):
     call.send_signal(number)
     _, errors = call.communicate(timeout=60)
     if number == signal.SIGTERM:
-        assert call.returncode == SIGNAL and errors.count("the same call continues") == 1
+        assert call.returncode == SIGNAL and errors.count("repeat the command to continue") == 1
     while any(map(at_work, jobs)):
         assert time.monotonic() < end + 60
         time.sleep(0.05)

@@ -80,7 +80,7 @@ def test_so_many_steps_of_each_member_in_a_call(quiet, tmp_path, ranks):
                                  "80"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), capture_output=True,
                                 text=True, timeout=120)
         if k < 2:
-            assert result.returncode == SIGNAL and "12 members left; the same call runs the rest" in result.stderr
+            assert result.returncode == SIGNAL and "12 members left; repeat the command to" in result.stderr
             done = [json.loads(p.read_text())["n_steps"] for p in tmp_path.glob("all/members/*/summary.json")]
             assert done == [80 * (k + 1)] * 12
             assert not list(tmp_path.glob("all/members/*/finished"))
@@ -93,7 +93,7 @@ def test_a_limit_of_wall_time(tmp_path):
     """The member at hand stops with a checkpoint, and goes on from there."""
     prepare(tmp_path, STUDY | {"repeats": 1}, LONG)
     result = ensemble(tmp_path, "all", "--max-wall", "1")
-    assert result.returncode == SIGNAL and "the same call continues with the 4" in result.stderr
+    assert result.returncode == SIGNAL and "repeat the command to continue with the 4" in result.stderr
     steps = {p.parent.name: json.loads(p.read_text())["n_steps"] for p in tmp_path.glob("all/members/*/summary.json")}
     assert len(steps) == 1 and 0 < min(steps.values()) < 30000
     assert (tmp_path / "all/members" / next(iter(steps)) / "checkpoint.h5").exists()
@@ -110,7 +110,7 @@ def test_a_stop_of_an_ensemble(tmp_path):
     assert ensemble(tmp_path, "all", "--steps", 3).returncode == SIGNAL
     next(tmp_path.glob("all/members/*/")).joinpath("stop").touch()
     stopped = ensemble(tmp_path, "all")
-    assert stopped.returncode == SIGNAL and "the same call continues" in stopped.stderr
+    assert stopped.returncode == SIGNAL and "repeat the command to continue" in stopped.stderr
     assert "signal" not in stopped.stderr
     assert ensemble(tmp_path, "all").returncode == DONE
     late = ensemble(tmp_path, "all", "--max-wall", 0.001)

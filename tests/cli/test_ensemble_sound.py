@@ -202,7 +202,8 @@ def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
                                        env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
         time.sleep(0.5)
         interrupted.send_signal(signal.SIGINT)
-        assert "the same call continues" in interrupted.communicate(timeout=30)[1] and interrupted.returncode == SIGNAL
+        said = interrupted.communicate(timeout=30)[1]
+        assert "repeat the command to continue" in said and interrupted.returncode == SIGNAL
     out = waiting.communicate(timeout=60)[0]
     assert (waiting.returncode == DONE and "waiting for 1 member in other processes" in out
             and "4 members finished, 0 failed, 0 left" in out)
@@ -253,7 +254,7 @@ def test_damage_while_a_call_is_at_work(tmp_path):
     reported = child.communicate(timeout=60)[1]
     assert (child.returncode == IO
             and "member c002-r001 is not sound: all/members/c002-r001/result.h5: has changed since the member "
-            "finished; the same call runs it again" in reported)
+            "finished; repeat the command to run it again" in reported)
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert list(f["members/status"][()]) == [
             1, 0

@@ -266,7 +266,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
              "mean_tow_force_95": [None, None], "tension": [2e5, 3e5], "mean_tension": 2.5e5,
              "mean_tension_95": [None, None]}
     limit = {"label": "the case", "for": None, "makes_it": 0.5, "does_not": None, "estimate": None, "resolved": True,
-             "why": "every value of the range makes it", "runs": 5, "points": [point, point | {"value": 0.9}]}
+             "why": "every value of the range passes", "runs": 5, "points": [point, point | {"value": 0.9}]}
     rng = np.random.default_rng(1)
     budget = stat_budget.budget({"ice.friction": np.repeat(rng.random(30), 2)}, np.repeat(np.arange(30), 2),
                                 100 + rng.normal(size=60))
@@ -285,7 +285,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     cli.perform("report", folder, "-o", tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()
     at = [text.rindex(words) for words in ("take 20 m, or wider", "uniform from 0 to 1; a book",
-                                          "every value of the range makes it")]
+                                          "every value of the range passes")]
     assert at == sorted(at) and text.index("Assumptions") < at[0]
     assert text.count("<svg") >= 3 and str(tmp_path) not in text and "Not studied" not in text
     answered = text[:text.index("<h2>Limits of operation")]
@@ -294,7 +294,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
                         for key in ("ice.friction", "body.drag.water_form")]}
     assert report_ensemble.ranges({"budget": found["budget"]}, told) == {
         "ice.friction": ("uniform from 0 to 1", "a book"), "body.drag.water_form": ("0.1 to 0.5", "")}
-    for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on "
+    for words in ("every value of the range passes", "half of the tows no longer keep 0.300 m/s", "it depends on "
                   "width", sd):
         assert words in answered, words
 
@@ -348,12 +348,12 @@ def test_a_limit_that_is_not_resolved_is_not_stated_as_one():
             {"search": "ice.concentration", "unit": "", "for": "", "speed": 0.3, "share": 0.5, "conditions": [c],
              "doubt": doubt})]
     assert said(makes_it=0.5, does_not=0.6, estimate=0.55, resolved=True) == ["about 55.0 %"]
-    assert said(makes_it=0.95, estimate=0.78, resolved=True, why="every value of the range makes it") == \
-        ["every value of the range makes it"]
+    assert said(makes_it=0.95, estimate=0.78, resolved=True, why="every value of the range passes") == \
+        ["every value of the range passes"]
     assert said(makes_it=0.39, estimate=0.227, why="12 fields do not decide an end of the range") == \
         ["about 22.7 %; not resolved: 12 fields do not decide an end of the range"]
-    assert said(makes_it=0.2, does_not=0.9, why="not monotonic: at 0.5 0 of 6 make it", doubt="of another case") == \
-        ["between 20.0 % and 90.0 %; not resolved: not monotonic: at 0.5 0 of 6 make it (of another case)"]
+    assert said(makes_it=0.2, does_not=0.9, why="not monotonic: at 0.5 0 of 6 succeed", doubt="of another case") == \
+        ["between 20.0 % and 90.0 %; not resolved: not monotonic: at 0.5 0 of 6 succeed (of another case)"]
 
 
 @pytest.mark.slow

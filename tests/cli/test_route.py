@@ -530,8 +530,8 @@ def test_a_line_that_always_fails_is_none_to_compare_with():
     v = judged(failing, made_up("a", [20.0, 20] * 2))
     assert v["code"] == "better" and v["recommended"] == "a"
     said = text_route.answer({"verdict": v, "objective": "work", "routes": [{"name": "a", "label": "route 1"}]})
-    assert said == ("Take route 1: the straight line fails in all 2 members that judged, and route 1 in none; so few "
-                    "may be chance.")
+    assert said == ("Take route 1: the straight line fails in all 2 evaluation members, and route 1 in none; with "
+                    "so few members this may be chance.")
     assert judged(failing, made_up("a", [20.0, 20] * 2, missed=True, arrived=False))["recommended"] is None
 
 

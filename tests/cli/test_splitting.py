@@ -258,7 +258,8 @@ def test_a_report_counts_splits(split, tmp_path):
     with Run(split.dir) as folder:
         (value, words), = [row[1:] for row in quality(folder) if row[0] == "splits"]
     assert value == str(s["splits"]) and s["splits"] > 0
-    assert words.startswith(f"{s['near']} at a load, {s['far']} bent, {s['burst']} burst, in {s['steps']} steps; ")
+    assert words.startswith(f"{s['near']} opened at a contact, {s['far']} bent, {s['burst']} burst, in {s['steps']} "
+                            "steps; ")
     with Run(run(tmp_path / "none", TOW).dir) as folder:
         assert "splits" not in [row[0] for row in quality(folder)]
 

@@ -44,7 +44,7 @@ static const struct { const char *text; int64_t steps;
      "{current_x: 0.4}\nsolver: {max_sweeps: 20}\n",
      9},
 };
-enum { N_BASES = sizeof bases / sizeof *bases, EDIT = 12, STEPS = 3, MOST_ROWS = 200 };
+enum { N_BASES = sizeof bases / sizeof *bases, EDIT = 12, STEPS = 3, MAX_ROWS = 200 };
 
 typedef struct {
     bt_snapshot state;
@@ -191,7 +191,7 @@ static void edit(bt_snapshot *s, const uint8_t *e)
                     row);
         break;
     }
-    case ROWS: reshape(i, i->type, (int64_t)(bits % MOST_ROWS), i->width); break;
+    case ROWS: reshape(i, i->type, (int64_t)(bits % MAX_ROWS), i->width); break;
     case WIDTH: reshape(i, i->type, i->n, 1 + (int)(bits % 8)); break;
     case TYPE: reshape(i, (bt_item_type)(bits % BT_ITEM_TYPES), i->n, i->width); break;
     case GONE: // in place: the last one takes its name

@@ -33,11 +33,11 @@ WARM_UP = 0.1  # of the steps: first checkpoints, room of lists
 # Of the memory of a rank over the second half; the summary keeps 64 bytes of each step, 0.6 to 1 % here. Before that it
 # grows with the largest of the messages that carry floes to their new ranks: the C library keeps what they free (last
 # at step 7,654, 62 to 67 MB).
-MOST_GROWTH = 0.03
+MAX_GROWTH = 0.03
 # Of the time a step: other work on the machine changes it by half and comes and goes. What is sought grows with the
 # steps: a list that is searched each step and gets longer each step would make the last quarter several times the
 # first.
-MOST_DRIFT = 1.6
+MAX_DRIFT = 1.6
 
 
 @contextmanager
@@ -136,8 +136,8 @@ def test_memory_residual_and_time_stay(tmp_path):
         f"divisions {s['divisions']}, floes moved between ranks {s['moved_floes']}, renewed "
         f"{s['moving_window']['renewed']}"
     )
-    assert (growth < MOST_GROWTH).all()
+    assert (growth < MAX_GROWTH).all()
     # Rounding alone: sums of a thousand contacts, each to 1e-16 of what it exchanges.
     assert worst < 1e-10 and residual[-1] < 3 * residual.min() + 1e-15
     assert contacts.max() < 1.5 * contacts.min(), "the work is not stationary: the case tests nothing"
-    assert seconds[-1] < MOST_DRIFT * seconds[:-1].min()
+    assert seconds[-1] < MAX_DRIFT * seconds[:-1].min()

@@ -37,7 +37,7 @@ CASE = {
 # The summary keeps some 100 bytes of each step, and a resident set is a matter of the C library too.
 BYTES_A_STEP = 200
 ROUNDING = 1e-11   # of the momentum that a step exchanges: sums of some ten thousand contacts
-MOST_DRIFT = 1.6   # of the time a step: as tests/long/test_soak.py has it
+MAX_DRIFT = 1.6   # of the time a step: as tests/long/test_soak.py has it
 
 
 def at_step(log):
@@ -133,7 +133,7 @@ def test_a_week(tmp_path):
           f"{a['moving_window']['missed']} missed; unconverged {a['unconverged_steps']}; floes outside "
           f"{a['floes_outside']}; rafted {a['rafted_share_of_ice']}")
     assert growth < BYTES_A_STEP
-    assert seconds.max() < MOST_DRIFT * seconds.min()
+    assert seconds.max() < MAX_DRIFT * seconds.min()
     assert s["momentum_residual"].max() < ROUNDING
     assert np.allclose(np.diff(s["time"]), 20 * DT, rtol=1e-9) and len(s["time"]) == STEPS // 20
     for name in ("kinetic_energy", "contacts", "sweeps"):

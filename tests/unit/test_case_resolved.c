@@ -210,9 +210,9 @@ TEST(the_case_as_given_comes_back)
     }
     char *alone = bt_case_with_comments(resolved, NULL, NULL);
     assert_null(bt_case_given_in(alone));
-    char *large = calloc(1, BT_MOST_TEXT_BYTES + 1); // with which the text could not be read
+    char *large = calloc(1, BT_MAX_TEXT_BYTES + 1); // with which the text could not be read
     assert_non_null(large);
-    memset(large, '#', BT_MOST_TEXT_BYTES);
+    memset(large, '#', BT_MAX_TEXT_BYTES);
     char *without = bt_case_with_comments(resolved, NULL, large);
     assert_string_equal(without, alone);
     free(without);

@@ -449,7 +449,7 @@ TEST(floes_of_very_different_size)
         bt_world_add(w, &d);
     }
     check_contacts(w, 0.0625); // they overlap at random: only the pairs matter here
-    assert_true(w->cells->side_x > 2 * w->cells->reach && w->cells->reach > 3);
+    assert_true(w->cells->side_x > 2 * w->cells->max_radius && w->cells->max_radius > 3);
     // A margin beyond what the cells were made for makes larger ones.
     const double side = w->cells->side_x;
     check_contacts(w, 4);

@@ -22,8 +22,8 @@ typedef struct {
     size_t begin, end;
 } span;
 
-enum { MOST_SPANS = 4096 };
-static span written[MOST_SPANS]; // of the writes since somebody set the number to 0
+enum { MAX_SPANS = 4096 };
+static span written[MAX_SPANS]; // of the writes since somebody set the number to 0
 static int n_written;
 
 /// In place of the C library's: writes as it does, until the one at which the program is killed.
@@ -32,7 +32,7 @@ ssize_t pwrite(int fd, const void *data, size_t n, off_t at)
     if (writes_left == 0) _exit(9);
     if (writes_left > 0) writes_left--;
     if (n > most_at_once) n = most_at_once;
-    if (n_written < MOST_SPANS) written[n_written++] = (span){(size_t)at, (size_t)at + n};
+    if (n_written < MAX_SPANS) written[n_written++] = (span){(size_t)at, (size_t)at + n};
     return syscall(SYS_pwrite64, fd, data, n, at);
 }
 
@@ -269,9 +269,9 @@ static int kind_of(const plain_file *m, size_t i)
 }
 
 /// The runs of bytes that a flush should write, in their order. Returns their number.
-static int expected_runs(const plain_file *m, span out[MOST_SPANS])
+static int expected_runs(const plain_file *m, span out[MAX_SPANS])
 {
-    static span by_address[MOST_SPANS];
+    static span by_address[MAX_SPANS];
     int n = 0, k = 0;
     for (size_t i = 0; i < LENGTH; i++) {
         if (m->waits[i] == NONE) continue;
@@ -291,7 +291,7 @@ static int expected_runs(const plain_file *m, span out[MOST_SPANS])
 
 static void check_flush(H5FD_t *file, plain_file *m)
 {
-    static span wanted[MOST_SPANS];
+    static span wanted[MAX_SPANS];
     const int n = expected_runs(m, wanted);
     n_written = 0;
     assert_true(H5FDflush(file, H5P_DEFAULT, false) >= 0);

@@ -100,7 +100,7 @@ TEST(threads_of_the_environment_are_limited)
     const int before = omp_get_max_threads();
     setenv("OMP_NUM_THREADS", "given", 1); // libgomp has read it already
     omp_set_num_threads(5000000);
-    assert_int_equal(bt_run_threads(&bt_comm_alone, &input, 0), BT_MOST_THREADS);
+    assert_int_equal(bt_run_threads(&bt_comm_alone, &input, 0), BT_MAX_THREADS);
     omp_set_num_threads(3);
     assert_int_equal(bt_run_threads(&bt_comm_alone, &input, 0), 3);
     unsetenv("OMP_NUM_THREADS");

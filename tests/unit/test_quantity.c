@@ -25,8 +25,8 @@ TEST(what_will_not_do_is_refused)
         {{.name = "mute", .units = "N", .of_world = one}, "describe it in one sentence"},
         {{.name = "idle", .units = "N", .description = "a number of the test"}, "give it one of"},
         {{.name = "both", SOUND, .of_floe = one_each}, "give it one of"},
-        {{.name = "odd", SOUND, .keep = (bt_keep)9}, "none of its kinds"},
-        {{.name = "odd", SOUND, .role = (bt_role)-1}, "none of its kinds"},
+        {{.name = "odd", SOUND, .keep = (bt_keep)9}, "an unknown value"},
+        {{.name = "odd", SOUND, .role = (bt_role)-1}, "an unknown value"},
     };
     const int before = bt_n_series();
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {

@@ -127,7 +127,7 @@ TEST(test_opening_pair)
         force[i] = critical(&s, &load, 1, &law, &best);
         assert_near(force[i], bt_split_opening_load(&law, h, l), 1e-8);
         assert_near(force[i], 0.1875 * h * K * sqrt(l), 0.01);
-        assert_int_equal(best.mode, BT_SPLIT_NEAR);
+        assert_int_equal(best.mode, BT_SPLIT_OPENED);
         assert_near(best.length, l, 1e-12);
         assert_int_equal(best.chord.a.edge, 3); // the side x = -L/2, in its middle
         assert_int_equal(best.chord.b.edge, 1);
@@ -169,7 +169,7 @@ TEST(test_wedge)
         assert_near(force, r * bt_split_strength(&law, l, true) * h * l / (4 - 0.75 * r), 1e-8);
         assert_near(force, r * 0.75 / (4 - 0.75 * r) * h * K * sqrt(l), 0.01);
         assert_within(force / (h * K * sqrt(l)), want[i], i < 6 ? 0.006 : 0.06);
-        assert_int_equal(best.mode, BT_SPLIT_NEAR);
+        assert_int_equal(best.mode, BT_SPLIT_OPENED);
     }
     bt_split best;
     bt_floe_load load = push(-l / 2, 0, 1, 0);
@@ -235,7 +235,7 @@ TEST(test_three_point)
     const double force = critical(&s, load, 3, &law, &best);
     assert_near(force, bt_split_three_point_load(&law, h, l), 1e-8);
     assert_near(force, 1.4 * h * K * sqrt(l) / 1.5, 0.01);
-    assert_int_equal(best.mode, BT_SPLIT_FAR);
+    assert_int_equal(best.mode, BT_SPLIT_BENT);
     assert_near(best.length, l, 1e-12);
     load[0].length = 6; // an even pressure takes F w/8 of the bending
     const double wide = bt_split_strength(&law, l, false) * h * l / (1.5 - 0.75 * 6 / l);
@@ -253,7 +253,7 @@ TEST(test_strip)
     bt_floe_load load = push(-b / 2, -l / 2, 1, 0);
     const double strength = bt_split_strength(&law, b, false);
     assert_near(critical(&s, &load, 1, &law, &best), 27 * strength * h * b * b / (24 * l), 0.01);
-    assert_int_equal(best.mode, BT_SPLIT_FAR);
+    assert_int_equal(best.mode, BT_SPLIT_BENT);
     double p[2];
     bt_chord_place(f.n, f.v, best.chord.b, p);
     assert_within(p[0], -b / 2, 1e-9); // the crack begins on the side that is struck, away from the end
@@ -315,7 +315,7 @@ TEST(test_sides_agree)
     for (int trial = 0; trial < 2000; trial++) {
         const floe f = random_floe(&r, trial % 2);
         const bt_split_floe s = seen(&f, 1);
-        const bt_moments m = bt_shape_extent(f.n, f.v);
+        const bt_moments m = bt_shape_area_moments(f.n, f.v);
         bt_floe_load load[5];
         bt_edge_load on_edge[5];
         for (int k = 0; k < 5; k++) {
@@ -342,7 +342,7 @@ TEST(test_section_by_quadrature)
     for (int trial = 0; trial < 4; trial++) {
         const floe f = random_floe(&r, true);
         const bt_split_floe s = seen(&f, 1);
-        const bt_moments m = bt_shape_extent(f.n, f.v);
+        const bt_moments m = bt_shape_area_moments(f.n, f.v);
         bt_floe_load load[3];
         bt_edge_load on_edge[3];
         for (int k = 0; k < 3; k++) {
@@ -397,7 +397,7 @@ TEST(test_section_by_quadrature)
 /// Stress over strength of a section, written out once more.
 static double ratio_of(const bt_split_floe *s, const bt_load_case *w, const bt_split_law *law, const bt_chord *c)
 {
-    const bt_moments m = bt_shape_extent(s->n, s->outline);
+    const bt_moments m = bt_shape_area_moments(s->n, s->outline);
     const bt_section q = bt_section_of(s, m.area, m.polar, w, c, law->slop);
     const double l = q.length, b = fmin(m.area / l, l), weak = bt_split_strength(law, l, true),
                  strong = bt_split_strength(law, l, false);
@@ -482,7 +482,7 @@ TEST(test_same_from_all_sides)
         const int n = 1 + (int)(11 * bt_rng_uniform(&r));
         bt_floe_load load[12], other[12];
         for (int k = 0; k < n; k++) {
-            load[k] = random_load(&r, &f, 1e5 * bt_shape_extent(f.n, f.v).radius, k % 5);
+            load[k] = random_load(&r, &f, 1e5 * bt_shape_area_moments(f.n, f.v).radius, k % 5);
             load[k].point = k;
             load[k].collision = k % 4 == 3;
         }
@@ -536,7 +536,7 @@ TEST(test_froude)
     bt_rng r = bt_rng_start(5, BT_RNG_PLACE, 0);
     for (int trial = 0; trial < 100; trial++) {
         const floe f = random_floe(&r, trial % 2);
-        const double radius = bt_shape_extent(f.n, f.v).radius, scale = trial % 2 ? 4 : 1 / 37.;
+        const double radius = bt_shape_area_moments(f.n, f.v).radius, scale = trial % 2 ? 4 : 1 / 37.;
         bt_floe_load load[3], twin[3];
         floe g = f;
         for (int i = 0; i < 2 * f.n; i++) g.v[i] *= scale;
@@ -579,7 +579,7 @@ TEST(test_cuts)
     int cuts = 0, concave = 0;
     for (int trial = 0; cuts < 1000; trial++) {
         const floe f = random_floe(&r, trial % 2);
-        const bt_moments m = bt_shape_extent(f.n, f.v);
+        const bt_moments m = bt_shape_area_moments(f.n, f.v);
         const bt_floe_load at = random_load(&r, &f, 1, 0), to = random_load(&r, &f, 1, 0);
         const double slop = 1e-3 * m.radius;
         bt_chord c;
@@ -596,7 +596,7 @@ TEST(test_cuts)
         bt_chord_place(f.n, f.v, c.b, q);
         for (int k = 0; k < 2; k++) {
             // The moments are those of the outline that the piece has.
-            const bt_moments own = bt_shape_extent(piece[k].n, piece[k].outline);
+            const bt_moments own = bt_shape_area_moments(piece[k].n, piece[k].outline);
             const double share = m.area / piece[k].area;
             assert_near(own.area, piece[k].area, 1e-13 * share);
             assert_near(own.polar, piece[k].polar, 1e-12 * m.polar / piece[k].polar);
@@ -633,7 +633,7 @@ TEST(test_snap)
     for (int k = 0; k < 50; k++) {
         double v[12];
         for (int i = 0; i < 6; i++) v[2 * i] = cos(k + i * BT_PI / 3), v[2 * i + 1] = sin(k + i * BT_PI / 3);
-        const bt_moments m = bt_shape_extent(6, v);
+        const bt_moments m = bt_shape_area_moments(6, v);
         assert_true(bt_split_cut(6, v, m.area, m.polar, &(bt_chord){{k % 6, 0}, {(k + 3) % 6, 0}}, piece));
         assert_true(piece[0].left);
     }

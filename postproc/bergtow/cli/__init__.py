@@ -18,17 +18,17 @@ COMMANDS = {
                "write the report of the design tow force of a case or a study, as a page and as PDF"),
     "statistics": ("reporting.statistics",
                    "statistics of an ensemble: design force, loads, intervals, in tables and files"),
-    "converge": ("study.converge", "find out how a result depends on the computation: width, length, time step, "
-                 "tolerance, start"),
-    "budget": ("study.budget", "find out how much of the scatter comes from the fields, each assumed value, and the "
-               "computation"),
+    "converge": ("study.converge", "find out how a result depends on numerical settings: domain width and length, "
+                 "time step, tolerance, start-up"),
+    "budget": ("study.budget", "find out how much of the scatter comes from the fields, each assumed value, and "
+               "numerical error"),
     "capability": ("study.capability", "find out how fast a vessel can tow in given ice, and what ice stops it"),
     "route": ("routing.route",
               "plan the path and the speed of a tow through known ice, and verify them by simulated tows"),
     "outlines": ("maps.outlines",
                  "convert a map of the ice (outlines or an image of labels) into floes for ice.outlines"),
-    "export": ("maps.export", "write floes, tracks and loads of a run for the map: GeoPackage, GeoJSON, shapefile, "
-               "trajectories"),
+    "export": ("maps.export", "export floes, tracks and loads of a run to GIS formats: GeoPackage, GeoJSON, "
+               "shapefile, trajectories"),
     "contents": ("result.contents", "list the contents of the folder of a run"),
     "film": ("plot.film", "make a film of a run"),
     "plot-force": ("plot.force", "draw the forces of a run against time"),
@@ -37,7 +37,7 @@ COMMANDS = {
     "plot-resistance": ("plot.resistance", "draw the mean ice resistance of runs against the concentration, beside "
                         "the estimates"),
     "plot-chains": ("plot.chains", "draw the force chains of one step"),
-    "plot-ensemble": ("plot.ensemble", "draw the pictures of an ensemble that its study supports"),
+    "plot-ensemble": ("plot.ensemble", "plot an ensemble: every picture for which its study has the data"),
 }
 #: options whose value may begin with a minus sign: a western longitude or a negative label is not an option
 SIGNED = ("--centre", "--heading", "--water", "--unseen", "--footprint", "--from", "--to")

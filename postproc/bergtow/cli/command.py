@@ -80,8 +80,8 @@ def guarded(name, main):
         code = end.code
     sys.stdout.flush()
     if sys.stdout.lost and not code:
-        code = _say(name, "standard output: cannot be written; free some space, or keep the reading program running to "
-                    "the end; every file is written", IO)
+        code = _say(name, "standard output: cannot be written; free some disk space, or do not close the pipe early; "
+                    "every file is written", IO)
     if code:
         sys.exit(code)
 

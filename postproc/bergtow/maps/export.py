@@ -424,10 +424,12 @@ def options(p):
     p.add_argument("run", metavar="RUN", help="output folder of a run")
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="file to write: .gpkg, .geojson, "
                    ".shp, or trajectories of everything as .csv or .nc (CF-1.8)")
-    p.add_argument("--time", metavar="T", type=moment, help="floes and bodies at the frame nearest to T seconds, at "
-                   "the last one, or at all (default: last; all for trajectories)")
-    p.add_argument("--layer", choices=LAYERS, help="that alone (default: all in a .gpkg, floes in a .geojson or .shp)")
-    p.add_argument("--start", metavar="DATE", type=date, help="UTC at time zero, for a .nc: 2027-03-01T06:00 "
+    p.add_argument("--time", metavar="T", type=moment, help="write floes and bodies at the frame nearest to T "
+                                                            "seconds, at "
+                   "the last frame, or at all (default: last; all for trajectories)")
+    p.add_argument("--layer", choices=LAYERS, help="layer to write (default: all in a .gpkg, floes in a .geojson or "
+                                                   ".shp)")
+    p.add_argument("--start", metavar="DATE", type=date, help="UTC date at time zero, for a .nc: 2027-03-01T06:00 "
                    "(default: 1970, marked as assumed)")
     arguments.add_force(p)
 

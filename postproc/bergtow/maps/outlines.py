@@ -63,7 +63,7 @@ def corners(text):
 def options(p):
     p.add_argument("map", metavar="MAP", type=Path)
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="GeoJSON to write")
-    p.add_argument("--centre", metavar="LON,LAT", type=place, help="where the towed body is, x = y = 0: "
+    p.add_argument("--centre", metavar="LON,LAT", type=place, help="position of the towed body, x = y = 0: "
                    "degrees on WGS 84; east and north of a local map (default: the middle of the map)")
     p.add_argument("--heading", metavar="DEG", type=arguments.between(-360, 360), help="direction of x, clockwise from "
                    "north: metres for the basin's frame are written (default: degrees for the geographic frame, or "
@@ -72,9 +72,9 @@ def options(p):
                    "name that PROJ knows, or local: metres east and north without a place on the earth")
     p.add_argument("--layer", metavar="NAME",
                    help="layer to read, if there are several; the grid of a NetCDF or HDF5 file")
-    p.add_argument("--where", metavar="SQL", help="only features that meet this condition, e.g. \"kind = 'ice'\"")
-    p.add_argument("--thickness", metavar="COLUMN", help="the column with the thickness, m (default: thickness); of an "
-                   "image the thickness by label: 1=0.5,2=1.2")
+    p.add_argument("--where", metavar="SQL", help="read only features that meet this condition, e.g. \"kind = 'ice'\"")
+    p.add_argument("--thickness", metavar="COLUMN", help="column with the thickness, m (default: thickness); for an "
+                   "image, the thickness of each label: 1=0.5,2=1.2")
     p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that mark water "
                    "(default 0); each connected region of another label is a floe")
     p.add_argument("--nodata", choices=("water", "unseen"), help="meaning of an image's nodata (default: unseen; "
@@ -84,19 +84,21 @@ def options(p):
     p.add_argument("--footprint", metavar="X,Y,X,Y,...", type=corners, help="corners of the imaged area, as columns "
                    "and rows of the image from its upper left; the area around it was not seen")
     p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
-    p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
-    p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
-                   "about the centre, along x and y of the case")
+    p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, for an image without a "
+                                                                  "georeference")
+    p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="keep only floes whose middle lies in this "
+                   "rectangle about the centre, along x and y of the case")
     p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out floes that reach into this "
                    "circle about the centre, to make room for the towed body; the map may show the body itself")
-    p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
-    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="staircases along pixels: straightened "
-                   "within half a pixel (each floe keeps its area), or kept, apart from the tolerance")
+    p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="keep or drop floes cut by "
+                   "the edge of the image (default: keep)")
+    p.add_argument("--stairs", choices=("undo", "keep"), default="undo", help="undo staircases along "
+                   "pixels, within half a pixel (each floe keeps its area), or keep them, apart from the tolerance")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
                    "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
     p.add_argument("--least", metavar="AREA", type=arguments.not_below_zero,
                    help="smallest floe, m² (default: four pixels; 0)")
-    p.add_argument("--record", metavar="FILE", type=Path, help="write this report as JSON, too")
+    p.add_argument("--record", metavar="FILE", type=Path, help="also write the printed report as JSON")
     p.add_argument("--picture", metavar="FILE", type=Path,
                    help="draw the map and the resulting floes (.png, .pdf, .svg)")
     arguments.add_force(p)

@@ -26,7 +26,7 @@ from bergtow.maps import stairs as map_stairs
 from bergtow.result.hdf5 import first_line
 
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
-MOST_PIXELS = 400_000_000
+MAX_PIXELS = 400_000_000
 IMPLIED = ("OGC:1.3:CRS84", "OGC:CRS84", "EPSG:4326")  # crs of GeoJSON if nothing else is given [RFC 7946]
 #: columns of SIGRID-3 and of the national ice charts: kind of region, total concentration, stage and form, egg code
 CHART = {"POLY_TYPE", "PGON_TYPE", "CT", "E_CT", "N_CT", "SA", "E_SA", "FA", "E_FA", "ICECODE", "NIS_CLASS", "A_LEGEND"}
@@ -431,8 +431,8 @@ def from_image(path, source, how, name=None):
     if how.band is None and bands != 1 or not 1 <= (how.band or 1) <= bands:
         raise RunError(path, f"has {bands} bands, as pictures do; labels are one number a pixel",
                        "choose it with --band, or classify the image first")
-    if source.RasterXSize * source.RasterYSize > MOST_PIXELS:
-        raise RunError(path, f"has more than {MOST_PIXELS} pixels", "cut it, or make it coarser (gdal_translate)")
+    if source.RasterXSize * source.RasterYSize > MAX_PIXELS:
+        raise RunError(path, f"has more than {MAX_PIXELS} pixels", "cut it, or make it coarser (gdal_translate)")
     band = source.GetRasterBand(how.band or 1)
     try:
         labels, nodata = band.ReadAsArray(), band.GetNoDataValue()

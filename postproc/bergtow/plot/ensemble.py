@@ -21,7 +21,7 @@ from bergtow.errors import RunError
 from bergtow.plot import style
 from bergtow.plot import variants as plot_variants
 from bergtow.plot.axes import axis_label, headline, numeric, wants_log
-from bergtow.plot.loads import MOST_LINES, draw_above, draw_exceedance, draw_returns
+from bergtow.plot.loads import MAX_LINES, draw_above, draw_exceedance, draw_returns
 from bergtow.plot.sweep import draw_scatter, draw_sweep
 from bergtow.result.members import Members, reading, short_key
 from bergtow.said import say
@@ -153,7 +153,7 @@ def pictures(e, options, conditions):
         out.append(("sensitivity", lambda: draw_sensitivity(e, sensitivity(e, {int(m): member(e, m) for m in e.used}))))
     if plot_variants.KEY in e.parameters and not e.sampled:
         out.append(("variants", lambda: plot_variants.draw(e, headline)))
-    if not e.sampled or len(e.conditions()) <= MOST_LINES:
+    if not e.sampled or len(e.conditions()) <= MAX_LINES:
         tails = {c["index"]: c["extremes"].get("over_threshold") for c in conditions if "extremes" in c}
         out.append(("exceedance", lambda: draw_exceedance(e, options, tails)))
     return out
@@ -161,9 +161,9 @@ def pictures(e, options, conditions):
 
 def options(p):
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
-    p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to put the pictures (default: DIR)")
+    p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="folder for the pictures (default: DIR)")
     p.add_argument("--format", choices=[s[1:] for s in writing.PICTURES], default="png",
-                   help="kind of the files (default png)")
+                   help="file format (default png)")
     loads.add_options(p)
     arguments.add_force(p)
 

@@ -9,13 +9,13 @@ from bergtow.table import counted
 import numpy as np
 import scipy
 
-MOST_LINES = 8
+MAX_LINES = 8
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#8c6bb1", "#b8860b", "#56b4e9", "#4d4d4d", "#cc79a7")
 
 
 def every(some):
     """One in how many of these conditions is shown."""
-    return max(1, -(-len(some) // MOST_LINES))
+    return max(1, -(-len(some) // MAX_LINES))
 
 
 def finished(e, axes, notes, some, subject):

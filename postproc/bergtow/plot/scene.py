@@ -154,9 +154,9 @@ def framed(run, window):
 
 def add_options(p):
     p.add_argument("--colour", "--color", choices=COLOURS, default="speed",
-                   help="what colours the floes (default: speed)")
+                   help="quantity that colours the floes (default: speed)")
     p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
-                   help="the whole domain, or a window that moves with the body (default: auto, the body in long "
+                   help="draw the whole domain, or a window that moves with the body (default: auto, the body in long "
                    "domains)")
 
 

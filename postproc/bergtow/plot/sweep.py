@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 import scipy
 
-MOST_PANELS = 6
+MAX_PANELS = 6
 
 
 def groups(e, key):
@@ -160,7 +160,7 @@ def draw_sweep(e, key):
     """Figure of the resistance against one parameter of a grid."""
     panels = groups(e, key)
     panels = [(words, some) for words, some in panels if len(some) > 1] or panels
-    shown = panels[:MOST_PANELS]
+    shown = panels[:MAX_PANELS]
     columns = 2 if len(shown) == 4 else min(3, len(shown))
     rows = -(-len(shown) // columns)
     values = np.array([c.values[key] for _, some in shown for c in some])
@@ -205,7 +205,7 @@ def draw_sweep(e, key):
             axes.tick_params(labelbottom=True)
     pairs = fields_legend(e) + [(handle, label) for label, handle in extra.items()]
     note = " ".join(
-        ([f"{len(panels) - MOST_PANELS} further combinations are not shown."] if len(panels) > MOST_PANELS else []) +
+        ([f"{len(panels) - MAX_PANELS} further combinations are not shown."] if len(panels) > MAX_PANELS else []) +
         (["Estimates at the speed made good, dotted outside the range they are meant for."]
          if key == "ice.concentration" else []) +
         ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +

@@ -49,7 +49,7 @@ import numpy as np
 import yaml
 
 BUDGET = 14.0                # min
-MOST_FIELDS = 40
+MAX_FIELDS = 40
 RESERVE = 30.0, 10.0         # s of the budget for writing the report, and for the statistics of each condition
 MARGIN = 0.95                # share of the remaining time that is given to fields
 FIRST = 2                    # fields that measure the time per field: they keep two cores busy
@@ -208,8 +208,8 @@ def run_case(work, a, case):
     whole_round = work.ensemble(write_study(a, case, n, wider))
     if not whole_round and fields_settled(a.output) < 1:
         raise RunError(a.file, f"{a.budget:g} min are not enough for one field of each condition",
-                       f"raise --budget to {math.ceil(2 * a.budget)}; finished work is kept, and the same call "
-                       "continues", SIGNAL)
+                       f"raise --budget to {math.ceil(2 * a.budget)} and repeat the command; finished work "
+                       "is kept", SIGNAL)
     e = Members(a.output)
     conditions = len(e.conditions())
     def took(fields):  # s per member, including overheads
@@ -382,51 +382,52 @@ def speeds(text):
 def options(p):
     p.set_defaults(by_speed={}, varied={})
     p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
-    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call continues "
-                   "where an earlier one ended")
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="result folder (default: out/design-NAME); "
+                   "repeating the command continues where an earlier call ended")
     p.add_argument("--budget", type=minutes, metavar="MIN",
                    help=f"total wall time, min (default: {BUDGET:g} for a case, none for a study)")
     p.add_argument("--concentrations", type=several(concentration), metavar="A,...",
-                   help="of a case (default: its own)")
-    p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="of a case: tow speeds beside its own, "
+                   help="ice concentrations, given a case (default: its own)")
+    p.add_argument("--speeds", type=speeds, metavar="V,...", default=[], help="tow speeds beside that of a given case, "
                    "\"0.8 kn,1.3 kn\", or FROM:TO:N")
-    p.add_argument("--thicknesses", type=several(measure("m")), metavar="H,...", default=[], help="of a case: "
-                   "thicknesses of the ice beside its own, \"0.8 m,1.6 m\"")
+    p.add_argument("--thicknesses", type=several(measure("m")), metavar="H,...", default=[], help="thicknesses of "
+                   "the ice beside that of a given case, \"0.8 m,1.6 m\"")
     p.add_argument("--winds", type=several(from_zero("m/s")), metavar="V,...", default=[],
-                   help="of a case: winds from ahead beside its own, \"10 m/s,20 m/s\"")
+                   help="winds from ahead beside that of a given case, \"10 m/s,20 m/s\"")
     p.add_argument("--vessel", metavar="NAME", help="vessel to check: class of the library, or bollard pull, \"110 t\"")
     p.add_argument("--line", metavar="NAME", help="line of the library, or breaking load, \"3.5 MN\"")
-    p.add_argument("--line-length", type=measure("m"), metavar="M", help="its length, for snap loads (default: that "
-                   "of the case)")
+    p.add_argument("--line-length", type=measure("m"), metavar="M", help="line length, for snap loads (default: "
+                   "that of the case)")
     p.add_argument("--line-factor", type=factor, metavar="X", help="safety factor of the line (default: none is "
                    "applied)")
     p.add_argument("--efficiency", type=measure("%", lambda x: 0 < x <= 1, "not above 0 and up to 100 %"),
                    default=1.0, metavar="X", help="share of the bollard pull available to the vessel in the "
                    "weather (default: 1)")
     for kind in ("vessels", "lines"):
-        p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of {kind} of your own, beside the library")
-    p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="of a case: ranges of the assumed values, as the "
-                   "parameters of a study (default: a few with their sources)")
+        p.add_argument(f"--{kind}", metavar="FILE", type=Path, help=f"CSV of your own {kind}, beside the library")
+    p.add_argument("--ranges", metavar="STUDY.yml", type=Path, help="ranges of the assumed values, given a case, as "
+                   "the parameters of a study (default: a few with their sources)")
     p.add_argument("--head-current", type=from_zero("m/s"), metavar="V",
-                   help="against the tow, in the load case with head current and wind (default: "
+                   help="current against the tow in the load case with head current and wind (default: "
                    f"{load_cases.HEAD_CURRENT:g} m/s, assumed, and then not in the design value)")
-    p.add_argument("--head-wind", type=from_zero("m/s"), metavar="V", help="the same for the wind (default: "
-                   f"{load_cases.HEAD_WIND:g} m/s)")
+    p.add_argument("--head-wind", type=from_zero("m/s"), metavar="V", help="wind against the tow in that load "
+                   f"case (default: {load_cases.HEAD_WIND:g} m/s)")
     p.add_argument("--bend", type=measure("rad", lambda x: BENDS[0] <= abs(x) <= BENDS[1], "not from 1 to "
                                           "150 degrees, to either side"),
                    default=math.radians(answer.BEND), metavar="DEG", help="angle of the course change, degrees "
                    f"(default: {answer.BEND:g}, assumed)")
-    p.add_argument("--bend-radius", type=measure("m"), metavar="M", help="its radius (default: ten body widths, "
-                   "assumed)")
-    p.add_argument("--no-load-cases", action="store_true", help="no runs of load cases and ranges: closed forms only")
+    p.add_argument("--bend-radius", type=measure("m"), metavar="M", help="radius of the course change (default: "
+                   "ten body widths, assumed)")
+    p.add_argument("--no-load-cases", action="store_true", help="make no runs of load cases and ranges: use closed "
+                   "forms only")
     domain_width.add_option(p)
-    p.add_argument("--fields", type=at_least_one, default=MOST_FIELDS, metavar="N",
-                   help="of a case: largest number for each condition (default: %(default)s)")
+    p.add_argument("--fields", type=at_least_one, default=MAX_FIELDS, metavar="N",
+                   help="most ice fields per condition, given a case (default: %(default)s)")
     p.add_argument("--seed", type=at_least_one, default=1, metavar="N",
-                   help="of a case: seed of its fields (default: 1)")
-    p.add_argument("--title", metavar="TEXT", help="of a case: title of the report")
-    p.add_argument("--no-pdf", action="store_true", help="the page alone")
-    p.add_argument("--no-replay", action="store_true", help="no replay of a tow")
+                   help="seed of the fields, given a case (default: 1)")
+    p.add_argument("--title", metavar="TEXT", help="title of the report, given a case")
+    p.add_argument("--no-pdf", action="store_true", help="write the page only")
+    p.add_argument("--no-replay", action="store_true", help="leave out the replay of a tow")
     p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
                    help="take results of converge, budget and capability from this folder into the report; may be "
                    "repeated")

@@ -26,7 +26,7 @@ import jinja2
 PAGE = Path(__file__).resolve().parent / "page"
 #: columns of members.csv
 MEMBER = "name", "condition", "seed", "status", "mean_ice_resistance_n", "low_95_n", "high_95_n", "doubts"
-MOST_OF_TITLE = 80  #: characters in the running head
+MAX_TITLE = 80  #: characters in the running head
 
 
 def templates():
@@ -67,7 +67,7 @@ def quoted(text):
 
 def head_of_pages(title, right):
     """The running head and foot of the printed page."""
-    left = title if len(title) <= MOST_OF_TITLE else title[:MOST_OF_TITLE - 1].rstrip() + "…"
+    left = title if len(title) <= MAX_TITLE else title[:MAX_TITLE - 1].rstrip() + "…"
     box = 'font: 7.6pt "DejaVu Sans", Verdana, sans-serif; color: #5a6672; vertical-align: bottom; padding-bottom: 4mm;'
     foot = box.replace("bottom; padding-bottom", "top; padding-top")
     return (f"@page {{ @top-left {{ content: {quoted(left)}; width: 75%; text-align: left; {box} }}\n"
@@ -108,8 +108,8 @@ def options(p):
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block, in place of report.{name} of the "
                        "case")
     p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
-                   help="of an ensemble: take results of converge and other commands from this folder too; may be "
-                   "repeated")
+                   help="take results of converge and other commands from this folder into the report of an "
+                   "ensemble; may be repeated")
 
 
 def perform(a):

@@ -36,7 +36,7 @@ KEY_VALUES = {
         "impact.duration", "impact.pressure"
     ],
 }
-MOST_EVENTS = 40  #: rows in the table; a tow may have thousands of waypoints
+MAX_EVENTS = 40  #: rows in the table; a tow may have thousands of waypoints
 UNSET = {"body.mass": "0 kg"}  #: values that mean "derived from other keys"
 
 
@@ -270,9 +270,9 @@ def quality(run):
                  f"{style.short(n('splitting.piece_size_m'))} m; " if n("splitting.splits") else "")
         rows.append((
             "splits", f"{n('splitting.splits'):.0f}",
-            f"{at:.0f} at a load, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks of "
-            f"{style.short(n('splitting.crack_length_m'))} m; {sizes}times kept whole by size {small:.0f}, by "
-            f"generation {old:.0f}"
+            f"{at:.0f} opened at a contact, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks of "
+            f"{style.short(n('splitting.crack_length_m'))} m; {sizes}times not split: {small:.0f} because a piece "
+            f"would have been too small or slender, {old:.0f} in the last generation"
         ))
     if n("stalled_s", 0):
         rows.append(("body stood still", f"{style.short(n('stalled_s'))} s", "while the tow asked for motion"))
@@ -282,7 +282,7 @@ def quality(run):
 def events(run):
     """(rows of events, their total number)."""
     units = {"line_broken": "N", "adrift": "m/s", "waypoint": "m"}
-    some = sorted(run.events, key=lambda e: e["kind"] == "waypoint")[:MOST_EVENTS]  # a broken line comes before corners
+    some = sorted(run.events, key=lambda e: e["kind"] == "waypoint")[:MAX_EVENTS]  # a broken line comes before corners
     rows = [(f"{e['time_s']:g} s", e["kind"].replace("_", " "), str(e["subject"]),
              f"{style.short(e['value'])} {units.get(e['kind'], '')}".strip() if e["value"] is not None else "")
             for e in sorted(some, key=lambda e: e["time_s"])]

@@ -70,10 +70,10 @@ def write(s, folder, force):
 def options(p):
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
     p.add_argument("-o", "--output", metavar="FOLDER", type=Path,
-                   help="where to write statistics.csv and .json (default: DIR)")
+                   help="folder for statistics.csv and statistics.json (default: DIR)")
     p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
     p.add_argument("--error", type=above_zero, metavar="E",
-                   help="relative error of the mean, from which the needed number of fields follows (default "
+                   help="relative error of the mean for which to give the needed number of fields (default "
                         "%(default)s)")
     p.add_argument("--hours", type=above_zero, nargs="+", metavar="T",
                    help="return times of loads and peaks, hours of tow (default 1 10 100)")
@@ -83,11 +83,11 @@ def options(p):
     p.add_argument("--gap", type=not_below_zero, metavar="S",
                    help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
     p.add_argument("--blocks", type=at_least_one, metavar="K",
-                   help="blocks a field for block maxima (default: so many that there are 20)")
+                   help="blocks per field for block maxima (default: so many that there are 20 in all)")
     p.add_argument("--resamples", type=at_least_one, metavar="B",
                    help="resamples for p-values and return levels (default %(default)s)")
     p.add_argument("--partial", action="store_true",
-                   help="exit with 0 even if some members of the study enter no statistics")
+                   help="exit with 0 even if the statistics leave out some members of the study")
     arguments.add_force(p)
     p.set_defaults(**conditions.DEFAULTS | {"exclude": []})
 

@@ -28,7 +28,7 @@ UNREACHED = {"goal_drifts_away": "the goal drifts away from the ice faster than 
              "no_route": "the turns do not fit where the goal then is; give a smaller radius",
              "outside": "the way leaves the domain, which moves with the ice; raise the speed"}
 FAULTS = {1: "no_go", 2: "outside", 4: "force_limit", 8: "turns"}
-MOST_STATES, MOST_CELLS = 20e6, 20e6  # about 1 GB
+MAX_STATES, MAX_CELLS = 20e6, 20e6  # about 1 GB
 Points = Union[np.ndarray, Sequence[Sequence[float]]]
 
 
@@ -207,7 +207,7 @@ class _Task:
         t.drift[:], t.water[:] = _place("drift", drift), _place("water", water)
         t.start_heading = math.nan if start_heading is None else _number("start heading", start_heading, -math.inf)
         t.goal_heading = math.nan if goal_heading is None else _number("goal heading", goal_heading, -math.inf)
-        for name, value, most in ("spacing", spacing, MOST_STATES / headings), ("cell", cell, MOST_CELLS):
+        for name, value, most in ("spacing", spacing, MAX_STATES / headings), ("cell", cell, MAX_CELLS):
             least = math.sqrt((x1 - x0) * (y1 - y0) / most)
             setattr(t, name, 0 if value is None else _number(name, value, least))
 

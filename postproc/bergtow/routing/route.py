@@ -75,7 +75,7 @@ def options(p):
     p.add_argument("--no-go", action="append", default=[], type=Path, metavar="FILE", help="polygons of no-go areas "
                    "(GeoJSON, ...): land, shoals, zones; may be repeated. Fixed floes of the case are no-go areas, too")
     p.add_argument("--clearance", type=from_zero("m"), metavar="M", default=0.0,
-                   help="distance to keep from them (default 0 m)")
+                   help="distance to keep from no-go areas (default 0 m)")
     p.add_argument("--objective", choices=tuple(words.UNITS), default="work",
                    help="quantity to minimise (default work)")
     p.add_argument("--speeds", type=several(measure("m/s")), metavar="V,V",
@@ -87,31 +87,32 @@ def options(p):
     p.add_argument("--members", type=whole_from(1, 1000), default=MEMBERS, metavar="N", help="members of the map that "
                    f"every route is towed through (default {MEMBERS}; a map without errors has one)")
     p.add_argument("--map-error", type=from_zero("m"), metavar="M",
-                   help=f"of a floe's position, standard deviation (default {POSITION:g} widths of the body, assumed)")
+                   help=f"standard deviation of floe positions (default {POSITION:g} widths of the body, assumed)")
     p.add_argument("--thickness-error", type=not_below_zero, default=THICKNESS, metavar="S",
-                   help="of the thickness, standard deviation over the thickness (default %(default)g, assumed)")
+                   help="standard deviation / mean of the floe thickness (default %(default)g, assumed)")
     p.add_argument("--drift-error", type=from_zero("m/s"), metavar="V",
-                   help=f"of each component of the drift, standard deviation (default {DRIFT:g} of the speed, assumed)")
+                   help=f"standard deviation of each component of the drift (default {DRIFT:g} of the speed, assumed)")
     p.add_argument("--calibrate", type=whole_from(0, 1000), default=0, metavar="N", help="fit the cost to N straight "
                    "swaths towed through the map first, at least 6 (default 0: none)")
     p.add_argument("--replan", type=measure("s"), metavar="S",
-                   help="look at the ice again after every S of the tow and plan the rest")
+                   help="map the ice again after every S of the tow, and plan the rest anew")
     p.add_argument("--map-age", type=from_zero("s"), metavar="S", default=0.0,
-                   help="age of the map at each look of --replan (default 0 s)")
+                   help="age of each new map of --replan (default 0 s)")
     p.add_argument("--width", type=measure("m"), metavar="M",
-                   help="of the body across its path (default: the mean over its headings)")
+                   help="width of the body across its path (default: the mean over its headings)")
     p.add_argument("--radius", type=from_zero("m"), metavar="M",
                    help=f"least radius of the body's path (default: the length of the line, or {LENGTHS:g} times the "
                    f"body's mass over its water drag at 1 m/s; without a line {RADIUS:g} widths)")
-    p.add_argument("--headings", type=int, choices=(16, 32), default=32, help="of the lattice (default 32)")
+    p.add_argument("--headings", type=int, choices=(16, 32), default=32, 
+                   help="number of headings of the search lattice (default 32)")
     p.add_argument("--cell", type=measure("m"), metavar="M",
-                   help="of the raster of costs (default: an eighth of the width, or more)")
-    p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="of a radian of turning, in "
-                   "the unit of the objective (default 0)")
-    p.add_argument("--plan-only", action="store_true", help="plan, and tow nothing")
+                   help="cell size of the cost raster (default: an eighth of the width, or more)")
+    p.add_argument("--turn-cost", type=not_below_zero, default=0.0, metavar="C", help="cost of one radian of "
+                   "turning, in the unit of the objective (default 0)")
+    p.add_argument("--plan-only", action="store_true", help="plan without simulating tows")
     p.add_argument("--no-page", action="store_true", help="leave out route.html, the page with the replays")
-    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/route-CASE; tows are kept there, and "
-                   "the same call continues")
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="result folder (default: out/route-CASE); tows are "
+                   "kept there, and repeating the command continues")
     analysis.add_options(p, BUDGET)
 
 
@@ -119,7 +120,7 @@ def refuse_looks(w, s):
     """Reject options and cases that --replan does not support. Raises RunError."""
     if s.mode == "thrust":
         raise RunError("--replan", "the vessel of tow.mode thrust steers for a point ahead on its path, so that a new "
-                       "path would change its tow before the look", "set tow.mode to speed or line", USAGE)
+                       "path would change its tow before the new map", "set tow.mode to speed or line", USAGE)
     if len(w["speeds"]) > 1:
         raise RunError("--replan", "plans the path at one speed", "give --speeds one speed", USAGE)
     if w["age"] > w["replan"]:

@@ -17,7 +17,7 @@ from bergtow.table import scale, short
 
 import numpy as np
 
-MOST_SAMPLES = 300  # of a condition's series, to which distributions are fitted
+MAX_SAMPLES = 300  # of a condition's series, to which distributions are fitted
 
 
 #: the options of statistics(): the defaults of bergtow statistics
@@ -41,7 +41,7 @@ def member(e, m):
 
 def samples(e, rows, members):
     """Samples of the steady windows of a condition: (all of them; number of independent ones; every 2 tau-th above
-    zero, at most MOST_SAMPLES).
+    zero, at most MAX_SAMPLES).
 
     All fields are thinned equally, by the median of their tau. Thinning each field by its own tau would give it the
     weight 1/tau, and almost all weight to a field without contact, whose tau is that of a constant.
@@ -52,7 +52,7 @@ def samples(e, rows, members):
     stride = max(1, int(np.ceil(2 * np.median(taus)))) if taus else 1
     thinned = np.concatenate([x[::stride] for x in every]) if every else np.zeros(0)
     above = thinned[thinned > 0]
-    step = max(1, int(np.ceil(len(above) / MOST_SAMPLES)))
+    step = max(1, int(np.ceil(len(above) / MAX_SAMPLES)))
     return np.concatenate(every) if every else np.zeros(0), len(thinned), above[::step]
 
 

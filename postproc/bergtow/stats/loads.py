@@ -194,8 +194,8 @@ def _design(found, hours, total):
         level = found[kind].get("levels", [{"level": np.nan}])[-1]
         if np.isfinite(level["level"]):
             if np.isinf(level["level_95"][1]):
-                return {"refused": "the sample does not know the tail: the interval of its level has no upper bound; "
-                                   "run more fields", "return_hours": hours, "unbounded": True}
+                return {"refused": "the sample does not determine the tail: the interval of its level has no upper "
+                                   "bound; run more fields", "return_hours": hours, "unbounded": True}
             return {"value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,
                     "times_the_hours_simulated": hours / total, "beyond_data": bool(hours > total),
                     "shape": found[kind]["shape"], "irregular": found[kind]["irregular"]}

@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 
 FEW = 6              # a parameter with at most this many distinct values is a choice among levels
-MOST_DEGREE = 10
+MAX_DEGREE = 10
 LEAST_SAMPLES = 20
 PER_TERM = 2         # samples per term of the expansion
 LEAST_Q2 = 0.3
@@ -143,7 +143,7 @@ def sobol(parameters, y, resamples=RESAMPLES):
     if np.ptp(y) == 0:
         return {"refused": "the response does not vary"}
     columns, best = [scores(parameters[k]) for k in names], None
-    for degree in range(1, MOST_DEGREE + 1):
+    for degree in range(1, MAX_DEGREE + 1):
         a, terms = _design(columns, degree)
         if n < PER_TERM * a.shape[1]:
             break

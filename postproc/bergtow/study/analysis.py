@@ -25,7 +25,7 @@ KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty bud
 def add_options(p, minutes):
     """Add --budget, --set, --jobs, --force."""
     p.add_argument("--budget", type=arguments.minutes, default=minutes, metavar="MIN",
-                   help=f"wall time, min (default {minutes:g}); the same call continues")
+                   help=f"wall time, min (default {minutes:g}); repeat the command to continue")
     add_runs(p)
 
 
@@ -33,7 +33,7 @@ def add_runs(p):
     """Add --set, --jobs, --force."""
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=arguments.at_least_one, default=len(os.sched_getaffinity(0)), metavar="N",
-                   help="runs at a time (default: the cores)")
+                   help="runs at a time (default: the number of cores)")
     arguments.add_force(p)
 
 

@@ -184,11 +184,12 @@ def read_converge(path, folder):
 def options(p):
     p.add_argument("study", metavar="STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
-    p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a "
-                   "quantile of a load in %%, 100 for the largest value of a tow, as the moving mean over its time "
-                   f"scale; may be repeated (default: {', '.join(OF)})")
-    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for the part of the "
-                   "computation")
+    p.add_argument("--of", action="append", metavar="NUMBER", help="quantity to study: a key of the summary, or "
+                   "LOAD:SHARE for a quantile in %% of the moving mean of a load over its time scale, 100 for the "
+                   "largest "
+                   f"value of a tow; may be repeated (default: {', '.join(OF)})")
+    p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for the part of "
+                   "numerical error")
     analysis.add_options(p, BUDGET)
 
 

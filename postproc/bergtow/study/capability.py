@@ -170,7 +170,7 @@ class Search:
             good = int(some[-1].made)
             point.good, point.bad = point.good + good, point.bad + 1 - good
         if self.say:
-            print(f"\r{c.label}, {self.key} {value:.4g}: {point.good} of {point.n} make it\x1b[K", end="",
+            print(f"\r{c.label}, {self.key} {value:.4g}: {point.good} of {point.n} succeed\x1b[K", end="",
                   file=self.say, flush=True)
         if len(failed) >= FAILING:
             point.spent = True
@@ -231,7 +231,7 @@ def contradiction(s):
         return ""
     p = max(against, key=lambda p: s.judged(p.value) != bracket.OPEN)
     words = "not monotonic" if s.judged(p.value) != bracket.OPEN else "perhaps not monotonic"
-    return f"{words}: at {p.value:.4g} {p.good} of {p.n} make it"
+    return f"{words}: at {p.value:.4g} {p.good} of {p.n} succeed"
 
 
 def failures(s):
@@ -247,11 +247,11 @@ def found_of(c):
     yes, no = s.ends()
     why, sure = c.why or contradiction(s), False
     if not why and yes is not None and no is not None and abs(no - yes) > s.resolution * (1 + 1e-6):
-        why = failures(s) or f"between them near {100 * s.share:g} % make it, and {s.most} fields do not decide"
+        why = failures(s) or f"between them near {100 * s.share:g} % succeed, and {s.most} fields do not decide"
     elif not why and (yes is None or no is None):
         sure = all(s.judged(v) != bracket.OPEN for v in (s.start, s.end))
         why = (failures(s) or f"{s.most} fields do not decide an end of the range" if not sure else
-               "every value of the range makes it" if no is None else "no value of the range makes it")
+               "every value of the range passes" if no is None else "no value of the range passes")
     return {"label": c.label, "for": c.number, "makes_it": yes, "does_not": no,
             "estimate": np.nan if s.against() else s.estimate(), "resolved": sure or not why, "why": why,
             "runs": sum(len(t) for t in c.trials.values()) + sum(len(f) for f in c.failed.values()),
@@ -316,24 +316,26 @@ share = measure("%", lambda x: 0.05 <= x <= 0.95, "not from 0.05 to 0.95")
 
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
-    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/capability-CASE; runs are kept "
-                   "there, and the same call reuses those of the same case file and program")
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="result folder (default: out/capability-CASE); "
+                   "runs are kept there and reused for the same case file and program")
     p.add_argument("--search", default="ice.concentration", metavar="KEY", help="key along which the limit is searched "
                    "(default ice.concentration)")
-    p.add_argument("--from", dest="start", metavar="V", help="one end of its range (ice.concentration: 0.2)")
-    p.add_argument("--to", dest="end", metavar="V", help="the other end (ice.concentration: 0.95)")
+    p.add_argument("--from", dest="start", metavar="V", help="one end of the range of --search (default for "
+                   "ice.concentration: 0.2)")
+    p.add_argument("--to", dest="end", metavar="V", help="the other end of that range (default for "
+                   "ice.concentration: 0.95)")
     p.add_argument("--resolution", metavar="V", help="width of the bracket at which the search ends (default: "
                    f"1/{PARTS} of the range)")
     p.add_argument("--for", dest="conditions", metavar="KEY=V,V", help="search under each of these values")
     p.add_argument("--speed", type=measure("m/s"), metavar="V",
                    help=f"speed that a tow must keep (default: {STOPPED:g} of its tow.speed)")
-    p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
+    p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that succeed at the limit "
                    "(default 0.5)")
-    p.add_argument("--fields", type=whole_from(1, 1000), metavar="N", help="fields of a value, at most (default: "
-                   f"{FIELDS * bracket.least_trials()}; more where --share takes more to be decided)")
+    p.add_argument("--fields", type=whole_from(1, 1000), metavar="N", help="most ice fields per value (default: "
+                   f"{FIELDS * bracket.least_trials()}; more if a decision at --share needs more)")
     p.add_argument("--points", type=whole_from(0, 100), default=POINTS, metavar="N",
-                   help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
-                   "search alone)")
+                   help=f"values of the curve, with at least {CURVE} fields each (default {POINTS}; 0: only those of "
+                   "the search)")
     domain_width.add_option(p)
     analysis.add_options(p, BUDGET)
 
@@ -411,6 +413,7 @@ def perform(a):
              "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid, "conditions": [found_of(c) for c in some]}
     if not any(any(c.trials.values()) for c in some):
         runs.tell_failed()
-        raise RunError(folder, "the budget is not enough for a run", "raise --budget; the same call continues", SIGNAL)
+        raise RunError(folder, "the budget is not enough for a run", "raise --budget and repeat the command to "
+                                                                     "continue", SIGNAL)
     analysis.keep("capability", found, folder, a.force)
     runs.tell_failed()

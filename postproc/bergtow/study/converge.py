@@ -342,7 +342,7 @@ def converge(study, names, margin, tries=TRIES):
     """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget is not enough for {FIELDS[0]} runs of the case",
-                       "raise --budget; runs are kept, and the same call continues them", SIGNAL)
+                       "raise --budget and repeat the command; its runs are kept", SIGNAL)
     rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         try:
@@ -367,14 +367,14 @@ def names_of(text):
 
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
-    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/converge-CASE; runs are kept there, "
-                   "and the same call reuses those of the same case file and program")
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="result folder (default: out/converge-CASE); runs "
+                   "are kept there and reused for the same case file and program")
     p.add_argument("--vary", type=names_of, default=list(NAMES), metavar="NAME,...",
-                   help=f"some of {', '.join(NAMES)} (default: all)")
+                   help=f"settings to vary, of {', '.join(NAMES)} (default: all)")
     p.add_argument("--margin", type=above_zero, default=MARGIN, metavar="M",
-                   help="relative effect that does not matter (default 0.1)")
+                   help="relative change of the mean that is negligible (default 0.1)")
     p.add_argument("--tries", type=whole_from(1, 5), default=TRIES, metavar="K",
-                   help="values of a quantity after each other, where the first change matters (default 3)")
+                   help="successive values to try of a setting whose first change is not negligible (default 3)")
     analysis.add_options(p, BUDGET)
 
 

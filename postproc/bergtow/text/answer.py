@@ -121,7 +121,7 @@ def _largest(v, a):
 
 def _covers(v, a):
     why = {"no_tail": "There are too few peaks for a tail",
-           "unbounded_tail": "These fields do not know the tail, whose interval has no upper bound"}[v["reason"]]
+           "unbounded_tail": "These fields do not determine the tail: its interval has no upper bound"}[v["reason"]]
     return (f"{why}: the largest of {v['n_tows']} steady tows of "
             f"{short(60 * v['hours_each'], 2)} min is {force(v['n'])}; with 95 % confidence at least "
             f"{percent(v['share_below'])} of such tows stay below it, whatever the distribution, and a tow of "
@@ -307,10 +307,10 @@ def plan(p):
 
 def took(a):
     c = a["cost"]
-    rows = [["wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
-            ["of it fields", f"{short(c['fields_s'] / 60, 2)} min"],
-            ["of it statistics", f"{short(c['statistics_s'] / 60, 2)} min"],
-            ["of it load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
+    rows = [["total wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
+            ["fields", f"{short(c['fields_s'] / 60, 2)} min"],
+            ["statistics", f"{short(c['statistics_s'] / 60, 2)} min"],
+            ["load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
     return [Table(["what", "took"], rows)]
 
 

@@ -104,15 +104,15 @@ def warnings(found):
         beyond = found.get("left_out")
         out.append(f"{left} of {wanted} members are still to come: this uses the first {found['conditions']} "
                    "conditions, which are a fair sample, and its intervals are wider than those of the whole study."
-                   + (f" Of those beyond the first gap {beyond} are done, and left out until it is closed: which they "
-                      "are depends on how long a tow takes." if beyond else ""))
+                   + (f" Complete but not used yet: {beyond} after the first unfinished condition. Which of those "
+                      "finish early depends on the run time, so they are not a random sample." if beyond else ""))
     if failed := found.get("failed"):
         name, why = next(iter(failed.items()))
         within = set(failed) - set(found.get("failed_beyond", []))
         out.append(f"{len(failed)} of {wanted} members failed ({listed(list(failed))}; {name}: {why}). " + (
             "The cause of their failure may be an effect that the budget is to measure: there are no "
             "intervals." if within else
-            "They lie beyond the first gap, and are not in this sample."))
+            "They lie after the first unfinished condition, and are not in this sample."))
     if lacking := found.get("without_number"):
         out.append(f"{len(lacking)} of {wanted} members have no such number ({listed(lacking)}): there are no "
                    "intervals.")
@@ -134,8 +134,8 @@ def content(found):
 
 
 def _content(found):
-    head = ["part", "standard deviation", "of the mean", "share of the variance", "Sobol, first order", "total",
-            "range and source"]
+    head = ["part", "standard deviation", "relative to the mean", "share of the variance", "Sobol, first order",
+            "total", "range and source"]
     return [*warnings(found), Table(head, rows(found)), [notes(found)]]
 
 
@@ -172,7 +172,7 @@ def figure(found):
     if names:
         right.legend(loc="lower right")
     else:
-        right.text(0.5, 0.5, "not shared out", transform=right.transAxes, ha="center", color=style.FAINT)
+        right.text(0.5, 0.5, "not attributed", transform=right.transAxes, ha="center", color=style.FAINT)
     for axes in (left, right):
         axes.set_xlim(left=0)
         axes.grid(True, axis="x")

@@ -22,7 +22,7 @@ def condition(found, c):
 
 
 def limits(found):
-    head = [found["for"] or "case", "makes it at", "does not at", "limit about", "runs", "verdict"]
+    head = [found["for"] or "case", "passes at", "fails at", "limit about", "runs", "verdict"]
     rows = []
     for c in found["conditions"]:
         verdict = ": ".join(w for w in ("resolved" if c["resolved"] else "not resolved", c["why"]) if w)
@@ -37,7 +37,7 @@ def least_of(values):
 
 
 def curve(found):
-    head = [found["for"] or "case", found["search"], "make it", "stood still", "failed", "line parted",
+    head = [found["for"] or "case", found["search"], "succeed", "stood still", "failed runs", "line parted",
             "speed, m/s (95 %)", "mean tow force", "largest tension: mean", "of all"]
     rows = []
     for c in found["conditions"]:
@@ -73,11 +73,11 @@ def meaning(found):
     if any(None in p["speed"] for c in found["conditions"] for p in c["points"]):
         more += (" Where nothing tows the body to the end of the window, a field has no speed and no tow force; its "
                  "tension, the largest of a step, the start included, is among the others.")
-    return (f"A tow makes it in a field if it keeps {kept(found)} along the ordered tow, on average "
+    return (f"A tow succeeds in a field if it keeps {kept(found)} along the ordered tow, on average "
             f"over the window (as far as it is ordered to be so fast there) and over the last quarter of that "
             f"time{line}. Stood still: tows that the ice held for a while. "
-            f"A value makes it if more than {100 * found['share']:g} % of all tows do, and does not if fewer do, each "
-            f"at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
+            f"A value passes if more than {100 * found['share']:g} % of all tows succeed, and fails if fewer do, each "
+            f"with 97.5 % confidence over all interim analyses together. {runs} runs in {found['spent_min']:.3g} of "
             f"{found['budget_min']:g} min; a grid of this resolution with {found['most_fields']} fields has "
             f"{found['grid_runs']}.{more}")
 

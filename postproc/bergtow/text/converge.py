@@ -67,9 +67,9 @@ def doubtful(found):
 
 
 def content(found):
-    head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
-    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together; error x: ratio of "
-            "its error to the error with other ice for each value. Effects below "
+    head = ["varied", "value", "quantity", "effect (95 %)", "fields", "verdict", "recommended"]
+    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} interim analyses together; error "
+            "x: ratio of its error to the error with other ice for each value. Effects below "
             f"{100 * found['margin']:g} % do not matter; an effect in the other fields may have gone unseen. "
             f"{found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return [*doubtful(found), Table(head, [cells(row) for row in found["rows"]]), [note]]

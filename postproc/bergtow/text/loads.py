@@ -12,7 +12,7 @@ from bergtow.table import Table, Warned, hours_text, marked, number, pair, quant
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 SHOWN = 5, 50, 95, 99  # quantiles in a table, %
-MOST_NAMED = 5  # conditions of a warning
+MAX_NAMED = 5  # conditions of a warning
 
 
 def _towed(s):
@@ -145,8 +145,8 @@ def sentence(text):
 def several(some):
     """Join a list of texts; of a long list only the first ones, since nobody reads a page of conditions. The most
     important come first."""
-    return "; ".join(some if len(some) <= MOST_NAMED else
-                     [*some[:MOST_NAMED - 1], f"and {len(some) - MOST_NAMED + 1} more conditions"])
+    return "; ".join(some if len(some) <= MAX_NAMED else
+                     [*some[:MAX_NAMED - 1], f"and {len(some) - MAX_NAMED + 1} more conditions"])
 
 
 def _rows_of(s, name, cells):

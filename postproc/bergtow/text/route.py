@@ -92,8 +92,8 @@ def answer(found):
     if code == "better":
         low, high = c["relative_95"]
         if c["fails_less"] == len(v["judged"]):
-            few = "" if c["chance_of_fails"] <= CHANCE else "; so few may be chance"
-            return (f"Take {chosen}: the straight line fails in all {len(v['judged'])} members that judged, and "
+            few = "" if c["chance_of_fails"] <= CHANCE else "; with so few members this may be chance"
+            return (f"Take {chosen}: the straight line fails in all {len(v['judged'])} evaluation members, and "
                     f"{chosen} in none{few}.")
         if c["fails_less"]:
             return (f"Take {chosen}: the straight line fails in {c['fails_less']} of {len(v['judged'])} members in "
@@ -102,7 +102,7 @@ def answer(found):
                 f"{change(low)} to {change(high)} at 95 %.")
     if code == "straight_not_passable":
         return (f"The straight line cannot be towed; {chosen} " +
-                ("reaches the goal without a fault in every member that judged." if v["recommended"] else
+                ("reaches the goal without a fault in every evaluation member." if v["recommended"] else
                  "fails in some members, too, and is not recommended."))
     if code == "no_route":
         return "No route other than the straight line was found."
@@ -167,13 +167,13 @@ def text(found, markdown=False):
 def rounds(found, markdown=False):
     """The rounds of the receding horizon."""
     h = found["horizon"]
-    head = ["look at", "age of the map", "way to go", "predicted work", "plan"]
+    head = ["mapped at", "age of the map", "way to go", "predicted work", "plan"]
     rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"),
              amount(r["length"], "m"), amount(r["work"], "J"),
              "new" if r["length"] is not None else "as before, since none is allowed"] for r in found["rounds"]]
-    names = {"horizon": "with new looks", "once": "planned once", "straight": "straight line"}
+    names = {"horizon": "with new maps", "once": "planned once", "straight": "straight line"}
     told = "; ".join(", ".join([f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}",
                                 *(FAULTS[f] for f in t["faults"])]) for k, t in h["tows"].items())
-    bound = ("The looks are perfect, so the gain is an upper bound. " if h["perfect"] else "")
+    bound = ("The new maps have no errors, so the gain is an upper bound. " if h["perfect"] else "")
     return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
            f"{told}. {bound}One tow is one sample, and has no interval."
