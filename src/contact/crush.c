@@ -318,6 +318,7 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
         const double length[2] = {first, bt_law_patch(world, part, &manifold, gap + way, &area[1]).length};
         const double mean = resistance_of(length, area, least, line, slop, way).mean;
         force = line * bt_max(least, bt_max(length[0], length[1]));
+        if (!(force > 0)) return INFINITY; // the outlines pass each other
         const double next = bt_max(2 * slop, way - (way * mean - energy) / force);
         if (!(fabs(next - way) > PRECISION * way)) break;
         way = next;
