@@ -38,7 +38,7 @@ DOUBTS = {
     "jammed": "the towed body stood still although the tow demanded motion",
     "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or unsolved "
                 "steps",
-    "short": "no window, or fewer than 20 independent samples in it",
+    "short": "no window, or one shorter than 40 correlation times of a load or than two swings on the line",
     "few": "the body met no ice in its window, or little: contact worth fewer than 10 equal stretches",
     "stopped": "the run stopped early",
     "other": "a warning of another kind",

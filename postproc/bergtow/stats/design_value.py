@@ -33,7 +33,7 @@ SHORT_FIELDS = stat_profile.LEAST_FIELDS
 DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
     "unsteady": "members whose window is not steady",
-    "short": "members with fewer than 20 independent samples",
+    "short": "members whose window is too short",
     "few": "members whose mean rests on contact worth fewer than 10 equal stretches, or on none",
     "stopped": "members that stopped early"
 }
