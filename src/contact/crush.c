@@ -297,8 +297,9 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     }
 }
 
-/// The force at the depth at which the work of the ice is this energy, by Newton's method. Where the contact length
-/// grows with the depth, E is convex, and all iterates after the first are too deep: the force is not too small.
+/// The force at the depth at which the work of the ice is this energy, of the curve through the depths `slop` and `way`.
+/// Newton's method brings `way` there, unless it is less than the curve can resolve. Where the contact length grows with
+/// the depth, E is convex, and all iterates after the first are too deep: the force is not too small.
 static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double energy)
 {
     enum { ITERATIONS = 30 };
@@ -310,20 +311,23 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
     const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), slop = world->par.slop,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, least = own[BT_CRUSH_LEAST] * h;
-    double gap = INFINITY, area[2];
+    double gap = INFINITY, area[2], length[2];
     for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
-    const double first = bt_law_patch(world, part, &manifold, gap + slop, &area[0]).length;
-    double way = bt_max(2 * slop, LEAST_WAY * world->par.size), force = 0;
+    length[0] = bt_law_patch(world, part, &manifold, gap + slop, &area[0]).length;
+    double way = bt_max(2 * slop, LEAST_WAY * world->par.size);
+    resistance ice = {0};
     for (int k = 0; k < ITERATIONS; k++) {
-        const double length[2] = {first, bt_law_patch(world, part, &manifold, gap + way, &area[1]).length};
-        const double mean = resistance_of(length, area, least, line, slop, way).mean;
-        force = line * bt_max(least, bt_max(length[0], length[1]));
+        length[1] = bt_law_patch(world, part, &manifold, gap + way, &area[1]).length;
+        const double force = line * bt_max(least, bt_max(length[0], length[1]));
         if (!(force > 0)) return INFINITY; // the outlines pass each other
-        const double next = bt_max(2 * slop, way - (way * mean - energy) / force);
+        ice = resistance_of(length, area, least, line, slop, way);
+        const double next = bt_max(2 * slop, way - (way * ice.mean - energy) / force);
         if (!(fabs(next - way) > PRECISION * way)) break;
         way = next;
     }
-    return force;
+    const double y = bt_hit_root(0.5 * ice.ramp, ice.touch, energy);
+    return y <= ice.kink ? ice.touch + ice.ramp * y
+                         : ice.force + ice.slope * bt_hit_root(0.5 * ice.slope, ice.force, energy - ice.work);
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------

@@ -192,7 +192,7 @@ void bt_impact_convert(const bt_impact_rule *rule, double most, bt_impact *impac
         impact->mean = impact->impulse / rule->duration;
         impact->peak = 0.5 * BT_PI * impact->mean;
     }
-    if (impact->peak > most) {
+    if (most > 0 && impact->peak > most) {
         const double longer = impact->peak / most;
         impact->peak = most, impact->mean /= longer, impact->duration *= longer;
     }

@@ -83,7 +83,8 @@ typedef struct bt_impact_open {
     bt_impact so_far;
     double rest;          ///< approach that the last step left, m/s
     double largest;       ///< largest λ_c of one manifold so far, which gives place, mass and corner, N s
-    double most;          ///< force that the contact laws let the contacts of one step bear, the largest so far, N
+    double most;          ///< force that the contact laws let the contacts of one step bear, the largest so far, N;
+                          ///< 0 = not known, from a checkpoint of version 0.1.0
 } bt_impact_open;
 
 /// Parameters of the conversion.
@@ -118,7 +119,7 @@ typedef struct bt_impacts {
 
 bt_impact_rule bt_impact_rule_of(const bt_case *input);
 /// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner, and the most that
-/// the contact laws let the ice bear, N.
+/// the contact laws let the ice bear, N; 0 = not known.
 void bt_impact_convert(const bt_impact_rule *rule, double most, bt_impact *impact);
 
 /// Create it for the towed body of the world; NULL if the case does not ask for collisions, or there is no body.

@@ -562,7 +562,7 @@ static bt_impact_open *load_open(bt_snapshot *snap, const bt_panels *panels, int
     double *rows = bt_snapshot_copy(snap, "impacts/open", BT_ITEM_F64, width, n);
     bt_impact_open *open = bt_alloc((size_t)*n, sizeof *open);
     for (int64_t k = 0; k < *n; k++) {
-        open[k].most = INFINITY;
+        open[k].most = 0;
         memcpy(&open[k], rows + k * width, (size_t)width * sizeof *rows);
         if (width < OPEN_WIDTH) open[k].so_far.panel = bt_panels_at(panels, open[k].so_far.x, open[k].so_far.y, 0, 0);
     }

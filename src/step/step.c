@@ -307,12 +307,13 @@ void bt_world_step(bt_world *world)
     clock_phase(world, &st->phases.forces, &t0);
     solve_split(world); // U2
     t0 = bt_clock();
+    bt_impacts_take(world); // of the towed body, at X1, as long as gaps and crushed depths are those of X1, too
+    clock_phase(world, &st->phases.advance, &t0);
     bt_laws_grow(world);
     bt_solver_project(world); // D
     clock_phase(world, &st->phases.project, &t0);
     balance(world);
     bt_forces_record(world); // of the towed body, at X1
-    bt_impacts_take(world); // of the towed body, at X1
     advance(world); // X2 = X1 + U2 Δt + D
     bt_undisturbed_advance(world);
     bt_domain_note(world);

@@ -298,6 +298,13 @@ def test_undisturbed_ice_drifts_as_the_mean_floe(tmp_path):
     assert mixed["speed_along_m_s"] == pytest.approx(alike["speed_along_m_s"], rel=1e-6)
 
 
+def test_floes_by_hand_alone_drift_as_they_are(tmp_path):
+    case = changed(DRIVEN, ice__concentration=0, domain__ends="open", floes=[
+        {"shape": "square", "length": 5, "x": 60 + 20 * k, "y": 5, "thickness": 0.3} for k in range(2)])
+    drift = json.loads(call("check", write_case(tmp_path, case), "--json").stdout)["ice"]["drift_x_m_s"]
+    assert estimate(tmp_path, case)["speed_along_m_s"] == pytest.approx(0.4 - drift, rel=1e-6)
+
+
 def test_a_run_goes_on_with_the_drift_that_it_had(tmp_path):
     """Red when the way of undisturbed ice, or its velocity, is not in the checkpoint."""
     case = changed(DRIVEN, domain__ends="periodic", ice__start="rest", run__duration=200)
