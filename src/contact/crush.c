@@ -297,9 +297,9 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     }
 }
 
-/// The force at the depth at which the work of the ice is this energy, of the curve through the depths `slop` and `way`.
-/// Newton's method brings `way` there, unless it is less than the curve can resolve. Where the contact length grows with
-/// the depth, E is convex, and all iterates after the first are too deep: the force is not too small.
+/// The force at the depth at which the work of the ice is this energy, by the curve through the depths `slop` and
+/// `way`. Newton's method brings `way` there, unless it is less than the curve can resolve. Where the contact length
+/// grows with the depth, E is convex, and all iterates after the first are too deep: the force is not too small.
 static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double energy)
 {
     enum { ITERATIONS = 30 };

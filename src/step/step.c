@@ -307,7 +307,7 @@ void bt_world_step(bt_world *world)
     clock_phase(world, &st->phases.forces, &t0);
     solve_split(world); // U2
     t0 = bt_clock();
-    bt_impacts_take(world); // of the towed body, at X1, as long as gaps and crushed depths are those of X1, too
+    bt_impacts_take(world); // of the towed body, by gaps and depths at X1
     clock_phase(world, &st->phases.advance, &t0);
     bt_laws_grow(world);
     bt_solver_project(world); // D
