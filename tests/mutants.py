@@ -622,8 +622,8 @@ MUTANTS = {
          "0.0);\n    return worst;\n}\n\ndouble bt_tow_update", "no residual of the line"),
         ("vessel->across_w = 1 / (m + dt * vessel->kn);", "vessel->across_w = 1 / m;", "drag across outside the mass"),
     ]),
-    "src/step/step.c": (["unit/test_cells", "physics/test_motion", "physics/test_environment", "physics/test_impact_loads",
-                         COPIES,
+    "src/step/step.c": (["unit/test_cells", "physics/test_motion", "physics/test_environment",
+                         "physics/test_impact_loads", COPIES,
                          "scenes:speed_dense,periodic_dense,free_drift,cold_start"], [
         ("dx += d.x, dy += d.y, turn += d.w;", "dx += d.x, dy += d.y;", "projection does not turn"),
         ("if (d.x != 0 || d.y != 0 || d.w != 0) bodies->disturbed[i] = 1;", "", "shifted floes are taken for quiet"),
@@ -644,7 +644,8 @@ MUTANTS = {
         ("bt_laws_grow(world);\n    bt_solver_project(world); // D",
          "bt_solver_project(world); // D\n    bt_laws_grow(world);", "order"),
         ("bt_impacts_take(world); // of the towed body, by gaps and depths at X1\n"
-         "    clock_phase(world, &st->phases.advance, &t0);\n    bt_laws_grow(world);\n    bt_solver_project(world); // D",
+         "    clock_phase(world, &st->phases.advance, &t0);\n    bt_laws_grow(world);\n"
+         "    bt_solver_project(world); // D",
          "bt_laws_grow(world);\n    bt_solver_project(world); // D\n    bt_impacts_take(world);", "gaps at X2"),
     ]),
     "src/step/window.c": (
