@@ -207,7 +207,7 @@ def test_interrupted(quiet, tmp_path, number):
         time.sleep(0.01)
     child.send_signal(number)
     out, err = child.communicate(timeout=60)
-    assert child.returncode == SIGNAL and "continues with the" in err
+    assert child.returncode == SIGNAL and "to continue with the" in err
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert f.attrs["complete"] == 0
     kept = list(tmp_path.glob("all/members/*/checkpoint.h5"))

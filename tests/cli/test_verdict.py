@@ -112,7 +112,7 @@ def test_the_length_of_a_window_is_that_of_its_steps(tmp_path):
     w = short.summary["window"]
     assert w["n_samples"] == 6 and w["start_s"] == pytest.approx(4.5) and w["end_s"] == pytest.approx(5)
     assert "the window of 0.6 s holds" in short.reason
-    assert "end of the first step of the window" in call("--list-quantities").stdout
+    assert "end of the first step in the window" in call("--list-quantities").stdout
 
 
 def test_without_a_tow_there_is_no_ice_resistance(tmp_path):

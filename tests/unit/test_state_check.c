@@ -96,7 +96,7 @@ static const struct change {
     {0, "cells/relabel", 0, 2, NULL},
     {0, "bodies/cell", 4, 1000, NULL},
     {0, "bodies/pose", 3, NAN, NULL},
-    {0, "bodies/pose", 0, 1e300, "bodies/cell"},
+    {1, "bodies/pose", 0, 1e300, "bodies/cell"},
     {0, "bodies/velocity", 1, INFINITY, NULL},
     {0, "bodies/path", 2, -1, NULL},
     {0, "bodies/disturbed", 0, 7, NULL},
