@@ -298,6 +298,16 @@ char *bt_record_xdmf(const bt_record *record)
                                    .pieces = record->pieces.h ? record->pieces.frame : NULL});
 }
 
+/// Compare the files, as they were when the run began, with those that its case was recorded with.
+static void warn_of_files(bt_record *record)
+{
+    char *text = NULL;
+    size_t size;
+    if (bt_file_read(BT_PATH(record->dir, BT_FOLDER_CASE), "a case", &text, &size, NULL) == BT_OK)
+        bt_case_warn_files(record->c, text, &record->summary.warnings);
+    free(text);
+}
+
 /// Write the buffered data to the file, and form the numbers of the whole run, on rank 0.
 static void conclude(bt_record *record, const bt_run_totals *totals)
 {
@@ -305,6 +315,7 @@ static void conclude(bt_record *record, const bt_run_totals *totals)
     bt_impact_store_take_closed(&record->impacts);
     bt_record_flush(record);
     bt_summary_make(&record->summary, &record->history, record->c, totals, record->n_floes, record->towed >= 0);
+    warn_of_files(record);
     if (!record->impacts.h) return;
     bt_impact_count_init(&record->count, record->impacts.from, &record->history, &record->summary.window);
     bt_impact_store_count(&record->impacts, &record->count);
