@@ -273,6 +273,31 @@ def test_floes_that_split_have_trajectories(tmp_path):
     assert [float(row["speed_m_s"]) for row in rows if row["name"] == "iceberg"][-1] == body
 
 
+@pytest.mark.parametrize("mode, name", [("line", "towing end"), ("thrust", "vessel")])
+def test_the_towing_end_is_that_of_the_frames(tmp_path, mode, name):
+    """However few samples there are, and none of it between them once the line has parted. Red: interpolated, metres
+    off, and missing before the first sample."""
+    more = {"tow__vessel": {"mass": 1e5, "bollard_pull": 1e5, "free_speed": 3}} if mode == "thrust" else {}
+    there = towed(tmp_path, tow__mode=mode, tow__ramp=10, output__sample_every=21, output__frame_interval=2.5,
+                  domain__sides="periodic", **more)
+    bergtow.export(there, tmp_path / "drift.csv")
+
+    def way():
+        with open(tmp_path / "drift.csv", newline="") as file:
+            return {float(r["time_s"]): (float(r["north_m"]), float(r["east_m"])) for r in csv.DictReader(file)
+                    if r["name"] == name}
+    with Run(there) as r:
+        ends = [r._file["frames/line_points"][k, 1] for k in range(r.n_frames)]
+        assert list(way()) == r.frame_times.tolist() and r["time"][0] > 10
+        np.testing.assert_allclose(list(way().values()), ends, rtol=0, atol=1e-9)
+    with edited(there / "result.h5") as f:
+        f["frames/line_points"][:, 1] = f["frames/line_points"][:, 0]
+        same = sorted(set(f["frames/time"][:]) & set(f["series/time"][:]))
+        f["series/time"][0] = f["frames/time"][3]
+    bergtow.export(there, tmp_path / "drift.csv", force=True)
+    assert same == [30] and list(way()) == [7.5, 30]
+
+
 def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):
     """PROJ's forward projection of the degrees in the file gives the metres in it. Red: a grid mapping without
     parameters, latitude first."""
@@ -282,7 +307,7 @@ def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):
     with xarray.open_dataset(tmp_path / "drift.nc", decode_coords="all") as d:
         assert pyproj.CRS.from_cf(d.crs.attrs).to_epsg() == 32633 and d.speed.encoding["grid_mapping"] == "crs"
         there = np.isfinite(d.lon.values)
-        assert there.sum() == there.size - 1  # the towing end has no sample at time zero
+        assert there.all()
         back = pyproj.Proj("EPSG:32633")(d.lon.values[there], d.lat.values[there])
         np.testing.assert_allclose(back, [d.x.values[there], d.y.values[there]], rtol=0, atol=1e-6)
         assert d.time.attrs["comment"].startswith("assumed") and d.time.values[0] == np.datetime64("1970-01-01")

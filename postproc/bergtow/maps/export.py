@@ -130,6 +130,17 @@ def _iceberg(run, frame):
     return run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2], way)[0]
 
 
+def _led(run, frame, names):
+    """Position [2] m of the towing end, where a vessel is, too; not wrapped. While a line holds it is that of the
+    frame, else that of the sample at the same time, NaN if there is none: frames lie between samples, and an
+    interpolated position may be metres off. names: of the series."""
+    end = run.towing_end(frame)
+    if np.isfinite(end).all():
+        return end + (_iceberg(run, frame) - run.body_pose(frame)[run.towed, :2])
+    at = np.flatnonzero(run["time"] == run.frame_times[frame])
+    return np.array([run[name][at[0]] if len(at) else np.nan for name in names])
+
+
 def _about(run, frame):
     """Centre of the ice exported from a periodic domain: with a moving window, the middle of the window, whose end lies
     a fixed distance ahead of the iceberg; otherwise the iceberg. None without an iceberg."""
@@ -228,8 +239,8 @@ class Trajectories:
             if x in run and np.isfinite(run[x]).any():
                 if name == "iceberg":
                     way = np.array([_iceberg(run, f) for f in frames])
-                else:  # frames lie between samples, and the first one before all of them
-                    way = np.column_stack([np.interp(time, run["time"], run[c], np.nan, np.nan) for c in (x, y)])
+                else:
+                    way = np.array([_led(run, f, (x, y)) for f in frames])
                 speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
                 rows.append((name, way, np.array(speeds), np.nan))
         if not rows:

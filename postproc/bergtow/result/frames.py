@@ -220,6 +220,14 @@ class Frames:
         """Positions [..., 2] as (horizontal, vertical) of a picture: in the geographic frame as on a map."""
         return np.asarray(xy, dtype=float)[..., ::-1 if self.geographic else 1]
 
+    def towing_end(self, frame):
+        """Position [2] m of the towing end beside the towed body of the frame; NaN without a line that holds."""
+        if "line_points" in self._file.get("frames", ()):
+            for hull, end in self._read("frames/line_points", frame % self.n_frames, ndim=3).reshape(-1, 2, 2):
+                if not np.array_equal(hull, end):  # of a broken branch both are at the hull
+                    return end
+        return np.full(2, np.nan)
+
     def wrap(self, xy, centre=None):
         """Shift positions [n, 2] m by whole periods to within half a period of centre (default: of the domain).
 

@@ -85,7 +85,7 @@ def _panel_load(run):
         return None
     found = run.panel_series
     return Load("panel_load", "load on one hull panel", found["units"],
-                "sum of the normal forces on a panel of the hull, the largest of all panels"), filler(run)(found["load"])
+                "sum of the normal forces on a panel of the hull, the largest of them"), filler(run)(found["load"])
 
 
 def of_run(run):
