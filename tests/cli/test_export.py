@@ -15,7 +15,7 @@ import xarray
 from osgeo import ogr
 from pyproj import CRS, Geod
 
-from harness import DONE, IO, TOW as BASIN, USAGE, area, call, changed, run
+from harness import CASE as REFUSED, DONE, IO, TOW as BASIN, USAGE, area, call, changed, run
 from made_up_ensemble import edited
 from test_map import ARROW, BOX, LOCAL, ORIGIN, write
 from test_outlines import field, same_ring
@@ -271,6 +271,28 @@ def test_floes_that_split_have_trajectories(tmp_path):
             k, i = r.frame_at(float(row["time_s"])), int(row["name"].split()[1])
             assert (float(row["x_m"]), float(row["y_m"])) == tuple(pose[k, i, :2])
     assert [float(row["speed_m_s"]) for row in rows if row["name"] == "iceberg"][-1] == body
+
+
+def test_fixed_floes_are_told_and_do_not_come_back_adrift(tmp_path):
+    """Red: nothing tells a pier from a floe, and ice.outlines lets it drift off."""
+    pier = {"shape": "square", "length": 4, "x": 40, "y": 40, "thickness": 1}
+    there = towed(tmp_path, floes=[pier | {"fixed": True}, pier | {"y": -40}])
+    with Run(there) as r:
+        still = [i for i in range(r.n_floes) if np.array_equal(r.pose(0)[i, :2], (40, 40))]
+        assert np.flatnonzero(r.fixed).tolist() == still and len(still) == 1
+    bergtow.export(there, tmp_path / "map.geojson", force=True)
+    bergtow.export(there, tmp_path / "after.gpkg")
+    found = {f["properties"]["id"]: f["properties"]["fixed"] for f in
+             json.loads((tmp_path / "map.geojson").read_text())["features"]}
+    assert [i for i, fixed in found.items() if fixed is True] == still and set(found.values()) == {True, False}
+    file = ogr.Open(str(tmp_path / "after.gpkg"))
+    assert {f.GetField("id"): f.GetField("fixed") for f in file.GetLayer("floes")} == found
+    done = call("check", tmp_path / "case.yml", cwd=tmp_path)
+    assert done.returncode == REFUSED and "has the property `fixed`: true" in done.stderr
+    with edited(there / "result.h5") as f:
+        del f["floes/fixed"]  # as version 0.1.0 left it
+    bergtow.export(there, tmp_path / "old.geojson")
+    assert "fixed" not in json.loads((tmp_path / "old.geojson").read_text())["features"][0]["properties"]
 
 
 @pytest.mark.parametrize("mode, name", [("line", "towing end"), ("thrust", "vessel")])

@@ -165,10 +165,11 @@ def floes_layer(run, frames):
     def of(values):
         return np.concatenate([values(f)[index[at == f]] for f in frames])
 
+    fixed = {} if run.fixed is None else {"fixed": ("", run.fixed[index])}
     return Layer("floes", "Polygon", {
         "id": ("", index), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
         "area_m2": ("m2", run.area[index]), "speed_m_s": ("m/s", of(run.speed)),
-        "force_n": ("N, largest normal contact force in the step", of(run.contact_force))}, places)
+        "force_n": ("N, largest normal contact force in the step", of(run.contact_force))} | fixed, places)
 
 
 def bodies_layer(run, frames):
@@ -300,8 +301,10 @@ def write_ogr(layers, place, path, driver):
         columns = layer.columns if driver == "GPKG" else layer.columns | {"made_by": ("", [])}
         for name, (unit, values) in columns.items():
             number = np.asarray(values).dtype.kind
-            field = ogr.FieldDefn(name, {"i": ogr.OFTInteger64, "f": ogr.OFTReal}.get(number if unit or len(values)
-                                                                                       else "U", ogr.OFTString))
+            kinds = {"i": ogr.OFTInteger64, "f": ogr.OFTReal, "b": ogr.OFTInteger}
+            field = ogr.FieldDefn(name, kinds.get(number if unit or len(values) else "U", ogr.OFTString))
+            if driver == "GPKG" and number == "b":
+                field.SetSubType(ogr.OFSTBoolean)
             if driver == "GPKG" and unit:
                 field.SetAlternativeName(f"{name} ({unit})")
             map_read.quietly(there.CreateField, field)

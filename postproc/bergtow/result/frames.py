@@ -119,6 +119,13 @@ class Frames:
         return np.concatenate([own, self._read("pieces/area", ndim=1)]) if self.n_pieces else own
 
     @cached_property
+    def fixed(self):
+        """[N] of bool: floes that nothing moves; None in results of version 0.1.0, which do not tell."""
+        if "fixed" not in self._file["floes"]:
+            return None
+        return np.append(self._read("floes/fixed", ndim=1) != 0, np.zeros(self.n_pieces, bool))
+
+    @cached_property
     def bodies(self):
         """List of Body: all bodies that are not floes, in the order of body_pose; may be empty."""
         if "bodies" not in self._file:
