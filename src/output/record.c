@@ -158,6 +158,11 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     if (status == BT_OK) status = bt_h5_create_shared(&record->h5, comm, path, err);
     if (status == BT_OK) {
         bt_h5_attr_int(&record->h5, "/", "complete", 0);
+        bt_h5_attr_int(&record->h5, "/", "n_steps_of_case", bt_case_steps(input));
+        bt_h5_attr_text(&record->h5, "/", "comment",
+                        "complete: 1 once the file holds all that the run has done, n_steps; it has done its case if "
+                        "that is n_steps_of_case. stopped: the signal or limit that ended it earlier; empty at the end "
+                        "of the case, and after the number of steps that was asked for");
         bt_provenance_write(&record->h5, command_line);
         bt_h5_put_text(&record->h5, "/case", resolved, "the case with every key, in SI units");
         bt_h5_put_text(&record->h5, "/case_as_given", input->text ? input->text : "",
