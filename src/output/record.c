@@ -115,15 +115,17 @@ bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors 
 }
 
 /// Prepare the folder. A resumed run removes only the unfinished file.
-static bt_status prepare_dir(const bt_record *record, const char *resolved, const char *digests, bool fresh,
+static bt_status prepare_dir(bt_record *record, const char *resolved, const char *digests, bool fresh,
                              bt_errors *err)
 {
     bt_status status = bt_file_make_dir(record->dir, err);
     if (status == BT_OK && fresh) {
         char *text = bt_case_with_comments(resolved, digests, record->c->text);
         status = bt_folder_replace(record->dir, text, err);
+        record->replaces = bt_folder_keeps(record->dir);
         free(text);
     } else if (status == BT_OK) {
+        record->replaces = true;
         status = bt_record_remove(record, BT_RESULT_FILE ".tmp", err);
         if (status == BT_OK) status = bt_record_remove(record, BT_CHECKPOINT_FILE ".tmp", err);
     }
@@ -360,6 +362,7 @@ bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_sna
     if (first && status == BT_OK && last) status = bt_checkpoint_write(last, record->dir, BT_CHECKPOINT_FILE, err);
     if (first && status == BT_OK && totals) status = write_summary(record, totals, err);
     if (first && status == BT_OK && totals) bt_folder_settle(record->dir);
+    if (first && status == BT_OK && totals && record->replaces) bt_folder_warn_pages(record->dir);
     status = bt_comm_agree(record->comm, status);
     if (first && status == BT_OK && totals && table)
         bt_summary_print(&record->summary, &record->history, record->c, totals, record->n_floes);
