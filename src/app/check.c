@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Shared by the checks of a case and of a study: refusals, warnings, and the ice with which a run would begin.
 #include <math.h>
+#include <stdlib.h>
 
 #include "app/cmd_check.h"
 #include "bergtow/comm.h"
 #include "case/arch.h"
 #include "case/case_check.h"
+#include "case/case_files.h"
 #include "case/case_tow.h"
 #include "case/cost.h"
 #include "case/ice_bounds.h"
@@ -147,6 +149,9 @@ void bt_check_warn(const bt_case *input, const bt_field *field, const bt_check_i
     bt_case_warn_start(input, warnings);
     bt_case_warn_idle(input, warnings);
     bt_case_warn_tables(input, warnings);
+    char *digests = bt_case_digests(input);
+    bt_case_warn_files(input, digests, warnings);
+    free(digests);
     bt_case_warn_body(input, warnings);
     bt_outline_warn(&field->outlines, input, warnings);
     const double area = field->n > 0 ? bt_field_floe_area(field) : bt_case_made_area(input);

@@ -3,6 +3,9 @@
 #ifndef BT_INSIDE_H
 #define BT_INSIDE_H
 
+#include <math.h>
+#include <stdint.h>
+
 /// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
 /// parallel loop.
 #ifdef BT_VALIDATE
@@ -33,6 +36,15 @@ static inline int bt_ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 static inline int bt_descending(const void *a, const void *b) { return bt_ascending(b, a); }
+
+/// Percentile by linear interpolation between order statistics (numpy's default) of sorted x[n].
+static inline double bt_percentile(const double *x, int64_t n, double percent)
+{
+    if (n < 1) return NAN;
+    const double at = percent / 100 * (double)(n - 1);
+    const int64_t i = (int64_t)at, next = i + 1 < n ? i + 1 : i;
+    return x[i] + (at - (double)i) * (x[next] - x[i]);
+}
 
 /// Define an order of structs, for qsort: by one number of theirs; the second: where that is the same, by another.
 #define BT_ASCENDING(name, type, first) BT_ASCENDING_BY(name, type, first, first)

@@ -9,6 +9,7 @@
 
 #include "base/checksum.h"
 #include "base/largest.h"
+#include "case/warning.h"
 
 #define ITSELF "case" // no key has this name: all have a section
 #define GIVEN "#> "   // before each line of the case as given
@@ -149,18 +150,59 @@ bt_status bt_case_itself_same(const char *path, const char *text, const char *di
                    "run)", path, dir);
 }
 
+/// Do two comments say the same of a file? Either may be NULL.
+static bool alike(const char *before, const char *now)
+{
+    const size_t n = now ? strcspn(now, "\n") : 0;
+    return before && now && strcspn(before, "\n") == n && !strncmp(before, now, n);
+}
+
 bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err)
 {
     bt_status status = BT_OK;
+    char *digests = bt_case_digests(input);
     for (int k = 0; k < bt_n_case_keys; k++) {
-        char *now = comment_of(input, &bt_case_keys[k]);
-        const char *file = bt_case_file(input, &bt_case_keys[k]),
-                   *before = comment_in(input->text, bt_case_keys[k].name);
-        if (now && (!before || strncmp(before, now, strlen(now))))
+        const char *name = bt_case_keys[k].name, *now = comment_in(digests, name);
+        if (now && !alike(comment_in(input->text, name), now))
             status = bt_fail(err, BT_ERR_CASE,
                              "%s: has changed since the run in %s began; restore it, or start a new run with it "
-                             "(bergtow run)", file, dir);
-        free(now);
+                             "(bergtow run)", bt_case_file(input, &bt_case_keys[k]), dir);
     }
+    free(digests);
     return status;
+}
+
+/// Does a document of the text before or after this comment set the key? The text is that of bt_case.
+static bool is_replaced(const char *text, const char *comment, const char *name)
+{
+    const char *last = strrchr(name, '.'), *from = text, *at;
+    char *leaf = bt_text_of("%s:", last ? last + 1 : name), *given = bt_text_of("\"%s\":", name);
+    while ((at = strstr(from, "\n--- # ")) && at < comment) from = at + 1;
+    const char *beside = at ? strstr(at, given) : NULL;
+    at = strstr(text, leaf);
+    const bool replaced = beside || (at && at < from);
+    free(leaf);
+    free(given);
+    return replaced;
+}
+
+void bt_case_warn_files(const bt_case *input, const char *digests, bt_errors *warnings)
+{
+    for (int k = 0; k < bt_n_case_keys; k++) {
+        const char *name = bt_case_keys[k].name, *now = comment_in(digests, name),
+                   *before = comment_in(input->text, name);
+        if (!now || !before || alike(before, now) || is_replaced(input->text, before, name)) continue;
+        const char *line[2] = {now, before};
+        char *said[2];
+        for (int i = 0; i < 2; i++) {
+            const size_t skip = strlen("# : ") + strlen(name);
+            said[i] = bt_text_of("%.*s", (int)(strcspn(line[i], "\n") - skip), line[i] + skip);
+        }
+        bt_warn(warnings, BT_WARN_FILE_CHANGED,
+                "%s: %s is not the file that this case was recorded with: it has %s, that had %s; restore it, or the "
+                "result is another one",
+                name, bt_case_file(input, &bt_case_keys[k]), said[0], said[1]);
+        free(said[0]);
+        free(said[1]);
+    }
 }

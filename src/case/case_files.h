@@ -40,6 +40,11 @@ bt_status bt_case_itself_same(const char *path, const char *text, const char *di
 /// Do the files match the comments in input->text? The rest as above.
 bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *err);
 
+/// Warn of files that do not match the comments in input->text: a case.resolved.yml was given, with the promise that it
+/// gives the same result. digests: the comments of the files as they were read. A key that was replaced since, by a
+/// case based on it or with --set, has no comment.
+void bt_case_warn_files(const bt_case *input, const char *digests, bt_errors *warnings);
+
 /// The text behind "NAME: " at the beginning of a line; NULL if there is none.
 const char *bt_case_said_of(const char *text, const char *name);
 

@@ -73,6 +73,8 @@
     ROW(SHORT_RUN, "short_run", "ramp_s duration_s", "the run ends within the ramp of the tow")                        \
     ROW(LONG_IMPACT, "long_impact", "duration_s steps", "the duration of a collision is set too long")                 \
     ROW(TABLE_ROWS, "table_rows", "key dt_s rows first_s", "a table changes within less than a time step")             \
+    ROW(FILE_CHANGED, "file_changed", "key file now recorded",                                                         \
+        "a file that the case names is not the one that it was recorded with")                                         \
     ROW(LEAD_CORNERS, "lead_corners", "aside_m width_m", "the body leaves the lead at a corner of its path")           \
     ROW(LEAD_DRIFT, "lead_drift", "drift_m - width_m", "the lead drifts off the planned path")                         \
     ROW(NARROW_DOMAIN, "narrow_domain", "key widths concentration_percent - - needed",                                 \

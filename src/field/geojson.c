@@ -52,6 +52,7 @@ typedef struct map_feature {
     const char *why;    ///< why it is not an outline, or NULL
     json_t *id;         ///< or NULL; likewise thickness
     json_t *thickness;
+    bool fixed;         ///< its property `fixed` is true
 } map_feature;
 
 typedef struct reader {
@@ -334,7 +335,7 @@ static void take_feature(void *context, size_t index, const json_t *feature)
                               sizeof *in->ring);
     const json_t *properties = json_object_get(feature, "properties");
     json_t *id = json_object_get(feature, "id"), *thickness = json_object_get(properties, "thickness");
-    *out = (map_feature){.vertex = first};
+    *out = (map_feature){.vertex = first, .fixed = json_is_true(json_object_get(properties, "fixed"))};
     out[1] = (map_feature){.vertex = first + coordinates_of(feature, in->ring + 2 * first, &out->why)};
     out->id = json_incref(id ? id : json_object_get(properties, "id"));
     if (thickness && !json_is_null(thickness)) out->thickness = json_incref(thickness);
@@ -363,6 +364,11 @@ static void read_feature(reader *in, size_t index)
     }
     if (why) {
         bt_refuse(&in->r, "%s is refused: %s", name_of(in, index, name), why);
+        return;
+    }
+    if (feature->fixed) { // as bergtow export writes them
+        bt_refuse(&in->r, "%s has the property `fixed`: true, but floes from outlines drift; give it in `floes` with "
+                          "fixed: true and remove it here, or remove the property", name_of(in, index, name));
         return;
     }
     const json_t *given = feature->thickness;

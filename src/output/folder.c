@@ -2,6 +2,10 @@
 // Replacing the result in a folder; its states meanwhile are listed in folder.h.
 #include "output/folder.h"
 
+#include <dirent.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -192,6 +196,43 @@ void bt_folder_settle(const char *dir)
     const char *aside = BT_PATH(dir, BT_FOLDER_REPLACED);
     clear(aside, NULL); // the next complete result tries again
     rmdir(aside);
+}
+
+#define MARK "made by bergtow postproc" // as in postproc/bergtow/writing.py
+
+/// Is the file a page or a picture with the mark of the Python commands?
+static bool is_page(const char *path)
+{
+    static const char *const ends[] = {".html", ".pdf", ".md", ".png", ".svg", ".mp4"};
+    const char *end = strrchr(path, '.');
+    bool page = false;
+    for (size_t k = 0; end && k < sizeof ends / sizeof *ends; k++) page = page || !strcmp(end, ends[k]);
+    struct stat st;
+    FILE *f = page && is_regular(path) ? fopen(path, "rb") : NULL;
+    page = f && fstat(fileno(f), &st) == 0 && st.st_size > 0;
+    void *text = page ? mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fileno(f), 0) : MAP_FAILED;
+    page = text != MAP_FAILED && memmem(text, (size_t)st.st_size, MARK, strlen(MARK));
+    if (text != MAP_FAILED) munmap(text, (size_t)st.st_size);
+    if (f) fclose(f);
+    return page;
+}
+
+void bt_folder_warn_pages(const char *dir)
+{
+    struct dirent **list = NULL;
+    const int n = scandir(dir, &list, NULL, alphasort);
+    bt_text text;
+    bt_text_begin(&text);
+    int pages = 0;
+    for (int k = 0; k < n; k++) {
+        if (is_page(BT_PATH(dir, list[k]->d_name))) fprintf(text.out, "%s%s", pages++ ? ", " : "", list[k]->d_name);
+        free(list[k]);
+    }
+    free(list);
+    char *names = bt_text_end(&text);
+    if (pages) bt_errors_warn("warning: %s: %s: of an earlier result than the one here; make %s again", dir, names,
+                              pages > 1 ? "them" : "it");
+    free(names);
 }
 
 bt_status bt_folder_may_take(const char *dir, const char *remedy, bt_errors *err)

@@ -41,6 +41,10 @@ void bt_folder_recover(const char *dir);
 /// The new result is complete: remove the old one.
 void bt_folder_settle(const char *dir);
 
+/// Warn of the pages and pictures in the folder, which are of an earlier result: the new one has just been completed.
+/// Nothing else tells a reader of the folder that they show other numbers.
+void bt_folder_warn_pages(const char *dir);
+
 /// Is a result kept aside because the new one is not complete?
 bool bt_folder_keeps(const char *dir);
 

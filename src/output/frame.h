@@ -21,6 +21,7 @@ typedef struct bt_record_bodies {
     const double *vertices;      ///< [offsets[end] − offsets[0]][2] m, body frame, from the block's first
     const double *thickness;     ///< [bodies of the block] m (draft + sail of the towed body, 0 for walls)
     const double *area;          ///< [bodies of the block] m²
+    const int32_t *fixed;        ///< [bodies of the block] 1: a body that nothing moves; NULL: none is
     const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...; on rank 0
     bt_idx towed;                ///< index of the towed body among all, −1 = none
     int branches;                ///< of the tow line, 0 = none

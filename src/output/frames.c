@@ -104,19 +104,25 @@ static void write_outlines(outlines *o, const bt_record_bodies *bodies, int64_t 
     bt_rows_end(&rows);
 }
 
-/// Write the ids of the floes, their rows: ParaView renumbers the cells of a selection.
-static void write_ids(bt_frames *frames)
+/// Write the ids of the floes, their rows, since ParaView renumbers the cells of a selection; and which are fixed.
+static void write_marks(bt_frames *frames, const int32_t *fixed)
 {
-    bt_slab ids = bt_slab_fixed(frames->h, "/xdmf/floe_id", H5T_NATIVE_INT32, frames->n_floes, 0, true);
+    bt_slab ids = bt_slab_fixed(frames->h, "/xdmf/floe_id", H5T_NATIVE_INT32, frames->n_floes, 0, true),
+            still = bt_slab_fixed(frames->h, "/floes/fixed", H5T_NATIVE_INT32, frames->n_floes, 0, true);
     bt_h5_describe(frames->h, "/xdmf/floe_id", "floe", "1", "id of each floe");
-    if (bt_slab_share(frames->comm, (bt_slab *const[]){&ids}, 1) == BT_OK) {
+    bt_h5_describe(frames->h, "/floes/fixed", "floe", "1", "1: nothing moves the floe, such as a pier or a shore");
+    if (bt_slab_share(frames->comm, (bt_slab *const[]){&ids, &still}, 2) == BT_OK) {
         char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
         bt_rows rows = bt_rows_from(&ids, frames->first, buffer);
         for (int64_t i = 0; i < frames->own_floes; i++) *(int32_t *)bt_rows_next(&rows) = (int32_t)(frames->first + i);
         bt_rows_end(&rows);
+        rows = bt_rows_from(&still, frames->first, buffer);
+        for (int64_t i = 0; i < frames->own_floes; i++) *(int32_t *)bt_rows_next(&rows) = fixed ? fixed[i] : 0;
+        bt_rows_end(&rows);
         free(buffer);
     }
     bt_slab_close(&ids);
+    bt_slab_close(&still);
 }
 
 static void write_bodies(bt_frames *frames, const bt_record_bodies *bodies)
@@ -135,7 +141,7 @@ static void write_bodies(bt_frames *frames, const bt_record_bodies *bodies)
                       &o[1].vertices, &o[1].offsets, &o[1].thickness, &o[1].area, &o[1].topology};
     enum { N = sizeof all / sizeof *all };
     const bool last = frames->comm->rank == frames->comm->size - 1;
-    write_ids(frames);
+    write_marks(frames, bodies->fixed);
     if (bt_slab_share(frames->comm, all, N) == BT_OK) {
         char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
         // The first rank writes the 0 of the offsets even for an empty block of floes.

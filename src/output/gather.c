@@ -111,7 +111,7 @@ bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_
 {
     const bt_bodies *bodies = &world->bodies;
     list l = make_list(comm, world, roster);
-    double (*rows)[3] = bt_alloc((size_t)l.n, sizeof *rows), (*block)[3] = bt_alloc((size_t)l.count, sizeof *block);
+    double (*rows)[4] = bt_alloc((size_t)l.n, sizeof *rows), (*block)[4] = bt_alloc((size_t)l.count, sizeof *block);
     for (bt_idx i = 0; i < l.n; i++) {
         const int64_t k = l.body[i];
         const double *v;
@@ -119,14 +119,17 @@ bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_
         rows[i][0] = n;
         rows[i][1] = roster->thickness[l.row[i]];
         rows[i][2] = k < 0 ? bt_shape_area_moments(n, v).area : bodies->area[k];
+        rows[i][3] = k >= 0 && bodies->motion[k] == BT_STATIC; // a floe that has split was not
     }
-    bt_status status = bt_comm_rows_by_gid(comm, l.first, l.n, l.row, 3, &rows[0][0], &block[0][0], err);
+    bt_status status = bt_comm_rows_by_gid(comm, l.first, l.n, l.row, 4, &rows[0][0], &block[0][0], err);
     int64_t *offsets = bt_alloc((size_t)l.count + 1, sizeof *offsets);
     double *thickness = bt_alloc((size_t)l.count, sizeof *thickness), *area = bt_alloc((size_t)l.count, sizeof *area);
+    int32_t *fixed = bt_alloc((size_t)l.count, sizeof *fixed);
     for (int64_t i = 0; i < l.count; i++) {
         offsets[i + 1] = offsets[i] + (int64_t)block[i][0];
         thickness[i] = block[i][1];
         area[i] = block[i][2];
+        fixed[i] = block[i][3] != 0;
     }
     free(rows);
     free(block);
@@ -139,6 +142,7 @@ bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_
                               .vertices = vertices,
                               .thickness = thickness,
                               .area = area,
+                              .fixed = fixed,
                               .names = roster->names,
                               .all = comm->size == 1 && !world->splitting ? bodies : NULL, // no floe goes
                               .towed = world->towed < 0 ? -1 : (bt_idx)bt_roster_row(roster, world->towed),
@@ -153,6 +157,7 @@ void bt_gather_free(bt_record_bodies *bodies)
     free((void *)bodies->vertices);
     free((void *)bodies->thickness);
     free((void *)bodies->area);
+    free((void *)bodies->fixed);
     *bodies = (bt_record_bodies){0};
 }
 

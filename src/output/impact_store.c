@@ -73,9 +73,10 @@ static void create_panels(bt_impact_store *store, const bt_panels *panels, bool 
     store->normal = bt_h5_growing(h5, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
     bt_h5_describe(h5, "/panels/force", "sample panel xy", "N",
              "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry "
-             "of /series");
+             "of /series, NaN where one of its steps has no bound to the load (no_load)");
     bt_h5_describe(h5, "/panels/load", "sample panel", "N",
-             "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
+             "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series, NaN where one of "
+             "its steps has no bound to the load (no_load)");
 }
 
 void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts *impacts, const bt_case *input)
@@ -154,9 +155,9 @@ void bt_impact_store_take(bt_impact_store *store, double time, bool no_load)
     bt_panel_blocks_add(&store->blocks, panels, time < store->earliest);
     for (int k = 0; k < store->n_panels; k++) {
         const bt_panel *panel = &panels[k];
-        store->sum[3 * k] += panel->fx;
-        store->sum[3 * k + 1] += panel->fy;
-        store->sum[3 * k + 2] += panel->normal;
+        store->sum[3 * k] += no_load ? NAN : panel->fx;
+        store->sum[3 * k + 1] += no_load ? NAN : panel->fy;
+        store->sum[3 * k + 2] += no_load ? NAN : panel->normal;
     }
     store->n_merged++;
     free(none);
@@ -235,13 +236,18 @@ void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, co
     bt_h5 *h5 = store->h;
     bt_h5_attr_double(h5, "/panels", "from", steady->start);
     bt_h5_attr_int(h5, "/panels", "steps", steady->n);
+    bt_h5_attr_int(h5, "/panels", "no_load_steps", llround(steady->no_load * steps));
     bt_h5_put(h5, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x, "panel xy", "N",
-              "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
+              "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body; "
+              "its steps without a bound to the load, `no_load_steps` of `steps`, count as zero");
     const struct { const char *path, *text; } of_normals[] = {
-        {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
-        {"/panels/max_load", "largest sum of the normal forces in a step of the window, impulse / dt"},
+        {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on; its steps "
+                              "without a bound to the load, `no_load_steps` of `steps`, count as zero"},
+        {"/panels/max_load", "largest sum of the normal forces in a step of the window, impulse / dt; steps without a "
+                             "bound to the load count as zero"},
         {"/panels/max_peak", "largest peak of a collision in the window by the conversion of /impacts"},
-        {"/panels/start_max_load", "largest sum of the normal forces in a step before the window, impulse / dt"},
+        {"/panels/start_max_load", "largest sum of the normal forces in a step before the window, impulse / dt; steps "
+                                   "without a bound to the load count as zero"},
         {"/panels/start_max_peak", "largest peak of a collision before the window by the conversion of /impacts"},
     };
     for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++)

@@ -37,7 +37,7 @@ void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts 
 /// For runs whose floes may split: collisions refer to rows of /floes, /bodies (n_bodies together) and /pieces.
 void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int64_t n_bodies);
 /// Take the collisions that ended in the last step, and its panel loads; time: end of the step, s. no_load: the loads
-/// are not numbers, and count as none.
+/// are not numbers: NaN in the series, zero in means and maxima, which are then lower bounds.
 void bt_impact_store_take(bt_impact_store *store, double time, bool no_load);
 /// Take only collisions: those closed by the end of the run.
 void bt_impact_store_take_closed(bt_impact_store *store);

@@ -115,15 +115,17 @@ bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors 
 }
 
 /// Prepare the folder. A resumed run removes only the unfinished file.
-static bt_status prepare_dir(const bt_record *record, const char *resolved, const char *digests, bool fresh,
+static bt_status prepare_dir(bt_record *record, const char *resolved, const char *digests, bool fresh,
                              bt_errors *err)
 {
     bt_status status = bt_file_make_dir(record->dir, err);
     if (status == BT_OK && fresh) {
         char *text = bt_case_with_comments(resolved, digests, record->c->text);
         status = bt_folder_replace(record->dir, text, err);
+        record->replaces = bt_folder_keeps(record->dir);
         free(text);
     } else if (status == BT_OK) {
+        record->replaces = true;
         status = bt_record_remove(record, BT_RESULT_FILE ".tmp", err);
         if (status == BT_OK) status = bt_record_remove(record, BT_CHECKPOINT_FILE ".tmp", err);
     }
@@ -158,6 +160,11 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     if (status == BT_OK) status = bt_h5_create_shared(&record->h5, comm, path, err);
     if (status == BT_OK) {
         bt_h5_attr_int(&record->h5, "/", "complete", 0);
+        bt_h5_attr_int(&record->h5, "/", "n_steps_of_case", bt_case_steps(input));
+        bt_h5_attr_text(&record->h5, "/", "comment",
+                        "complete: 1 once the file holds all that the run has done, n_steps; it has done its case if "
+                        "that is n_steps_of_case. stopped: the signal or limit that ended it earlier; empty at the end "
+                        "of the case, and after the number of steps that was asked for");
         bt_provenance_write(&record->h5, command_line);
         bt_h5_put_text(&record->h5, "/case", resolved, "the case with every key, in SI units");
         bt_h5_put_text(&record->h5, "/case_as_given", input->text ? input->text : "",
@@ -298,6 +305,16 @@ char *bt_record_xdmf(const bt_record *record)
                                    .pieces = record->pieces.h ? record->pieces.frame : NULL});
 }
 
+/// Compare the files, as they were when the run began, with those that its case was recorded with.
+static void warn_of_files(bt_record *record)
+{
+    char *text = NULL;
+    size_t size;
+    if (bt_file_read(BT_PATH(record->dir, BT_FOLDER_CASE), "a case", &text, &size, NULL) == BT_OK)
+        bt_case_warn_files(record->c, text, &record->summary.warnings);
+    free(text);
+}
+
 /// Write the buffered data to the file, and form the numbers of the whole run, on rank 0.
 static void conclude(bt_record *record, const bt_run_totals *totals)
 {
@@ -305,6 +322,7 @@ static void conclude(bt_record *record, const bt_run_totals *totals)
     bt_impact_store_take_closed(&record->impacts);
     bt_record_flush(record);
     bt_summary_make(&record->summary, &record->history, record->c, totals, record->n_floes, record->towed >= 0);
+    warn_of_files(record);
     if (!record->impacts.h) return;
     bt_impact_count_init(&record->count, record->impacts.from, &record->history, &record->summary.window);
     bt_impact_store_count(&record->impacts, &record->count);
@@ -344,6 +362,7 @@ bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_sna
     if (first && status == BT_OK && last) status = bt_checkpoint_write(last, record->dir, BT_CHECKPOINT_FILE, err);
     if (first && status == BT_OK && totals) status = write_summary(record, totals, err);
     if (first && status == BT_OK && totals) bt_folder_settle(record->dir);
+    if (first && status == BT_OK && totals && record->replaces) bt_folder_warn_pages(record->dir);
     status = bt_comm_agree(record->comm, status);
     if (first && status == BT_OK && totals && table)
         bt_summary_print(&record->summary, &record->history, record->c, totals, record->n_floes);

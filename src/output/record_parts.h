@@ -23,6 +23,7 @@ struct bt_record {
     const bt_comm *comm;
     char identity[BT_CHECKSUM_DIGEST]; ///< of the run, on rank 0 (record_resume.c)
     bool fresh;            ///< a new run, which replaces the contents of the folder
+    bool replaces;         ///< another result was there, or an earlier one of this run
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
     // series

@@ -83,15 +83,6 @@ static void summary_window_warn(bt_errors *warnings, const bt_window *window)
 #define OVERLAP_LIMIT 0.01
 /// Crush above this fraction of it is reported: outlines do not change, and deeply overlapping floes separate sideways.
 
-/// Percentile by linear interpolation between order statistics (numpy's default) of sorted x[n].
-static double percentile(const double *x, int64_t n, double percent)
-{
-    if (n < 1) return NAN;
-    const double at = percent / 100 * (double)(n - 1);
-    const int64_t i = (int64_t)at, next = i + 1 < n ? i + 1 : i;
-    return x[i] + (at - (double)i) * (x[next] - x[i]);
-}
-
 static bt_mean mean_over(const bt_summary *summary, const bt_history *history, bt_column k)
 {
     return bt_stats_mean(history->column[k] + summary->window.first, summary->window.n);
@@ -122,9 +113,9 @@ static void reduce_window(bt_summary *summary, const bt_history *history)
     double *sorted = bt_alloc((size_t)n, sizeof *sorted);
     if (n > 0) memcpy(sorted, history->column[BT_COL_ICE] + summary->window.first, (size_t)n * sizeof *sorted);
     qsort(sorted, (size_t)n, sizeof *sorted, bt_ascending);
-    summary->p95 = percentile(sorted, n, 95);
-    summary->p99 = percentile(sorted, n, 99);
-    summary->peak = percentile(sorted, n, 100);
+    summary->p95 = bt_percentile(sorted, n, 95);
+    summary->p99 = bt_percentile(sorted, n, 99);
+    summary->peak = bt_percentile(sorted, n, 100);
     free(sorted);
 
     double largest = bt_max(fabs(summary->ice.mean), bt_max(fabs(summary->tow.mean), fabs(summary->drag.mean)));

@@ -95,8 +95,8 @@ static double window_laps(const view *from) { return bt_window_laps(from->t->win
 
 static bool has_splitting(const view *from) { return from->t->splitting; }
 static double n_splits(const view *from) { return (double)from->t->splitting->n; }
-static double size_before(const view *from) { return bt_splitting_size(from->t->splitting, true, 0.5); }
-static double size_of_pieces(const view *from) { return bt_splitting_size(from->t->splitting, false, 0.5); }
+static double size_before(const view *from) { return bt_splitting_size(from->t->splitting, true, 50); }
+static double size_of_pieces(const view *from) { return bt_splitting_size(from->t->splitting, false, 50); }
 static double least_piece(const view *from) { return bt_splitting_size(from->t->splitting, false, 0); }
 
 static double n_events(const view *from) { return from->t->events ? (double)from->t->events->n : 0; }
@@ -432,7 +432,8 @@ static const bt_json_key rows[] = {
     OF_WINDOW("moving_window.brought_energy_j", brought[2], "J", "kinetic energy of the renewed floes as they entered"),
     GROUP("splitting", has_splitting, "floes that split"),
     COUNT("splitting.splits", n_splits, "1", "splits, each of a floe into two pieces"),
-    NUMBER("splitting.size_before_m", size_before, "m", "median root of the area of the floes that split"),
+    NUMBER("splitting.size_before_m", size_before, "m",
+        "median root of the area of the original floes that split"),
     NUMBER("splitting.piece_size_m", size_of_pieces, "m", "median root of the area of the pieces at the end"),
     NUMBER("splitting.least_piece_m", least_piece, "m", "size of the smallest piece"),
     {.kind = BT_JSON_SPLITS}, // its totals: bt_split_total_rows of src/output/state.c

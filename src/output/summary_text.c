@@ -159,7 +159,7 @@ static void print_splits(const bt_splitting *splitting, int64_t n_steps)
     if (splitting->n > 0)
         printf("    sizes             floes of %.3g m (median) into pieces of %.3g m, the smallest of %.3g m; in "
                "%.2g %% of the steps\n",
-               bt_splitting_size(splitting, true, 0.5), bt_splitting_size(splitting, false, 0.5),
+               bt_splitting_size(splitting, true, 50), bt_splitting_size(splitting, false, 50),
                bt_splitting_size(splitting, false, 0), 100.0 * (double)totals->steps / (double)n_steps);
     printf("    times not split   %lld piece too small or slender, %lld last generation, %lld rafted, %lld out of ids; "
            "%lld left to the next step\n",

@@ -94,13 +94,15 @@ static bt_status keep_resolved(const char *dir, const char *text, bool *old, cha
     size_t size;
     *old = access(path, F_OK) == 0;
     bt_status status = *old ? bt_file_read(path, "a study", &before, &size, err) : bt_file_write(path, text, err);
-    if (status == BT_OK && *old && !bt_study_resolved_alike(before, text)) {
+    char *other = status == BT_OK && *old ? bt_study_difference(before, text) : NULL;
+    if (other) {
         status = bt_fail(err, BT_ERR_CASE,
-                         "%s: holds the members of another study (see %s): only `repeats` may change; give another "
+                         "%s: holds the members of another study (%s; see %s): only `repeats` may change; give another "
                          "folder with -o, or restore the study and its base case",
-                         dir, path);
+                         dir, other, path);
         bt_errors_code(err, "other_study");
     }
+    free(other);
     const char *kept = *old ? before : text;
     if (status == BT_OK) bt_checksum_digest_text(kept, strlen(kept), digest);
     free(before);

@@ -138,15 +138,37 @@ static size_t said_in(const char *line)
     return said;
 }
 
+/// The first lines that differ, which are empty at the end of a text; false if there are none. section: where the first
+/// of them belongs, the last line before it of less indent, or NULL.
+static bool first_difference(const char **a, const char **b, const char **section)
+{
+    const char *above[8] = {NULL}; // by indent
+    const size_t most = sizeof above / sizeof *above - 1;
+    while (**a || **b) {
+        const size_t n = said_in(*a), indent = strspn(*a, " ") / 2;
+        *section = indent > 0 ? above[(indent < most ? indent : most) - 1] : NULL;
+        if (n != said_in(*b) || memcmp(*a, *b, n)) return true;
+        if (n > 0) above[indent < most ? indent : most] = *a;
+        *a += strcspn(*a, "\n"), *b += strcspn(*b, "\n");
+        *a += **a == '\n', *b += **b == '\n';
+    }
+    return false;
+}
+
 bool bt_study_resolved_alike(const char *a, const char *b)
 {
-    while (*a || *b) {
-        const size_t n = said_in(a);
-        if (n != said_in(b) || memcmp(a, b, n)) return false;
-        a += strcspn(a, "\n"), b += strcspn(b, "\n");
-        a += *a == '\n', b += *b == '\n';
-    }
-    return true;
+    const char *section;
+    return !first_difference(&a, &b, &section);
+}
+
+char *bt_study_difference(const char *before, const char *now)
+{
+    const char *section;
+    if (!first_difference(&before, &now, &section)) return NULL;
+    const size_t skip[] = {strspn(before, " "), strspn(now, " ")}, n[] = {said_in(before), said_in(now)};
+    return bt_text_of("%.*s%s`%.*s` there, `%.*s` now", section ? (int)said_in(section) : 0, section ? section : "",
+                      section ? " " : "", n[0] > skip[0] ? (int)(n[0] - skip[0]) : 0, before + skip[0],
+                      n[1] > skip[1] ? (int)(n[1] - skip[1]) : 0, now + skip[1]);
 }
 
 /// The word for a choice in a study.
@@ -378,7 +400,9 @@ static void add_of_axes(bt_study_files *files, const bt_study *study)
 
 void bt_study_files_find(bt_study_files *files, const bt_study *study)
 {
-    *files = (bt_study_files){0};
+    char *folder = bt_file_folder(study->base);
+    *files = (bt_study_files){.root = realpath(folder, NULL)};
+    free(folder);
     bt_case input;
     if (bt_study_base_case(study, &input, NULL) == BT_OK)
         for (int k = 0; k < bt_n_case_keys; k++)
@@ -391,12 +415,14 @@ void bt_study_files_free(bt_study_files *files)
 {
     for (int i = 0; i < files->n; i++) free(files->list[i].path);
     free(files->list);
+    free(files->root);
     *files = (bt_study_files){0};
 }
 
 bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool old, bt_errors *err)
 {
     const char *path = BT_PATH(dir, "study.files");
+    const size_t root = files->root ? strlen(files->root) : 0;
     char *kept = NULL;
     size_t size;
     bt_status status = BT_OK;
@@ -410,7 +436,9 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
         const bt_named_file *file = &files->list[i];
         char line[96];
         snprintf(line, sizeof line, "%" PRId64 " bytes, xxh128 %s\n", file->bytes, file->digest);
-        const char *before = bt_case_said_of(kept, file->path);
+        const bool below = root && !strncmp(file->path, files->root, root) && file->path[root] == '/';
+        const char *name = file->path + (below ? root + 1 : 0), *before = bt_case_said_of(kept, name);
+        if (!before) before = bt_case_said_of(kept, file->path); // as version 0.1.0 named it
         if (before && strncmp(before, line, strlen(line))) {
             status = bt_fail(err, BT_ERR_CASE,
                              "%s: has changed since members in %s were made with it, and now belongs to another study; "
@@ -418,7 +446,7 @@ bt_status bt_study_files_keep(const bt_study_files *files, const char *dir, bool
             bt_errors_code(err, "other_study");
         }
         if (before) continue;
-        fprintf(text.out, "%s: %s", file->path, line);
+        fprintf(text.out, "%s: %s", name, line);
         added++;
         if (old)
             bt_errors_warn("warning: %s: %s has no digest of this file from when its members were run, so a "

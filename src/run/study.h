@@ -40,13 +40,18 @@ void bt_study_check_axes(const bt_study *study, bt_errors *err);
 /// in a case are not reported here. Errors: BT_ERR_CASE.
 bt_status bt_study_check_ice(const bt_study *study, bt_errors *err);
 
+/// The first difference of two texts of bt_study_resolved, in words; NULL if they are alike. The caller frees it.
+char *bt_study_difference(const char *before, const char *now);
+
 // --- files that a study names ----------------------------------------------------------------------------------------
 
 // The files that the cases of a study name: fields, outlines, tables. A case holds only their paths, so digests of
 // their contents are kept beside study.resolved.yml, in the file study.files, one line each:
 //
-//     /home/me/current.csv: 312 bytes, xxh128 0123...
+//     current.csv: 312 bytes, xxh128 0123...
 //
+// by the path from the folder of the base case if the file lies below that, so that both can be moved; else by the
+// whole path.
 // Members made before and after a change of such a file would belong to two studies.
 
 typedef struct {
@@ -59,6 +64,7 @@ typedef struct {
 typedef struct bt_study_files {
     bt_named_file *list;
     int n;
+    char *root; ///< folder of the base case, absolute; NULL if there is none
 } bt_study_files;
 
 /// Find the files that the base case and the values of its keys name, each once, as far as they can be read: a member

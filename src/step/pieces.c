@@ -38,7 +38,7 @@ bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t 
     return gid;
 }
 
-double bt_splitting_size(const bt_splitting *splitting, bool before, double share)
+double bt_splitting_size(const bt_splitting *splitting, bool before, double percent)
 {
     if (splitting->n == 0) return NAN;
     double *size = bt_alloc(2 * (size_t)splitting->n, sizeof *size); // of pieces; 0: it has split
@@ -55,7 +55,7 @@ double bt_splitting_size(const bt_splitting *splitting, bool before, double shar
     qsort(size, n, sizeof *size, bt_ascending);
     size_t gone = 0;
     while (size[gone] == 0) gone++;
-    const double found = size[gone + (size_t)(share * (double)(n - 1 - gone))];
+    const double found = bt_percentile(size + gone, (int64_t)(n - gone), percent);
     free(size);
     return found;
 }

@@ -117,9 +117,9 @@ int64_t bt_splitting_generation(const bt_splitting *splitting, bt_gid gid);
 /// The original floe from which gid comes; *path: the path from it to gid (bt_split_scatter).
 bt_gid bt_splitting_ancestor(const bt_splitting *splitting, bt_gid gid, int64_t *path);
 
-/// Size √A, m, that this share of the present pieces does not exceed, or (before) of the floes that they come from; NaN
-/// if none has split.
-double bt_splitting_size(const bt_splitting *splitting, bool before, double share);
+/// Percentile of the size √A, m, of the present pieces, or (before) of the original floes that they come from; NaN if
+/// none has split.
+double bt_splitting_size(const bt_splitting *splitting, bool before, double percent);
 
 /// ∫r²dA of floe i about its centroid, m⁴; for a piece, as computed by its cut.
 double bt_splitting_polar(const bt_world *world, bt_idx i);

@@ -20,7 +20,7 @@ from bergtow.result import at_least  # noqa: E402
 from bergtow.study import budget  # noqa: E402
 from bergtow.study import capability  # noqa: E402
 from bergtow import writing  # noqa: E402
-from bergtow.stats import conditions as ensemble
+from bergtow.stats import conditions as ensemble, loads
 from bergtow.text import ensemble as ensemble_text  # noqa: E402
 import made_up_ensemble as made_up  # noqa: E402
 from bergtow.plot import resistance as plot_resistance  # noqa: E402
@@ -94,6 +94,27 @@ def test_the_console_says_at_least(locked):
     assert "have no solution, so the loads on the body are at least those given" in reason["text"]
     assert "." not in reason["text"].replace("ice.", "").replace("rafting.", "").replace("crushing.", "").replace(
         f"{reason['values']['share_percent']:.3g}", "")  # one sentence
+
+
+def test_panels_have_no_load_where_the_body_has_none(locked):
+    """Red: a load of zero in the series, and nothing says that means and maxima count it."""
+    with h5py.File(locked.dir / "result.h5") as f:
+        lost, force = f["series/no_load"][:] == 1, f["series/ice_resistance"][:]
+        panels = {name: d[:] for name, d in f["panels"].items()}
+        given = dict(f["panels"].attrs)
+        texts = {name: f["panels"][name].attrs["description"] for name in ("mean_load", "mean_force", "max_load")}
+    assert lost.sum() > 3 and np.array_equal(np.isnan(force), lost)
+    for name in ("load", "force"):
+        empty = np.isnan(panels[name]).reshape(len(lost), -1)
+        assert np.array_equal(empty.all(axis=1), lost) and np.array_equal(empty.any(axis=1), lost), name
+    assert given["no_load_steps"] == lost.sum() == locked.summary["no_load_steps"] and given["steps"] == len(lost)
+    assert all("count as zero" in text for text in texts.values())
+    np.testing.assert_allclose(panels["mean_load"], np.nan_to_num(panels["load"]).mean(axis=0), rtol=1e-12)
+    with Run(locked.dir) as run:
+        (values,) = (x for load, x in loads.of_run(run)[0] if load.name == "panel_load")
+    first, last = np.flatnonzero(lost)[0], np.flatnonzero(~lost)[-1]
+    assert np.isfinite(values).all() and np.array_equal(values[first], values[first - 1]) and np.array_equal(
+        values[last], panels["load"][last])
 
 
 def test_what_contacts_do_in_a_step_without_a_solution_is_no_number(locked):

@@ -301,9 +301,25 @@ def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change,
         study = tmp_path / "out/converge/case.yml"
         study.write_text(study.read_text().replace("# bergtow", "# bergtow 0", 1))
     assert runs.make("case", [0], {"ice.friction": 0.3 if change == "values" else 0.1}) == [None] and runs.made == 1
-    told = "out/converge/case: its runs have other settings, and are made again" in capsys.readouterr().err
-    assert told == (change != "version")
+    told = capsys.readouterr().err
+    assert "renamed to case.old" in told and all(words in told for words in {
+        "version": ("bergtow 0 0.1.0", runs.version), "case": ("ice: `thickness: ", "`thickness: 0.05 m` now"),
+        "given": ("body: `draft: ", "`draft: 0.4 m` now"), "values": ("`friction: 0.1` there, `friction: 0.3` now",)}[
+            change])
     assert not runs.kept("case", 1)
+
+
+def test_finished_runs_and_the_files_of_others_are_set_aside(tmp_path):
+    """Red: they are removed, those of another version without a word."""
+    runs_of(tmp_path, SHORT).make("case", [0, 1], {})
+    home = tmp_path / "out/converge/case"
+    (home / "members/c001-r001/notes.txt").write_text("of the user")
+    before = {p.relative_to(home): p.read_bytes() for p in home.rglob("*") if p.is_file()}
+    (tmp_path / "out/converge/case.old").mkdir()
+    runs_of(tmp_path, SHORT).make("case", [0], {"ice.friction": 0.1})
+    old = tmp_path / "out/converge/case.old2"
+    assert before == {p.relative_to(old): p.read_bytes() for p in old.rglob("*") if p.is_file()}
+    assert (home / "members/c001-r001/finished").exists()
 
 
 def test_a_value_of_the_call_wins_over_one_of_the_user(tmp_path):

@@ -79,6 +79,25 @@ def test_outlines_and_bases_that_have_changed(tmp_path):
     assert result.returncode == CASE and "holds the members of another study" in result.stderr
 
 
+def test_files_below_the_base_case_can_be_moved_with_it(tmp_path):
+    """Version 0.1.0 recorded whole paths, which hold where they still lead. Red: nothing records what the file held."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    write(here, current=0.01)
+    prepare(here, STUDY | {"variants": {"slow": {"water.current_table": "current.csv"}}},
+            changed(BASE, water__current_table=None))
+    assert ensemble(here).returncode == DONE
+    names = here / "all/study.files"
+    relative = names.read_text()
+    names.write_text(f"{here}/{relative}")
+    assert relative.startswith("current.csv: ") and ensemble(here).stderr == ""
+    write(here, current=0.02)
+    assert refused(here, "current.csv")
+    names.write_text(relative)
+    here.rename(there)
+    assert refused(there, "current.csv")
+
+
 def test_a_folder_of_an_earlier_version_is_taken_and_it_is_said(tmp_path):
     write(tmp_path, current=0.01)
     prepare(tmp_path, STUDY, BASE)

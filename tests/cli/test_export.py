@@ -15,7 +15,7 @@ import xarray
 from osgeo import ogr
 from pyproj import CRS, Geod
 
-from harness import DONE, IO, TOW as BASIN, USAGE, area, call, changed, run
+from harness import CASE as REFUSED, DONE, IO, TOW as BASIN, USAGE, area, call, changed, run
 from made_up_ensemble import edited
 from test_map import ARROW, BOX, LOCAL, ORIGIN, write
 from test_outlines import field, same_ring
@@ -273,6 +273,53 @@ def test_floes_that_split_have_trajectories(tmp_path):
     assert [float(row["speed_m_s"]) for row in rows if row["name"] == "iceberg"][-1] == body
 
 
+def test_fixed_floes_are_told_and_do_not_come_back_adrift(tmp_path):
+    """Red: nothing tells a pier from a floe, and ice.outlines lets it drift off."""
+    pier = {"shape": "square", "length": 4, "x": 40, "y": 40, "thickness": 1}
+    there = towed(tmp_path, floes=[pier | {"fixed": True}, pier | {"y": -40}])
+    with Run(there) as r:
+        still = [i for i in range(r.n_floes) if np.array_equal(r.pose(0)[i, :2], (40, 40))]
+        assert np.flatnonzero(r.fixed).tolist() == still and len(still) == 1
+    bergtow.export(there, tmp_path / "map.geojson", force=True)
+    bergtow.export(there, tmp_path / "after.gpkg")
+    found = {f["properties"]["id"]: f["properties"]["fixed"] for f in
+             json.loads((tmp_path / "map.geojson").read_text())["features"]}
+    assert [i for i, fixed in found.items() if fixed is True] == still and set(found.values()) == {True, False}
+    file = ogr.Open(str(tmp_path / "after.gpkg"))
+    assert {f.GetField("id"): f.GetField("fixed") for f in file.GetLayer("floes")} == found
+    done = call("check", tmp_path / "case.yml", cwd=tmp_path)
+    assert done.returncode == REFUSED and "has the property `fixed`: true" in done.stderr
+    with edited(there / "result.h5") as f:
+        del f["floes/fixed"]  # as version 0.1.0 left it
+    bergtow.export(there, tmp_path / "old.geojson")
+    assert "fixed" not in json.loads((tmp_path / "old.geojson").read_text())["features"][0]["properties"]
+
+
+@pytest.mark.parametrize("mode, name", [("line", "towing end"), ("thrust", "vessel")])
+def test_the_towing_end_is_that_of_the_frames(tmp_path, mode, name):
+    """However few samples there are, and none of it between them once the line has parted. Red: interpolated, metres
+    off, and missing before the first sample."""
+    more = {"tow__vessel": {"mass": 1e5, "bollard_pull": 1e5, "free_speed": 3}} if mode == "thrust" else {}
+    there = towed(tmp_path, tow__mode=mode, tow__ramp=10, output__sample_every=21, output__frame_interval=2.5,
+                  domain__sides="periodic", **more)
+    bergtow.export(there, tmp_path / "drift.csv")
+
+    def way():
+        with open(tmp_path / "drift.csv", newline="") as file:
+            return {float(r["time_s"]): (float(r["north_m"]), float(r["east_m"])) for r in csv.DictReader(file)
+                    if r["name"] == name}
+    with Run(there) as r:
+        ends = [r._file["frames/line_points"][k, 1] for k in range(r.n_frames)]
+        assert list(way()) == r.frame_times.tolist() and r["time"][0] > 10
+        np.testing.assert_allclose(list(way().values()), ends, rtol=0, atol=1e-9)
+    with edited(there / "result.h5") as f:
+        f["frames/line_points"][:, 1] = f["frames/line_points"][:, 0]
+        same = sorted(set(f["frames/time"][:]) & set(f["series/time"][:]))
+        f["series/time"][0] = f["frames/time"][3]
+    bergtow.export(there, tmp_path / "drift.csv", force=True)
+    assert same == [30] and list(way()) == [7.5, 30]
+
+
 def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):
     """PROJ's forward projection of the degrees in the file gives the metres in it. Red: a grid mapping without
     parameters, latitude first."""
@@ -282,7 +329,7 @@ def test_metres_of_a_projection_have_degrees_beside_them(tmp_path):
     with xarray.open_dataset(tmp_path / "drift.nc", decode_coords="all") as d:
         assert pyproj.CRS.from_cf(d.crs.attrs).to_epsg() == 32633 and d.speed.encoding["grid_mapping"] == "crs"
         there = np.isfinite(d.lon.values)
-        assert there.sum() == there.size - 1  # the towing end has no sample at time zero
+        assert there.all()
         back = pyproj.Proj("EPSG:32633")(d.lon.values[there], d.lat.values[there])
         np.testing.assert_allclose(back, [d.x.values[there], d.y.values[there]], rtol=0, atol=1e-6)
         assert d.time.attrs["comment"].startswith("assumed") and d.time.values[0] == np.datetime64("1970-01-01")

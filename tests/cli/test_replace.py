@@ -13,6 +13,8 @@ from harness import (BERGTOW, CLOSING, DONE, IO, NUMERIC, TOW, Run, call, change
                      write_case)
 from resuming import assert_same_result
 
+from bergtow import writing  # noqa: E402
+
 SHORT = changed(TOW, run__duration=3)
 OTHER = changed(SHORT, ice__friction=0.1)
 STANDING = ("case.resolved.yml", "result.h5", "checkpoint.h5", "summary.json", "frames.xdmf")
@@ -48,6 +50,26 @@ def test_a_result_made_meanwhile_stays(tmp_path):
     late.send_signal(signal.SIGCONT)
     assert "holds a result" in late.communicate(timeout=60)[1] and late.returncode == IO
     assert contents(first.dir) == before
+
+
+def test_pages_of_the_result_before_are_named(tmp_path, old):
+    """By a run that replaces it, and by a resume; not those of others, and not where nothing was. Red: the folder holds
+    two answers in silence."""
+    for name, text in (("report.html", writing.MARK), ("force.png", writing.MARK), ("mine.png", "by hand"),
+                       ("input.yml", writing.MARK)):
+        (old / name).write_text(f"<!-- {text} -->")
+    case = write_case(tmp_path, OTHER)
+    result = call("run", case, "-o", old, "--force", "--quiet", "--steps", 5)
+    assert result.returncode == DONE and f"{old}: force.png, report.html: of an earlier result" in result.stderr
+    again = call("resume", old, "--quiet", "--steps", 5)
+    assert "force.png, report.html: of an earlier" in again.stderr
+    assert "mine" not in result.stderr and "input" not in result.stderr
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new/report.html").write_text(writing.MARK)
+    assert call("run", case, "-o", tmp_path / "new", "--quiet", "--steps", 5).stderr == ""
+    (old / "report.html").unlink()
+    (old / "force.png").unlink()
+    assert call("resume", old, "--quiet", "--steps", 5).stderr == ""
 
 
 @pytest.mark.parametrize("name", FIRST)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Checkpoints as a user meets them: stops and limits, damage, full disks, two processes in one folder, failures that
 can be met again."""
+import json
 import os
 import re
 import resource
@@ -211,6 +212,38 @@ def test_a_file_that_changes_before_the_first_checkpoint(tmp_path):
     assert resumed(tmp_path, "kept", "--steps", 2) == "" and (kept / "checkpoint.h5").exists()
     resolved.write_text(re.sub("# air.wind_table: .*", "", resolved.read_text()))
     assert f"{table}: has changed since the run in out began" in resumed(tmp_path, "out", code=REFUSED)
+
+
+def changes(told):
+    return [w["values"] for w in told["warnings"] if w["code"] == "file_changed"]
+
+
+def test_a_resolved_case_warns_of_files_that_have_changed(tmp_path):
+    """By `check` and `run`, also once resumed; not of a file that replaces the one named. Red: another result, and not
+    a word."""
+    table = tmp_path / "wind.csv"
+    table.write_text("t,u,v\n0,1,0\n40,-2,3\n")
+    case = write_case(tmp_path, changed(TOW, air__wind_table="wind.csv"))
+    assert call("run", case, "-o", "a", cwd=tmp_path).returncode == DONE
+    again, other = tmp_path / "a/case.resolved.yml", tmp_path / "other.csv"
+
+    def checked(*words):
+        return changes(json.loads(call("check", *words, "--json", cwd=tmp_path).stdout))
+    assert checked(case) == checked(again) == []
+    table.write_text("t,u,v\n0,1,0\n40,-2,4\n")
+    other.write_text("t,u,v\n0,1,0\n40,0,0\n")
+    (found,) = checked(again)
+    assert (found["key"], found["file"]) == ("air.wind_table", str(table)) and found["now"] != found["recorded"]
+    assert all(re.fullmatch(r"20 bytes, xxh128 [0-9a-f]{32}", found[name]) for name in ("now", "recorded"))
+    assert checked(case) == checked(again, "--set", f"air.wind_table={other}") == []
+    (tmp_path / "based.yml").write_text(f"base: {again}\nair: {{wind_table: other.csv}}\n")
+    (tmp_path / "longer.yml").write_text(f"base: {again}\nrun: {{title: longer}}\n")
+    assert checked("based.yml") == [] and checked("longer.yml") == [found]
+    assert call("run", again, "-o", "b", "--steps", 5, cwd=tmp_path).returncode == DONE
+    assert changes(Run(tmp_path / "b", None).summary) == [found]
+    table.unlink()
+    assert call("resume", "b", "--steps", 5, cwd=tmp_path).returncode == DONE
+    assert changes(Run(tmp_path / "b", None).summary) == [found]
 
 
 @pytest.mark.parametrize("arguments, code, text", [

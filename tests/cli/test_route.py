@@ -185,7 +185,7 @@ def test_members_are_the_map_within_its_errors(tmp_path):
     base = members.Floes.read(s.field)
     shifts, factors = [], []
     for m in some:
-        floes = members.Floes.read(m.keys["ice.field"])
+        floes = members.Floes.read(s.case.parent / m.keys["ice.field"])
         assert len(floes.area) == len(base.area) - m.left_out
         if not m.left_out:
             shifts.append(floes.pose[:, :2] - base.pose[:, :2])
@@ -197,14 +197,15 @@ def test_members_are_the_map_within_its_errors(tmp_path):
     assert np.log(np.concatenate(factors)).std() == pytest.approx(0.2, rel=0.25)
     drift = np.array([m.drift for m in some])
     assert drift.std() == pytest.approx(0.004, rel=0.3) and abs(drift.mean()) < 0.002
-    outlines = members.Floes.read(some[0].keys["ice.field"]).outlines()
+    outlines = members.Floes.read(s.case.parent / some[0].keys["ice.field"]).outlines()
     reach = [apart.radius(o, o.mean(axis=0)) for o in outlines]
     for i, p in enumerate(outlines):
         for j in range(i):
             if np.hypot(*(p.mean(axis=0) - outlines[j].mean(axis=0))) < reach[i] + reach[j]:
                 assert apart.of(p, outlines[j]) > 0
     again = members.drawn(3, s, errors, tmp_path / "again")[2]
-    with h5py.File(again.keys["ice.field"]) as a, h5py.File(some[2].keys["ice.field"]) as b:
+    first, second = (s.case.parent / m.keys["ice.field"] for m in (again, some[2]))
+    with h5py.File(first) as a, h5py.File(second) as b:
         assert np.array_equal(a["floes/pose"], b["floes/pose"])
     for m in some[:2]:  # the program takes them
         sets = [w for k, v in m.keys.items() for w in ("--set", f"{k}={v}")]
@@ -617,6 +618,21 @@ def test_what_is_killed_goes_on(routed, tmp_path):
     assert again.returncode == DONE, again.stderr
     assert all(p.stat().st_mtime_ns == t for p, t in kept.items())
     assert without_clocks(json.loads((out / "route.json").read_text())) == without_clocks(routed.found)
+
+
+def test_a_folder_that_has_moved_keeps_its_tows(tmp_path):
+    """Red: the members' ice has absolute paths, so that the tows are other ones, and are made again."""
+    write_case(tmp_path, BASIN)
+    call = ["route", tmp_path / "case.yml", "--to", "8.5,0.3", "--routes", "1", "--members", "2", "--no-page", "-o"]
+    assert called(*call, tmp_path / "a").returncode == DONE
+    (tmp_path / "a").rename(tmp_path / "b")
+    kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "b").glob("route/*/members/*/finished")}
+    again = called(*call, tmp_path / "b")
+    assert again.returncode == DONE and "renamed" not in again.stderr and "study.files" not in again.stderr
+    assert "records what it held" not in again.stderr
+    assert len(kept) == 4 and all(p.stat().st_mtime_ns == t for p, t in kept.items())
+    study = (tmp_path / "b/route/straight/study.resolved.yml").read_text()
+    assert "ice.field=route/members/m001.h5" in study
 
 
 def test_a_place_gives_degrees_and_a_gpx(tmp_path):

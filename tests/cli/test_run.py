@@ -115,6 +115,11 @@ def test_steps(tmp_path):
     short = run(tmp_path, TOW, "--steps", 70)
     assert short.summary["n_steps"] == 70 == len(short.series("time"))
     assert short.summary["stopped"] is None
+    with h5py.File(short.dir / "result.h5") as f:  # red: complete, and nothing tells that steps of the case are left
+        at = dict(f.attrs)
+    assert (at["complete"], at["n_steps"], at["stopped"]) == (1, 70, "")
+    assert at["n_steps_of_case"] == round(TOW["run"]["duration"] / TOW["run"]["dt"]) > 70
+    assert all(name in at["comment"] for name in ("complete", "stopped", "n_steps_of_case"))
     whole = run(tmp_path, changed(TOW, run__duration=7), name="whole")
     assert whole.hash == short.hash
     assert run(tmp_path, changed(TOW, run__duration=7), "--steps", 1000, name="more").summary["n_steps"] == 70

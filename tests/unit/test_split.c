@@ -4,6 +4,7 @@
 #include "base/rng.h"
 #include "split/section.h"
 #include "split/find.h"
+#include "step/splitting.h"
 
 static const double K = 150e3, STRENGTH = 300e3;
 
@@ -763,6 +764,23 @@ TEST(test_scatter)
     assert_true(w == bt_split_scatter(3, 5, 2, 8));
     assert_true(w != bt_split_scatter(3, 5, 3, 8) && w != bt_split_scatter(3, 6, 2, 8) &&
                 w != bt_split_scatter(4, 5, 2, 8));
+}
+
+TEST(test_sizes_of_an_even_number)
+{
+    // floes of 2 m and 4 m split in halves of sqrt(2) m and sqrt(8) m, and one of the latter in two of 2 m
+    bt_splitting *splitting = bt_alloc(1, sizeof *splitting);
+    splitting->first = 10;
+    const double areas[] = {2, 8, 4}, none[2] = {0};
+    for (int k = 0; k < 3; k++) {
+        const bt_split_record record = {.parent = k < 2 ? k : 12, .generation = k < 2 ? 1 : 2,
+                                        .area = {areas[k], areas[k]}};
+        bt_splitting_append(splitting, &record, none);
+    }
+    assert_near(bt_splitting_size(splitting, true, 50), 3, 1e-15); // red: 2 m, the smaller one of the middle two
+    assert_near(bt_splitting_size(splitting, false, 50), 2, 1e-15);
+    assert_near(bt_splitting_size(splitting, false, 0), sqrt(2), 1e-15);
+    bt_splitting_free(splitting);
 }
 
 TEST_MAIN(NULL, NULL)

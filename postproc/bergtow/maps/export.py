@@ -130,6 +130,17 @@ def _iceberg(run, frame):
     return run.wrap(run.body_pose(frame)[run.towed:run.towed + 1, :2], way)[0]
 
 
+def _led(run, frame, names):
+    """Position [2] m of the towing end, where a vessel is, too; not wrapped. While a line holds it is that of the
+    frame, else that of the sample at the same time, NaN if there is none: frames lie between samples, and an
+    interpolated position may be metres off. names: of the series."""
+    end = run.towing_end(frame)
+    if np.isfinite(end).all():
+        return end + (_iceberg(run, frame) - run.body_pose(frame)[run.towed, :2])
+    at = np.flatnonzero(run["time"] == run.frame_times[frame])
+    return np.array([run[name][at[0]] if len(at) else np.nan for name in names])
+
+
 def _about(run, frame):
     """Centre of the ice exported from a periodic domain: with a moving window, the middle of the window, whose end lies
     a fixed distance ahead of the iceberg; otherwise the iceberg. None without an iceberg."""
@@ -154,10 +165,11 @@ def floes_layer(run, frames):
     def of(values):
         return np.concatenate([values(f)[index[at == f]] for f in frames])
 
+    fixed = {} if run.fixed is None else {"fixed": ("", run.fixed[index])}
     return Layer("floes", "Polygon", {
         "id": ("", index), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
         "area_m2": ("m2", run.area[index]), "speed_m_s": ("m/s", of(run.speed)),
-        "force_n": ("N, largest normal contact force in the step", of(run.contact_force))}, places)
+        "force_n": ("N, largest normal contact force in the step", of(run.contact_force))} | fixed, places)
 
 
 def bodies_layer(run, frames):
@@ -228,8 +240,8 @@ class Trajectories:
             if x in run and np.isfinite(run[x]).any():
                 if name == "iceberg":
                     way = np.array([_iceberg(run, f) for f in frames])
-                else:  # frames lie between samples, and the first one before all of them
-                    way = np.column_stack([np.interp(time, run["time"], run[c], np.nan, np.nan) for c in (x, y)])
+                else:
+                    way = np.array([_led(run, f, (x, y)) for f in frames])
                 speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
                 rows.append((name, way, np.array(speeds), np.nan))
         if not rows:
@@ -289,8 +301,10 @@ def write_ogr(layers, place, path, driver):
         columns = layer.columns if driver == "GPKG" else layer.columns | {"made_by": ("", [])}
         for name, (unit, values) in columns.items():
             number = np.asarray(values).dtype.kind
-            field = ogr.FieldDefn(name, {"i": ogr.OFTInteger64, "f": ogr.OFTReal}.get(number if unit or len(values)
-                                                                                       else "U", ogr.OFTString))
+            kinds = {"i": ogr.OFTInteger64, "f": ogr.OFTReal, "b": ogr.OFTInteger}
+            field = ogr.FieldDefn(name, kinds.get(number if unit or len(values) else "U", ogr.OFTString))
+            if driver == "GPKG" and number == "b":
+                field.SetSubType(ogr.OFSTBoolean)
             if driver == "GPKG" and unit:
                 field.SetAlternativeName(f"{name} ({unit})")
             map_read.quietly(there.CreateField, field)

@@ -119,6 +119,13 @@ class Frames:
         return np.concatenate([own, self._read("pieces/area", ndim=1)]) if self.n_pieces else own
 
     @cached_property
+    def fixed(self):
+        """[N] of bool: floes that nothing moves; None in results of version 0.1.0, which do not tell."""
+        if "fixed" not in self._file["floes"]:
+            return None
+        return np.append(self._read("floes/fixed", ndim=1) != 0, np.zeros(self.n_pieces, bool))
+
+    @cached_property
     def bodies(self):
         """List of Body: all bodies that are not floes, in the order of body_pose; may be empty."""
         if "bodies" not in self._file:
@@ -219,6 +226,14 @@ class Frames:
     def on_page(self, xy):
         """Positions [..., 2] as (horizontal, vertical) of a picture: in the geographic frame as on a map."""
         return np.asarray(xy, dtype=float)[..., ::-1 if self.geographic else 1]
+
+    def towing_end(self, frame):
+        """Position [2] m of the towing end beside the towed body of the frame; NaN without a line that holds."""
+        if "line_points" in self._file.get("frames", ()):
+            for hull, end in self._read("frames/line_points", frame % self.n_frames, ndim=3).reshape(-1, 2, 2):
+                if not np.array_equal(hull, end):  # of a broken branch both are at the hull
+                    return end
+        return np.full(2, np.nan)
 
     def wrap(self, xy, centre=None):
         """Shift positions [n, 2] m by whole periods to within half a period of centre (default: of the domain).

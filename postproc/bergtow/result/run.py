@@ -43,12 +43,15 @@ def within(time, start, end):
 
 def least(x):
     """Fill a load that is NaN in some steps (no_load) with the last number before each, 0 at the start. The load has no
-    bound there, so means and peaks of the result are lower bounds. A load without any numbers is returned unchanged."""
-    there = np.isfinite(x)
+    bound there, so means and peaks of the result are lower bounds. A load without any numbers is returned unchanged.
+    x: [n], or [n, panels]."""
+    there = np.isfinite(x).reshape(len(x), -1).all(axis=1)
     if there.all() or not there.any():
         return x
     last = np.maximum.accumulate(np.where(there, np.arange(len(x)), -1))
-    return np.where(last < 0, 0.0, x[np.maximum(last, 0)])
+    filled = x[np.maximum(last, 0)]
+    filled[last < 0] = 0.0
+    return filled
 
 
 def notes(found):

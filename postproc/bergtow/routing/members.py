@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from bergtow.errors import CASE, RunError
 from bergtow.result.frames import place
 from bergtow.routing import apart
-from bergtow.routing.situation import reading
+from bergtow.routing.situation import named, reading
 
 import h5py
 import numpy as np
@@ -179,7 +179,7 @@ def one(k, floes, own, situation, errors, folder, as_read):
     file = folder / f"m{k + 1:03d}.h5"
     moved.take(kept).write(file)
     drift = errors.drift * current
-    keys = as_read | {"ice.field": str(file)}
+    keys = as_read | {"ice.field": named(values, file)}
     if errors.drift:
         keys |= {f"water.current_{axis}": f"{values[f'water.current_{axis}'] + d:.12g} m/s"
                  for axis, d in zip("xy", drift)}

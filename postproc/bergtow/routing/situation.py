@@ -339,10 +339,17 @@ def field(program, case, folder):
     return out
 
 
+def named(case, file):
+    """How a Case names a file: relative to its own folder for one below that, so that the folder can be moved."""
+    file, folder = Path(file).resolve(), Path(case.path).resolve().parent
+    return str(file.relative_to(folder) if file.is_relative_to(folder) else file)
+
+
 def reading(case, file):
     """{key: value} that make a case read its floes from a field file."""
-    return {"ice.field": str(file)} | ({"ice.outlines": "none", "ice.outlines_crs": "file", "ice.origin_east": "none",
-                                        "ice.origin_north": "none"} if case["ice.outlines"] else {})
+    of_outlines = {"ice.outlines": "none", "ice.outlines_crs": "file", "ice.origin_east": "none",
+                   "ice.origin_north": "none"}
+    return {"ice.field": named(case, file)} | (of_outlines if case["ice.outlines"] else {})
 
 
 def checked(values):

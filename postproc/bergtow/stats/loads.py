@@ -83,8 +83,9 @@ def _panel_load(run):
     """(Load, values [n, panels]), None if a run has no panel series."""
     if "load" not in run.panel_series:
         return None
-    return Load("panel_load", "load on one hull panel", run.panel_series["units"],
-                "sum of the normal forces on a panel of the hull, the largest of all panels"), run.panel_series["load"]
+    found = run.panel_series
+    return Load("panel_load", "load on one hull panel", found["units"],
+                "sum of the normal forces on a panel of the hull, the largest of them"), filler(run)(found["load"])
 
 
 def of_run(run):

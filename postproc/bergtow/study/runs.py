@@ -6,13 +6,13 @@ design and route base their decisions on them. Their requirements are under "Man
     DIR/SUBJECT/NAME/           its ensemble; field NNN in members/c001-rNNN
 
 The program keeps runs, resumes those that were stopped, and repeats damaged ones. A folder of another study, or of
-another version of the program, is removed. So only one call at a time works in DIR/SUBJECT: it and its runs hold the
-lock of the folder.
+another version of the program, is renamed to NAME.old: its runs may have taken hours, and it may hold files of others.
+So only one call at a time works in DIR/SUBJECT: it and its runs hold the lock of the folder.
 """
 import ctypes
+import itertools
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -130,16 +130,26 @@ class CaseRuns:
                 {k: v if isinstance(v, str) else f"{v:.12g}" for k, v in values.items()},
                 "fields": "numbered", "seed": FIRST_SEED, "repeats": n}
 
+    def set_aside(self, name, why):
+        """Rename the folder of runs that are no longer those of NAME, and tell why."""
+        home = self.home(name)
+        if not home.exists():
+            return
+        old = next(path for k in itertools.count(1) if not (path := Path(f"{home}.old{k if k > 1 else ''}")).exists())
+        home.rename(old)
+        self.tell((name, why), f"{home}: renamed to {old.name}, and its runs are made again: {why}")
+
     def write(self, name, n, values):
-        """Write NAME.yml; runs of another version of the program are removed."""
+        """Write NAME.yml; runs of another version of the program are set aside."""
         path = Path(f"{self.home(name)}.yml")
         path.parent.mkdir(parents=True, exist_ok=True)
         study = {"base": os.path.relpath(self.case.resolve(), path.parent.resolve()), **self.study(n, values)}
         for some in (study.get("set", {}), *study.get("variants", {}).values()):
             some |= {key: None for key, text in some.items() if text in ("", "~", "null")}
         first = f"# {self.version}\n"
-        if path.exists() and not path.read_text(encoding="utf-8").startswith(first):
-            shutil.rmtree(self.home(name), ignore_errors=True)
+        made_by = path.read_text(encoding="utf-8").partition("\n")[0] + "\n" if path.exists() else first
+        if made_by != first:
+            self.set_aside(name, f"they are of {made_by[2:-1]}, and this is {self.version}")
         path.write_text(first + yaml.safe_dump(study, sort_keys=False, allow_unicode=True), encoding="utf-8")
         return path
 
@@ -170,11 +180,9 @@ class CaseRuns:
             _, said = run_members(self.program, study, self.home(name), [], self.jobs, self.last - began, not line,
                                   more, line, pass_fds=[self.lock] if self.lock >= 0 else [])
         except Refused as error:
-            codes = {message.code for message in error.errors}
+            codes = {message.code: message.text for message in error.errors}
             if "other_study" in codes:
-                self.tell((name, "other_study"), f"{self.home(name)}: its runs have other settings, and are made "
-                          "again")
-                shutil.rmtree(self.home(name))
+                self.set_aside(name, codes["other_study"])
             elif "one_field" in codes:
                 self._alike.add(name)
             else:
