@@ -789,6 +789,35 @@ def test_windows_that_are_too_short_for_a_number_are_told_before_the_first_run(t
     assert error.value.status == 3 and not (tmp_path / "out/design.yml").exists()
     p = answer.plan(BERGTOW, path, ["output.window_start=-1"], 1, 2, np.inf, 9)  # it may be longer than half of the run
     assert p["gives"] == "no_window" and "as short as that" in words.plan(p)
+    def begins(*_):
+        raise BergtowError("it runs")
+    monkeypatch.setattr(design, "run_case", begins)
+    def needs(*options):
+        """The run.duration that is asked for; None if the runs begin."""
+        with pytest.raises(BergtowError) as error:
+            cli.perform("design", path, "-o", tmp_path / "out", "--no-pdf", "--no-replay", *options)
+        found = re.search(r"lengthen run.duration to (\d+) s", str(error.value))
+        return int(found[1]) if found else None
+    own = "--set", "run.duration=161 s", "--set", "output.window_start=10 s", "--set", "tow.speed=0.02"
+    assert needs(*own) is None
+    longer = needs(*own, "--speeds", "0.04 m/s")  # red: that speed was left out after all runs
+    assert longer > 300 and needs(*own, "--speeds", "0.04 m/s", "--set", f"run.duration={longer} s") is None
+
+
+@pytest.mark.parametrize("dt, every, start, some", [
+    (4, 1, 100, {252: False, 255: True, 258: True}), (7, 1, 98, {230: True, 224: False, 238: True}),
+    (2, 3, 101, {246: False, 252: True}), (2, 5, 33, {181: False, 201: True}), (1, 1, 0, {149: False, 150: True})])
+def test_a_window_holds_whole_samples_as_in_the_statistics(tmp_path, dt, every, start, some):
+    """30 s are 8 samples of 4 s, and 4 of 7 s. Red: 152 s of 4 s said to be enough, and 132 s of 7 s too short."""
+    path = write_case(tmp_path, changed(CASE, estimate__length_scale=1, tow__speed=0.01))
+    for duration, enough in some.items():
+        steps = math.ceil(duration / dt)
+        time = every * dt * np.arange(1, steps // every + 1)
+        first = max(1, math.ceil(start / dt)) * dt + (every - 1) * dt  # Members.window
+        assert (stat_load.field_of(time, 0.0 * time, first, steps * dt, 30.0) is not None) == enough
+        p = answer.plan(BERGTOW, path, [f"run.dt={dt} s", f"run.duration={duration} s", f"output.window_start={start} s",
+                                        f"output.sample_every={every}"], 1, 2, np.inf, 9)
+        assert (p["gives"] != "no_window") == enough
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ width that the rule requires: a load that the periodic images of the body help t
 Walls are part of the question, and are left where they are.
 """
 import argparse
+import itertools
 import math
 import os
 import re
@@ -476,12 +477,16 @@ def planned(a, case, found, began):
     work.core = answer.plan(work.program, a.file, a.set, n, a.jobs, np.inf, a.fields)["core_s"]
     left = set_ends(work, a, n) - time.monotonic()
     plan = answer.plan(work.program, a.file, a.set, n, a.jobs, left / 60, a.fields)
-    if plan["gives"] == "no_window" and found["window_start"] >= 0:
-        lacks = 3600 * (plan["least_window_hours"] - plan["window_hours"])
-        raise RunError(a.file, f"has a window of {3600 * plan['window_hours']:g} s, and a load needs "
-                       f"{answer.stat_load.LEAST_SCALES} time scales, {3600 * plan['least_window_hours']:.4g} s",
-                       f"lengthen run.duration to {math.ceil(found['duration'] + lacks - 1e-6)} s, or give the length "
-                       "scale of a model (estimate.length_scale)", CASE)
+    faster = max(found["speed"], *a.speeds) / found["speed"] if a.by_speed else 1.0
+    window, least, enough = answer.window_of(found, faster)
+    if found["window_start"] >= 0 and not enough:
+        at = f" at {faster * found['speed']:g} m/s" if faster > 1 else ""
+        longer = next(t for t in itertools.count(math.ceil(found["duration"]))
+                      if answer.window_of(found | {"duration": t}, faster)[2])
+        raise RunError(a.file, f"has a window of {window:g} s{at}, and a load needs "
+                       f"{answer.stat_load.LEAST_SCALES} time scales, {least:.4g} s",
+                       f"lengthen run.duration to {longer} s, or {'leave that speed out, or ' if at else ''}give the "
+                       "length scale of a model (estimate.length_scale)", CASE)
     print(alike or answer_text.plan(plan), flush=True)
     return work, plan | {"speed_m_s": found["speed"]}
 
