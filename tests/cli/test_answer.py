@@ -536,6 +536,21 @@ def test_a_tow_of_a_model_is_shorter_than_the_one_asked_for(made):
     assert "of tows of 1.2 h exceed" in words.WORDS["needs"](level, made)
     fall_back = {"reason": "no_tail", "n_tows": 3, "hours_each": 0.01, "n": 8.0, "share_below": 0.3}
     assert "a tow of 1.2 h bears more" in words.WORDS["covers"](fall_back, made)
+    earlier = [{k: x for k, x in c.items() if k != "tow_hours"} | {"time_scale_s": 1.5} for c in made["conditions"]]
+    assert "of tows of 1.2 h exceed" in words.WORDS["needs"](level, made | {"conditions": earlier})
+    full = [c | {"time_scale_s": 28.0} for c in earlier]  # four samples of 7 s
+    assert "of tows of 24 h exceed" in words.WORDS["needs"](level, made | {"conditions": full})
+
+
+def test_hours_and_time_scale_are_those_of_the_condition_of_the_value(made):
+    """Red: those of the first, which has another length scale."""
+    two = [c | {"tow_hours": hours, "time_scale_s": scale}
+           for c, hours, scale in zip(made["conditions"], (8, 4), (10, 5))]
+    level = {"kind": "return_level", "n": 8.0, "interval_95": [7.0, 9.0], "case": "case.steady"}
+    for k, times in enumerate(((8, 10), (4, 5))):
+        said = words.WORDS["needs"](level, made | {"conditions": two, "load_cases": [
+            {"id": "case.steady", "of": two[k]["id"]}]})
+        assert f"over {words.short(times[1], 2)} s" in said and f"tows of {times[0]}.0 h" in said
 
 
 def test_the_fall_back_is_named(made):
