@@ -830,8 +830,8 @@ def test_a_window_holds_whole_samples_as_in_the_statistics(tmp_path, dt, every, 
         time = every * dt * np.arange(1, steps // every + 1)
         first = max(1, math.ceil(start / dt)) * dt + (every - 1) * dt  # Members.window
         assert (stat_load.field_of(time, 0.0 * time, first, steps * dt, 30.0) is not None) == enough
-        p = answer.plan(BERGTOW, path, [f"run.dt={dt} s", f"run.duration={duration} s", f"output.window_start={start} s",
-                                        f"output.sample_every={every}"], 1, 2, np.inf, 9)
+        given = {"run.dt": dt, "run.duration": duration, "output.window_start": start, "output.sample_every": every}
+        p = answer.plan(BERGTOW, path, [f"{key}={value}" for key, value in given.items()], 1, 2, np.inf, 9)
         assert (p["gives"] != "no_window") == enough
 
 

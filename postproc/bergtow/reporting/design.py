@@ -460,6 +460,21 @@ def sets_of_study(a, asked):
     return [text for text in a.set if text.partition("=")[0].strip() not in there]
 
 
+def refuse_short_window(a, found):
+    """Raises RunError if the window that a case names is too short for a load, at the fastest of its speeds."""
+    faster = max(found["speed"], *a.speeds) / found["speed"] if a.by_speed else 1.0
+    window, least, enough = answer.window_of(found, faster)
+    if enough:
+        return
+    at = f" at {faster * found['speed']:g} m/s" if faster > 1 else ""
+    longer = next(t for t in itertools.count(math.ceil(found["duration"]))
+                  if answer.window_of(found | {"duration": t}, faster)[2])
+    raise RunError(a.file, f"has a window of {window:g} s{at}, and a load needs {answer.stat_load.LEAST_SCALES} time "
+                   f"scales, {least:.4g} s", f"lengthen run.duration to {longer} s, or "
+                   f"{'leave that speed out, or ' if at else ''}give the length scale of a model "
+                   "(estimate.length_scale)", CASE)
+
+
 def planned(a, case, found, began):
     """(Work of the fields, plan): print, before the first run, the cost per value and what the budget allows. Raises
     RunError."""
@@ -477,16 +492,8 @@ def planned(a, case, found, began):
     work.core = answer.plan(work.program, a.file, a.set, n, a.jobs, np.inf, a.fields)["core_s"]
     left = set_ends(work, a, n) - time.monotonic()
     plan = answer.plan(work.program, a.file, a.set, n, a.jobs, left / 60, a.fields)
-    faster = max(found["speed"], *a.speeds) / found["speed"] if a.by_speed else 1.0
-    window, least, enough = answer.window_of(found, faster)
-    if found["window_start"] >= 0 and not enough:
-        at = f" at {faster * found['speed']:g} m/s" if faster > 1 else ""
-        longer = next(t for t in itertools.count(math.ceil(found["duration"]))
-                      if answer.window_of(found | {"duration": t}, faster)[2])
-        raise RunError(a.file, f"has a window of {window:g} s{at}, and a load needs "
-                       f"{answer.stat_load.LEAST_SCALES} time scales, {least:.4g} s",
-                       f"lengthen run.duration to {longer} s, or {'leave that speed out, or ' if at else ''}give the "
-                       "length scale of a model (estimate.length_scale)", CASE)
+    if found["window_start"] >= 0:
+        refuse_short_window(a, found)
     print(alike or answer_text.plan(plan), flush=True)
     return work, plan | {"speed_m_s": found["speed"]}
 
