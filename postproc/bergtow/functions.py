@@ -14,10 +14,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
+from .arguments import ends_in
 from .case import here, setting
 from .errors import IO, BergtowError
 from .said import collected
-from .writing import written
+from .writing import PICTURES, written
 
 if TYPE_CHECKING:
     from .result.dataset import Result
@@ -93,8 +94,9 @@ class Picture:
         its path. A .png is the picture as displayed; the other formats are drawn from the contents that the result
         folder has when they are first asked for. replace: overwrite a file even if bergtow did not make it."""
         path = Path(file)
-        with written(path, force=replace) as new:
-            new.write_bytes(self._data(path.suffix.lstrip(".")))
+        ends_in(path, PICTURES)
+        with written(path, replace, ("give another path", "replace=True")) as new:
+            new.write_bytes(self._data(path.suffix.lower().lstrip(".")))
         return path
 
     def _repr_png_(self) -> bytes:

@@ -33,26 +33,30 @@ def made_here(path):
             return data.find(MARK.encode()) >= 0
 
 
-def may_write(path, force):
+#: remedies of a path that cannot be used, of a file that is not replaced: those of the commands
+REMEDIES = "choose another place with -o", "--force"
+
+
+def may_write(path, force, remedies=REMEDIES):
     """Raises RunError for a file that bergtow did not make, and for a path that is not a file."""
+    other, by = remedies
     try:
         if not path.exists():
             return
         if not path.is_file():
-            raise RunError(path, "already exists and is not a file", "choose another place with -o")
+            raise RunError(path, "already exists and is not a file", other)
         if force or made_here(path):
             return
     except OSError as error:
-        raise RunError(path, f"cannot be read ({error.strerror or error})", "choose another place with -o") from None
-    raise RunError(path, "already exists and was not made by bergtow",
-                   "choose another place with -o, or --force to replace it")
+        raise RunError(path, f"cannot be read ({error.strerror or error})", other) from None
+    raise RunError(path, "already exists and was not made by bergtow", f"{other}, or {by} to replace it")
 
 
 @contextmanager
-def written(path, force):
+def written(path, force, remedies=REMEDIES):
     """with written(path, force) as new: write the file `new`, which replaces `path` once it is complete. Raises
     RunError."""
-    may_write(path, force)
+    may_write(path, force, remedies)
     new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -61,7 +65,7 @@ def written(path, force):
             os.fsync(whole.fileno())  # so that a crash leaves either the old file or the new one
         os.replace(new, path)
     except OSError as error:
-        raise RunError(path, f"cannot be written ({error.strerror or error})", "choose another place with -o") from None
+        raise RunError(path, f"cannot be written ({error.strerror or error})", remedies[0]) from None
     finally:
         with suppress(OSError):
             new.unlink()

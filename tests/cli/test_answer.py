@@ -536,6 +536,21 @@ def test_a_tow_of_a_model_is_shorter_than_the_one_asked_for(made):
     assert "of tows of 1.2 h exceed" in words.WORDS["needs"](level, made)
     fall_back = {"reason": "no_tail", "n_tows": 3, "hours_each": 0.01, "n": 8.0, "share_below": 0.3}
     assert "a tow of 1.2 h bears more" in words.WORDS["covers"](fall_back, made)
+    earlier = [{k: x for k, x in c.items() if k != "tow_hours"} | {"time_scale_s": 1.5} for c in made["conditions"]]
+    assert "of tows of 1.2 h exceed" in words.WORDS["needs"](level, made | {"conditions": earlier})
+    full = [c | {"time_scale_s": 28.0} for c in earlier]  # four samples of 7 s
+    assert "of tows of 24 h exceed" in words.WORDS["needs"](level, made | {"conditions": full})
+
+
+def test_hours_and_time_scale_are_those_of_the_condition_of_the_value(made):
+    """Red: those of the first, which has another length scale."""
+    two = [c | {"tow_hours": hours, "time_scale_s": scale}
+           for c, hours, scale in zip(made["conditions"], (8, 4), (10, 5))]
+    level = {"kind": "return_level", "n": 8.0, "interval_95": [7.0, 9.0], "case": "case.steady"}
+    for k, times in enumerate(((8, 10), (4, 5))):
+        said = words.WORDS["needs"](level, made | {"conditions": two, "load_cases": [
+            {"id": "case.steady", "of": two[k]["id"]}]})
+        assert f"over {words.short(times[1], 2)} s" in said and f"tows of {times[0]}.0 h" in said
 
 
 def test_the_fall_back_is_named(made):
@@ -789,6 +804,35 @@ def test_windows_that_are_too_short_for_a_number_are_told_before_the_first_run(t
     assert error.value.status == 3 and not (tmp_path / "out/design.yml").exists()
     p = answer.plan(BERGTOW, path, ["output.window_start=-1"], 1, 2, np.inf, 9)  # it may be longer than half of the run
     assert p["gives"] == "no_window" and "as short as that" in words.plan(p)
+    def begins(*_):
+        raise BergtowError("it runs")
+    monkeypatch.setattr(design, "run_case", begins)
+    def needs(*options):
+        """The run.duration that is asked for; None if the runs begin."""
+        with pytest.raises(BergtowError) as error:
+            cli.perform("design", path, "-o", tmp_path / "out", "--no-pdf", "--no-replay", *options)
+        found = re.search(r"lengthen run.duration to (\d+) s", str(error.value))
+        return int(found[1]) if found else None
+    own = "--set", "run.duration=161 s", "--set", "output.window_start=10 s", "--set", "tow.speed=0.02"
+    assert needs(*own) is None
+    longer = needs(*own, "--speeds", "0.04 m/s")  # red: that speed was left out after all runs
+    assert longer > 300 and needs(*own, "--speeds", "0.04 m/s", "--set", f"run.duration={longer} s") is None
+
+
+@pytest.mark.parametrize("dt, every, start, some", [
+    (4, 1, 100, {252: False, 255: True, 258: True}), (7, 1, 98, {230: True, 224: False, 238: True}),
+    (2, 3, 101, {246: False, 252: True}), (2, 5, 33, {181: False, 201: True}), (1, 1, 0, {149: False, 150: True})])
+def test_a_window_holds_whole_samples_as_in_the_statistics(tmp_path, dt, every, start, some):
+    """30 s are 8 samples of 4 s, and 4 of 7 s. Red: 152 s of 4 s said to be enough, and 132 s of 7 s too short."""
+    path = write_case(tmp_path, changed(CASE, estimate__length_scale=1, tow__speed=0.01))
+    for duration, enough in some.items():
+        steps = math.ceil(duration / dt)
+        time = every * dt * np.arange(1, steps // every + 1)
+        first = max(1, math.ceil(start / dt)) * dt + (every - 1) * dt  # Members.window
+        assert (stat_load.field_of(time, 0.0 * time, first, steps * dt, 30.0) is not None) == enough
+        given = {"run.dt": dt, "run.duration": duration, "output.window_start": start, "output.sample_every": every}
+        p = answer.plan(BERGTOW, path, [f"{key}={value}" for key, value in given.items()], 1, 2, np.inf, 9)
+        assert (p["gives"] != "no_window") == enough
 
 
 @pytest.mark.slow

@@ -134,7 +134,8 @@ def test_values_set_beside_the_case_are_those_of_the_study(tmp_path, monkeypatch
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     cli.perform("design", tmp_path / "case.yml", "-o", tmp_path / "out", "--fields", "1", "--quiet", "--no-pdf",
                 "--no-replay", "--no-load-cases", "--speeds", "0.26 m/s", "--set", "run.duration=20 s", "--set",
-                "ice.concentration=0.2", "--winds", "2 m/s", "--set", "air.wind_y=1 m/s", "--set", "ice.friction=0.1")
+                "output.window_start=4 s", "--set", "ice.concentration=0.2", "--winds", "2 m/s",
+                "--set", "air.wind_y=1 m/s", "--set", "ice.friction=0.1")
     e, found = Members(tmp_path / "out"), set()
     for m in range(e.n):
         with Run(e.folder(m)) as run:
@@ -302,7 +303,7 @@ def test_ice_that_no_seed_changes_gets_one_field(ice, asked, fields, tmp_path, m
     a = cli.arguments("design", tmp_path / "case.yml", "-o", tmp_path, "--fields", "9")
     a.concentrations = asked
     case = {name: {} for name in design.SECTIONS} | {"ice": ice}
-    design.planned(a, case, {"case": {"ice.concentration": "0"}, "speed": 1.0}, 0.0)
+    design.planned(a, case, {"case": {"ice.concentration": "0"}, "speed": 1.0, "window_start": -1.0}, 0.0)
     assert a.fields == fields and ("one field is run" in capsys.readouterr().out) == (fields == 1)
     study = yaml.safe_load(design.write_study(a, case, a.fields, {}).read_text())
     assert study["repeats"] == fields and ("parameters" in study) == (not ice)

@@ -74,6 +74,11 @@ def test_a_picture_is_saved_as_it_is_shown(towed, tmp_path, monkeypatch):
     with pytest.raises(bergtow.BergtowError, match="theirs.png: already exists and was not made by bergtow"):
         picture.save(tmp_path / "theirs.png")
     assert (tmp_path / "theirs.png").read_text() == "not ours"
+    for name, remedy in ("theirs.png", "replace=True"), ("a.jpg", ".png, .pdf, .svg"), ("a", ".png, .pdf, .svg"):
+        with pytest.raises(bergtow.BergtowError) as error:  # red: -o and --force, and a temporary file
+            picture.save(tmp_path / name)
+        assert str(error.value).startswith(f"{tmp_path / name}: ") and remedy in str(error.value)
+        assert "--" not in str(error.value)
     assert picture.save(tmp_path / "theirs.png", replace=True).read_bytes() == picture._repr_png_()
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(bergtow.BergtowError, match="pipe.png: already exists and is not a file"):

@@ -142,18 +142,35 @@ def test_the_answer_is_the_design_statement(tmp_path):
     assert "figure" not in [b["kind"] for b in report_ensemble.answer(e, one, [], {})]
 
 
-@pytest.mark.parametrize("n", [2, 6, 12])
-def test_labels_of_conditions_are_within_the_picture(n):
-    """Those of two parameters are long and slanted. Red: the concentration of the first was outside."""
+def labelled(label, n):
+    """The picture of n conditions, its labels and its axes. label: k -> text."""
     tow = {"value": 9e5, "interval_95": [8e5, 1e6], "largest": 8e5, "mean": 5e5, "units": "N", "start_up": None}
-    figure = plot_design.draw([{"label": f"concentration {10 * k} %, tow speed {0.065 * k:g} m/s, thickness {k} m",
-                                "values": {"a": k, "b": -k}, "design": {"tension": None, "tow": tow}}
-                               for k in range(n)], {"a", "b"}, str, lambda key: 1)
+    figure = plot_design.draw([{"label": label(k), "values": {"a": k, "b": -k}, "design": {
+        "tension": None, "tow": tow}} for k in range(n)], {"a", "b"}, str, lambda key: 1)
     figure.draw_without_rendering()
-    for label in figure.axes[0].get_xticklabels():
+    return figure, figure.axes[0].get_xticklabels(), figure.axes[0].get_position()
+
+
+@pytest.mark.parametrize("words", [
+    "concentration {0}0 %, tow speed 0.{0} m/s, thickness {0} m", "outlines data/flight/segmented/" + "x" * 120 + "{0}",
+    ", ".join(["some key {0} m"] * 20)])
+@pytest.mark.parametrize("n", [2, 6, 12])
+def test_labels_of_conditions_are_within_the_picture(n, words):
+    """Those of two parameters are long and slanted. Red: the concentration of the first was outside; of a longer label,
+    or of twenty parameters, "bottom cannot be >= top"."""
+    figure, labels, axes = labelled(words.format, n)
+    for k, label in enumerate(labels):
         box = label.get_window_extent()
-        assert len(label.get_text()) > 30 and box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.width
-    assert figure.axes[0].get_position().width > 0.6 and figure.axes[0].get_position().height > 0.3
+        assert len(label.get_text()) >= 30 and str(k) in label.get_text()
+        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.width
+    assert axes.width > 0.6 and axes.height > 0.3
+
+
+def test_labels_leave_room_for_the_picture():
+    """Whatever their letters."""
+    for n in (2, 12):
+        _, _, axes = labelled(lambda k: ", ".join(["M" * 60] * 9), n)
+        assert axes.width >= 0.299 and axes.height >= 0.299
 
 
 def test_conditions_without_a_value_are_named_beside_the_largest():

@@ -640,6 +640,19 @@ def test_numbers_that_are_refused(more, said):
         plan(Ice([box(0, 0, 1, 1)], [0.0]), BERG, (50, 300), (900, 300), extent=(0, 0, 1000, 600))
 
 
+def test_closed_rings_are_those_without_their_last_point():
+    """As of GeoJSON and shapely. Red: edges that cross or touch."""
+    corners = [box(300, 250, 340, 320), disc(600, 300, 45, 9)]
+    closed = [np.concatenate([p, p[:1]]) for p in corners]
+    closed[0] = np.repeat(closed[0], 2, axis=0)
+    ways = [plan(Ice(rings, [1.0, 1.0]), BERG, (50, 300), (900, 300), extent=(0, 0, 1000, 600), no_go=rings[:1]).routes
+            for rings in (corners, closed)]
+    assert len(ways[0]) > 1 and [way.cost for way in ways[0]] == [way.cost for way in ways[1]]
+    for other in [[(0, 0), (1, 1), (0, 0)], [(5, 5)] * 4, [1, 2, 3], np.zeros((0, 2))]:
+        with pytest.raises(BergtowError, match="floe 0: an outline of shape"):
+            plan(Ice([other], [1.0]), BERG, (50, 300), (900, 300), extent=(0, 0, 1000, 600))
+
+
 def test_a_goal_at_the_start_or_next_to_it():
     """Less than a spacing of the lattice away, the search ends where it begins. Red: memory before the way-points is
     written to."""

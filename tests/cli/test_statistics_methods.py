@@ -109,6 +109,7 @@ def test_the_exponent_is_that_of_the_means(scatter, n, shared):
     assert one_hit[0] == pytest.approx(3) and np.isnan(one_hit[1:]).all()  # no exponent without the first field
     assert stat_mean.power_of_conditions([1, 2], [{1: 0.0, 2: 0.0}, {1: 4.0, 2: 4.0}]) is None
     assert stat_mean.power_of_conditions([2, 2], [{1: 1.0}, {2: 4.0}]) is None
+    assert stat_mean.power_of_conditions([0, 2], [{1: 1.0}, {2: 4.0}]) is None  # red: NaN, a body that is held
 
 
 def test_the_studentised_bootstrap_follows_skewness():

@@ -9,6 +9,8 @@ import numpy as np
 
 EDGE = 0.01  #: of the picture, left free beside labels
 FEW = 7      #: more labels of several lines are too close at a small slant
+LETTERS, LINES = 30, 4  #: of a label, whose full text is in the tables
+LEAST = 0.3  #: share of the picture, in width and height, that labels leave to the axes at least
 LIMIT = 4.0  #: upper ends of intervals are cut off at this multiple of the largest value
 
 
@@ -40,6 +42,13 @@ def _draw(axes, x, some, factor, top, colour, label):
         axes.plot(x[at][beyond], np.full(beyond.sum(), top) / factor, "^", color=colour, markersize=7, zorder=5)
 
 
+def _label(text):
+    """A label in lines, with its long parts and long lists of parts cut short."""
+    lines = [part if len(part) <= LETTERS else f"{part[:LETTERS // 2]}…{part[-LETTERS // 2 + 1:]}"
+             for part in text.split(", ")]
+    return ",\n".join(lines if len(lines) <= LINES else [*lines[:LINES - 1], "…"])
+
+
 def _make_room(figure, axes):
     """Move the axes up, and to the right, until the slanted labels below them are within the picture."""
     figure.draw_without_rendering()
@@ -51,7 +60,8 @@ def _make_room(figure, axes):
         share = (tick - here.x0) / here.width
         if box.x0 < EDGE * width and share < 1:
             left.append((tick - box.x0 / width + EDGE - share * here.x1) / (1 - share))
-    figure.subplots_adjust(left=max(left), bottom=here.y0 + max(0, EDGE - min(box.y0 for box in boxes) / height))
+    bottom = here.y0 + max(0, EDGE - min(box.y0 for box in boxes) / height)
+    figure.subplots_adjust(left=min(max(left), here.x1 - LEAST), bottom=min(bottom, here.y1 - LEAST))
 
 
 def draw(conditions, numeric, axis_label, times):
@@ -89,8 +99,7 @@ def draw(conditions, numeric, axis_label, times):
                                      if np.isfinite(v)]
     axes.set_ylim(0, 1.08 * min(top, max([largest, *(d["largest"] for d in tows if d), *ends])) / factor)
     axes.set_ylabel(f"force ({unit})")
-    axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [c["label"].replace(", ", ",\n")
-                                                                         for c in conditions],
+    axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [_label(c["label"]) for c in conditions],
                     **({} if key else {"rotation": 20 if len(x) <= FEW else 45, "ha": "right"}))
     axes.set_xlabel(axis_label(key) if key else "")
     axes.grid(True, axis="y")

@@ -19,6 +19,7 @@ width that the rule requires: a load that the periodic images of the body help t
 Walls are part of the question, and are left where they are.
 """
 import argparse
+import itertools
 import math
 import os
 import re
@@ -459,6 +460,21 @@ def sets_of_study(a, asked):
     return [text for text in a.set if text.partition("=")[0].strip() not in there]
 
 
+def refuse_short_window(a, found):
+    """Raises RunError if the window that a case names is too short for a load, at the fastest of its speeds."""
+    faster = max(found["speed"], *a.speeds) / found["speed"] if a.by_speed else 1.0
+    window, least, enough = answer.window_of(found, faster)
+    if enough:
+        return
+    at = f" at {faster * found['speed']:g} m/s" if faster > 1 else ""
+    longer = next(t for t in itertools.count(math.ceil(found["duration"]))
+                  if answer.window_of(found | {"duration": t}, faster)[2])
+    raise RunError(a.file, f"has a window of {window:g} s{at}, and a load needs {answer.stat_load.LEAST_SCALES} time "
+                   f"scales, {least:.4g} s", f"lengthen run.duration to {longer} s, or "
+                   f"{'leave that speed out, or ' if at else ''}give the length scale of a model "
+                   "(estimate.length_scale)", CASE)
+
+
 def planned(a, case, found, began):
     """(Work of the fields, plan): print, before the first run, the cost per value and what the budget allows. Raises
     RunError."""
@@ -476,12 +492,8 @@ def planned(a, case, found, began):
     work.core = answer.plan(work.program, a.file, a.set, n, a.jobs, np.inf, a.fields)["core_s"]
     left = set_ends(work, a, n) - time.monotonic()
     plan = answer.plan(work.program, a.file, a.set, n, a.jobs, left / 60, a.fields)
-    if plan["gives"] == "no_window" and found["window_start"] >= 0:
-        lacks = 3600 * (plan["least_window_hours"] - plan["window_hours"])
-        raise RunError(a.file, f"has a window of {3600 * plan['window_hours']:g} s, and a load needs "
-                       f"{answer.stat_load.LEAST_SCALES} time scales, {3600 * plan['least_window_hours']:.4g} s",
-                       f"lengthen run.duration to {math.ceil(found['duration'] + lacks - 1e-6)} s, or give the length "
-                       "scale of a model (estimate.length_scale)", CASE)
+    if found["window_start"] >= 0:
+        refuse_short_window(a, found)
     print(alike or answer_text.plan(plan), flush=True)
     return work, plan | {"speed_m_s": found["speed"]}
 

@@ -137,7 +137,8 @@ def _among(value, some):
 def misfit(found, texts, base):
     """Why a result belongs to a different case than the members (texts of cases()): a key of the ice, the body, the
     tow, water or air has a value that none of them has. "" if it belongs to them, or does not name its case. base:
-    Members.base: the base case of a hypercube often lies at the end of a range, where no member does."""
+    Members.base: the base case of a hypercube often lies at the end of a range, where no member does, and so do the
+    keys that follow from those varied."""
     for key, value, some in _physical_values(found, texts):
         if not _among(value, some) and _differ(value, base.get(key, "")):
             return f"{key} is {value} there and {some[0] if len(some) == 1 else f'of {len(some)} other values'} here"

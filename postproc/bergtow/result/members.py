@@ -12,6 +12,7 @@ its seal is intact. A member whose files do not match the record of its end (res
 enters no number until `bergtow ensemble` has run it again. Raises RunError.
 """
 import json
+import re
 from collections import Counter, defaultdict
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +25,7 @@ from bergtow import _library
 from bergtow.errors import RunError
 from bergtow.result import at_least, integrity
 from bergtow.result.hdf5 import opened, plain
-from bergtow.result.run import Run, least, parse_case, within
+from bergtow.result.run import Run, case_value, least, parse_case, within
 
 WAITING, FINISHED, FAILED = 0, 1, 2
 #: s at full scale, five time scales of stats/loads.py: a tow whose line parts earlier in the window has no mean,
@@ -235,10 +236,19 @@ class Members:
 
     @cached_property
     def base(self):
-        """{key: text} of the case of which a Latin hypercube varies keys; {} of a grid, which has the values that it
-        names."""
-        text = self.study.partition("# base case")[2].partition("\n")[2]
-        return parse_case(text) if self.sampled else {}
+        """{key: text} of the case of which a Latin hypercube varies keys, without those whose value there is outside
+        their range; {} of a grid, which has the values that it names."""
+        study, _, case = self.study.partition("# base case")
+        base = parse_case(case.partition("\n")[2]) if self.sampled else {}
+        def inside(key):
+            some = self.parameters[key]
+            if some.dtype.kind != "f":
+                return base[key] in some
+            ends = re.search(rf"^{re.escape(key)}: .*from (\S+) to (\S+),", study, re.MULTILINE)
+            ends = [*some, *(map(float, ends.groups()) if ends else ())]
+            slack = 1e-9 * np.abs(ends).max()
+            return min(ends) - slack <= case_value(base, key) <= max(ends) + slack
+        return {key: text for key, text in base.items() if key not in self.parameters or inside(key)}
 
     # ---- members
 

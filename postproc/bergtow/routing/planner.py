@@ -43,9 +43,9 @@ class Weights(NamedTuple):
 
 @dataclass(frozen=True)
 class Ice:
-    """Floes: outlines [n, 2], m, any simple polygons in either direction, and the thickness of each, m; density, kg/m3;
-    added mass / mass of floes; concentration at which packed ice jams, assumed; rafting: 1/2 kappa rho_i (1 -
-    rho_i/rho_w) g, N/m3, infinite if floes do not raft."""
+    """Floes: outlines [n, 2], m, any simple polygons in either direction, closed or not, and the thickness of each, m;
+    density, kg/m3; added mass / mass of floes; concentration at which packed ice jams, assumed; rafting: 1/2 kappa
+    rho_i (1 - rho_i/rho_w) g, N/m3, infinite if floes do not raft."""
     outlines: Sequence[Points]
     thickness: Union[np.ndarray, Sequence[float]]
     density: float = 910
@@ -138,11 +138,15 @@ def _place(what: str, value: Iterable[float], n: int = 2) -> list[float]:
 
 
 def _rings(what: str, polygons: Sequence[Points]) -> tuple[Any, np.ndarray]:
-    """Points of all polygons, concatenated, and the offset of each polygon."""
+    """Points of all polygons, concatenated, and the offset of each polygon. A point that the next one repeats is left
+    out, as the last one of a closed ring."""
     rings = [np.asarray(p, dtype=float) for p in polygons]
     for k, ring in enumerate(rings):
-        if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 or not np.isfinite(ring).all():
-            raise _refuse(f"{what} {k}", f"an outline of shape {ring.shape}", "give three points or more, all finite")
+        if ring.ndim == 2:
+            rings[k] = ring[(ring != np.roll(ring, -1, axis=0)).any(axis=1)]
+        if ring.ndim != 2 or ring.shape[1] != 2 or len(rings[k]) < 3 or not np.isfinite(ring).all():
+            raise _refuse(f"{what} {k}", f"an outline of shape {ring.shape}", "give three different points or more, "
+                          "all finite")
     first = np.cumsum([0, *map(len, rings)], dtype=np.int64)
     return np.ascontiguousarray(np.concatenate(rings) if rings else np.zeros((0, 2))), first
 

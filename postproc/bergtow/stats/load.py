@@ -46,6 +46,11 @@ def moving_mean(x, n):
     return (total[n:] - total[:-n]) / n
 
 
+def samples_of(scale, dt):
+    """Samples dt apart in a time scale."""
+    return max(1, int(round(scale / dt)))
+
+
 def field_of(time, x, start, end, scale):
     """The filtered signal of one field between two times in the format of stats/extreme.py, with its sampling interval
     dt and the effective time scale, s; None if the window is shorter than LEAST_SCALES of these, or the load is not
@@ -58,7 +63,7 @@ def field_of(time, x, start, end, scale):
     if len(time) < 2 or not np.isfinite(x).all():
         return None
     dt = float(np.median(np.diff(time)))
-    n = max(1, int(round(scale / dt)))
+    n = samples_of(scale, dt)
     if len(x) < LEAST_SCALES * n:
         return None
     y = moving_mean(x, n) if n > 1 else x
@@ -74,7 +79,7 @@ def start_up(time, x, start, end, scale):
     if len(time) < 2:
         return None
     dt = float(np.median(np.diff(time)))
-    n = max(1, int(round(scale / dt)))
+    n = samples_of(scale, dt)
     last = int(np.sum(~within(time, start, np.inf))) + n - 1
     time, x = time[:last], x[:last]
     if len(x) < n:

@@ -80,8 +80,10 @@ def power_of_conditions(x, conditions, level=LEVEL):
     The slope of ln mean on ln x, each mean alike, is a sum over conditions. Rejected: the slope of the logarithms of
     single fields, which is that of geometric means: another exponent where fields scatter more at one x (coverage of
     both: docs/statistics.md)."""
+    if not all(v > 0 for v in [*x, *(np.mean(list(c.values())) for c in conditions)]):
+        return None
     away = np.log(x) - np.mean(np.log(x))
-    if not away.any() or min(np.mean(list(c.values())) for c in conditions) <= 0:
+    if not away.any():
         return None
     def term(k, mean):
         return away[k] / np.dot(away, away) * np.log(np.where(mean > 0, mean, np.nan))

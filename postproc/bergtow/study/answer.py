@@ -55,20 +55,31 @@ def plan(program, path, given, conditions, jobs, minutes, most):
     found = json.loads(checked(program, path, given, "--json"))
     values = case_numbers(program, path, given)
     speed, slower = values["speed"], values["slower"]
-    duration, start = found["run"]["duration_s"], values["window_start"]
-    window = max(0.0, duration - start) if start >= 0 else HALF * duration
+    window, least, enough = window_of(values)
     size = (found.get("ice") or {}).get("mean_size_m") or 0.0
     gap = max((values["length"] + size) / speed if speed > 0 else 0.0, stat_loads.TIME_SCALE / slower)
     hours = stat_extreme.LEAST_BLOCKS * stat_load.LEAST_GAPS * gap / 3600
     needs = max(stat_profile.LEAST_FIELDS, math.ceil(3600 * hours / window)) if window > 0 else most + 1
-    least = stat_load.LEAST_SCALES * stat_loads.TIME_SCALE / slower
     core = found["cost"]["core_time_s"]
     gives = min(most, fields_in(60 * minutes, core, conditions, jobs))
     return {"needs_fields": needs, "needs_hours": hours, "needs_min": math.ceil(needs * conditions / jobs) * core / 60,
             "budget_fields": gives, "budget_hours": gives * window / 3600, "window_hours": window / 3600,
             "least_window_hours": least / 3600, "core_s": core, "gap_s": gap, "conditions": conditions,
-            "most_fields": most, "gives": "no_window" if window < (1 - 1e-9) * least else
-            "return_level" if gives >= needs else "largest_of_n" if gives >= 1 else "nothing"}
+            "most_fields": most, "gives": "no_window" if not enough else "return_level" if gives >= needs else
+            "largest_of_n" if gives >= 1 else "nothing"}
+
+
+def window_of(values, faster=1.0):
+    """Of a tow that covers the distance of a case, case_numbers(), so many times as fast: the length of its window, s,
+    that of the least window with a load, s, and whether it has one. Samples are counted as in stat_load.field_of,
+    from the first one without a step before the window (Members.window)."""
+    dt, every = values["dt"], values["sample_every"]
+    duration, start = values["duration"] / faster, values["window_start"] / faster
+    length = max(0.0, duration - start) if start >= 0 else HALF * duration
+    first, last = (math.ceil(t / dt - 1e-6) for t in ((start, duration) if start >= 0 else (0.0, length)))  # steps
+    there = last // every - math.ceil(max(0, first - 1) / every)
+    least = stat_load.LEAST_SCALES * stat_load.samples_of(stat_loads.TIME_SCALE / values["slower"], every * dt)
+    return length, least * every * dt, there >= least
 
 
 def fields_in(seconds, member, conditions, jobs):
@@ -84,7 +95,8 @@ def case_numbers(program, path, given):
     scale = case_value(case, "estimate.length_scale", 1.0)
     return {"case": case, "speed": case_value(case, "tow.speed", 0.0), "slower": math.sqrt(scale) if scale > 0 else 1.0,
             "window_start": case_value(case, "output.window_start", -1.0),
-            "length": case_value(case, "body.length", 0.0), "duration": case_value(case, "run.duration")}
+            "length": case_value(case, "body.length", 0.0), "duration": case_value(case, "run.duration"),
+            "dt": case_value(case, "run.dt"), "sample_every": int(case_value(case, "output.sample_every", 1))}
 
 
 # ---- from the ensemble

@@ -83,9 +83,19 @@ def minutes(s):
 # ---- the sentence
 
 
+def _of(a):
+    """The id of the condition of the value."""
+    return next((c["of"] for c in a["load_cases"] if c.get("of")), None)
+
+
 def _own(a, key):
-    """A number of the conditions, in which times are those of the case; what is asked is at full scale."""
-    return next((c[key] for c in a["conditions"] if known(c.get(key))), a["asked"][key])
+    """A time of the condition of the value, or else of the first that has one: those of conditions are of their case;
+    what is asked is at full scale. An earlier answer.json has no hours there; its time scales, in whole samples, tell
+    a model."""
+    some = sorted(a["conditions"], key=lambda c: c["id"] != _of(a))
+    scale = next((c["time_scale_s"] for c in some if known(c.get("time_scale_s"))), math.inf)
+    faster = scale / a["asked"]["time_scale_s"]
+    return next((c[key] for c in some if known(c.get(key))), a["asked"][key] * (faster if faster < 0.7 else 1))
 
 
 def _over(a):
@@ -98,9 +108,8 @@ def _over(a):
 def _in_case(v, a):
     """The load case of a value, and its condition if there are several at that speed."""
     case = "" if v["case"] == "case.steady" else f" in the load case \"{CASES[v['case']]}\""
-    of = next((c.get("of") for c in a["load_cases"] if c.get("of")), None)
-    here = [c for c in a["conditions"] if c["speed_m_s"] == a["asked"]["speed_m_s"] or c["id"] == of]
-    return case + "".join(f" ({c['label']})" for c in here if c["id"] == of and len(here) > 1)
+    here = [c for c in a["conditions"] if c["speed_m_s"] == a["asked"]["speed_m_s"] or c["id"] == _of(a)]
+    return case + "".join(f" ({c['label']})" for c in here if c["id"] == _of(a) and len(here) > 1)
 
 
 def _needs(v, a, tow="The tow"):
