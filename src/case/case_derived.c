@@ -69,6 +69,7 @@ static int outline_of(bt_body_shape shape, double length, double width, int n, c
     const char *reason = fault(n, v);
     if (why) *why = reason;
     if (reason) return 0;
+    n = bt_outline_clean(n, v); // of corners in a straight edge: contact takes it for one edge
     bt_shape_centre(n, v);
     return n;
 }

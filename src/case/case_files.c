@@ -9,6 +9,7 @@
 
 #include "base/checksum.h"
 #include "base/largest.h"
+#include "base/tree.h"
 #include "case/warning.h"
 
 #define ITSELF "case" // no key has this name: all have a section
@@ -172,18 +173,24 @@ bt_status bt_case_files_same(const bt_case *input, const char *dir, bt_errors *e
     return status;
 }
 
-/// Does a document of the text before or after this comment set the key? The text is that of bt_case.
-static bool is_replaced(const char *text, const char *comment, const char *name)
+/// Is `path` what the key is in the document with this comment? If not, the key has been set again beside or above it.
+/// The text is that of bt_case.
+static bool is_recorded(const char *text, const char *comment, const char *name, const char *path)
 {
-    const char *last = strrchr(name, '.'), *from = text, *at;
-    char *leaf = bt_text_of("%s:", last ? last + 1 : name), *given = bt_text_of("\"%s\":", name);
-    while ((at = strstr(from, "\n--- # ")) && at < comment) from = at + 1;
-    const char *beside = at ? strstr(at, given) : NULL;
-    at = strstr(text, leaf);
-    const bool replaced = beside || (at && at < from);
-    free(leaf);
-    free(given);
-    return replaced;
+    const char *from = text, *end;
+    while ((end = strstr(from, "\n--- # ")) && end < comment) from = end + 1;
+    bt_node *document = bt_tree_parse(from, end ? (size_t)(end - from) : strlen(from), "", NULL);
+    const bt_node *node = document;
+    for (const char *at = name, *dot; node && at; at = dot ? dot + 1 : NULL) {
+        dot = strchr(at, '.');
+        char *key = bt_text_of("%.*s", (int)strcspn(at, "."), at);
+        int line;
+        node = bt_tree_find(node, key, &line);
+        free(key);
+    }
+    const bool same = node && node->kind == BT_NODE_SCALAR && !strcmp(node->text, path);
+    bt_tree_free(document);
+    return same;
 }
 
 void bt_case_warn_files(const bt_case *input, const char *digests, bt_errors *warnings)
@@ -191,7 +198,8 @@ void bt_case_warn_files(const bt_case *input, const char *digests, bt_errors *wa
     for (int k = 0; k < bt_n_case_keys; k++) {
         const char *name = bt_case_keys[k].name, *now = comment_in(digests, name),
                    *before = comment_in(input->text, name);
-        if (!now || !before || alike(before, now) || is_replaced(input->text, before, name)) continue;
+        const char *path = bt_case_file(input, &bt_case_keys[k]);
+        if (!now || !before || alike(before, now) || !is_recorded(input->text, before, name, path)) continue;
         const char *line[2] = {now, before};
         char *said[2];
         for (int i = 0; i < 2; i++) {
@@ -199,9 +207,9 @@ void bt_case_warn_files(const bt_case *input, const char *digests, bt_errors *wa
             said[i] = bt_text_of("%.*s", (int)(strcspn(line[i], "\n") - skip), line[i] + skip);
         }
         bt_warn(warnings, BT_WARN_FILE_CHANGED,
-                "%s: %s is not the file that this case was recorded with: it has %s, that had %s; restore it, or the "
-                "result is another one",
-                name, bt_case_file(input, &bt_case_keys[k]), said[0], said[1]);
+                "%s: %s is not the file that this case was recorded with: now %s, then %s; restore it, or the result "
+                "will differ",
+                name, path, said[0], said[1]);
         free(said[0]);
         free(said[1]);
     }

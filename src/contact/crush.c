@@ -297,31 +297,31 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     }
 }
 
-/// The force at the depth at which the work of the ice is this energy, by the curve through the depths `slop` and
-/// `way`. Newton's method brings `way` there, unless it is less than the curve can resolve. Where the contact length
-/// grows with the depth, E is convex, and all iterates after the first are too deep: the force is not too small.
+/// The force at the depth at which the work of the ice is this energy, by the curve through the first touch and `way`.
+/// Newton's method brings `way` there, unless it is less than the curve can resolve. Where the contact length grows
+/// with the depth, E is convex, and all iterates after the first are too deep: the force is not too small. The first
+/// length is not taken at the slop, which may be deeper than the energy reaches.
 static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double energy)
 {
-    enum { ITERATIONS = 30 };
-    const double PRECISION = 1e-4; // of the depth
+    enum { ITERATIONS = 40 };
+    const double PRECISION = 1e-4, TOUCH = 1e-6; // of the depth; depth of the first length / mean floe size
     const bt_contact *contact = &cell->contacts[j];
     if (cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0) return INFINITY;
     const bt_manifold manifold = {.a = contact->a, .b = contact->b, .nx = contact->nx, .ny = contact->ny};
     const uint16_t *part = cell->search.pairs[contact->pair].part;
-    const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), slop = world->par.slop,
+    const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), touch = TOUCH * world->par.size,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, least = own[BT_CRUSH_LEAST] * h;
-    double gap = INFINITY, area[2], length[2];
+    double gap = INFINITY, way = LEAST_WAY * world->par.size, length[2], area[2];
     for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
-    length[0] = bt_law_patch(world, part, &manifold, gap + slop, &area[0]).length;
-    double way = bt_max(2 * slop, LEAST_WAY * world->par.size);
+    length[0] = bt_law_patch(world, part, &manifold, gap + touch, &area[0]).length;
     resistance ice = {0};
     for (int k = 0; k < ITERATIONS; k++) {
         length[1] = bt_law_patch(world, part, &manifold, gap + way, &area[1]).length;
         const double force = line * bt_max(least, bt_max(length[0], length[1]));
         if (!(force > 0)) return INFINITY; // the outlines pass each other
-        ice = resistance_of(length, area, least, line, slop, way);
-        const double next = bt_max(2 * slop, way - (way * ice.mean - energy) / force);
+        ice = resistance_of(length, area, least, line, touch, way);
+        const double next = bt_max(2 * touch, way - (way * ice.mean - energy) / force);
         if (!(fabs(next - way) > PRECISION * way)) break;
         way = next;
     }

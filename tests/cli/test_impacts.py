@@ -220,6 +220,37 @@ def test_the_real_corner_of_a_floe_in_parts(tmp_path):
     np.testing.assert_allclose(rows(r)["corner"][0], angle, rtol=1e-6)
 
 
+HIT = {"run": {"dt": 0.1, "duration": 1}, "domain": {"length": 60, "width": 40, "x0": -20},
+       "body": {"shape": "square", "length": 10, "x": -5, "draft": 5, "mass": 1e9},
+       "tow": {"mode": "speed", "speed": 0.5, "ramp": 0}, "impact": {"duration": 0.1},
+       "ice": {"concentration": 0, "size": 1, "thickness": 0.5, "density": 900, "added_mass": 0, "friction": 0}}
+SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+TRIANGLE = [[0.5, -1], [0.5, 1], [-0.5, 0]]
+
+
+@pytest.mark.parametrize("outline, more, x", [
+    (SQUARE, [*SQUARE, [-0.5, 0.2], [-0.5, -0.2]], 0.515),
+    (TRIANGLE, [[0.5, -1], [0.5, 1], [0, 0.5], [-0.5, 0]], 0.6816667)])
+def test_a_corner_in_a_straight_edge_changes_no_hit(tmp_path, outline, more, x):
+    """Of a floe, and of the body. Red: the hit came a step late, or turned the floe."""
+    def told(name, vertices, **keys):
+        case = changed(HIT, floes=[{"shape": "polygon", "vertices": vertices, "x": x, "y": 0}], **keys)
+        return run(tmp_path, case, "--quiet", name=name)
+    one, two = told("one", outline), told("two", more)
+    assert one.hash == two.hash and rows(one)["impulse"] == pytest.approx([450 * 0.5])
+    hull = [[-5, -5], [5, -5], [5, 5], [-5, 5]]
+    hull[2:2] = [5, -0.2], [5, 0.3]
+    assert told("barge", outline, body__shape="polygon", body__length=None, body__vertices=hull).hash == one.hash
+
+
+@pytest.mark.parametrize("slop", [1e-3, 0])
+def test_the_first_touch_of_a_corner_is_met(tmp_path, slop):
+    """Red at 0 where a pair at rounding's distance counts as one that passes."""
+    r = run(tmp_path, changed(HIT, solver__slop=slop, floes=[{"shape": "square", "length": 1, "yaw": 45, "x": 0.7221,
+                                                              "y": 0}]), "--quiet")
+    assert rows(r)["time"] == pytest.approx([0.1]) and r.summary["max_overlap_m"] < 1e-9
+
+
 def test_a_wall_that_is_struck_is_no_floe():
     """Rows from the number of floes on are those of bodies, then of pieces."""
     def said(struck):

@@ -238,7 +238,10 @@ def test_a_resolved_case_warns_of_files_that_have_changed(tmp_path):
     assert checked(case) == checked(again, "--set", f"air.wind_table={other}") == []
     (tmp_path / "based.yml").write_text(f"base: {again}\nair: {{wind_table: other.csv}}\n")
     (tmp_path / "longer.yml").write_text(f"base: {again}\nrun: {{title: longer}}\n")
-    assert checked("based.yml") == [] and checked("longer.yml") == [found]
+    (tmp_path / "quoted.yml").write_text(f"base: {again}\nair: {{'wind_table' : other.csv}}\n")
+    (tmp_path / "titled.yml").write_text(f"base: {again}\nrun: {{title: 'wind_table: as it was'}}\n")
+    assert checked("based.yml") == checked("quoted.yml") == []
+    assert checked("longer.yml") == checked("titled.yml") == [found]
     assert call("run", again, "-o", "b", "--steps", 5, cwd=tmp_path).returncode == DONE
     assert changes(Run(tmp_path / "b", None).summary) == [found]
     table.unlink()
