@@ -201,8 +201,8 @@ def test_a_large_result_opens_without_being_read(tmp_path):
     n = 1_000_000
     with h5py.File(there.dir / "result.h5", "r+") as f:
         t = len(f["frames/time"])
-        for name, shape in (("floes/thickness", (n,)), ("floes/area", (n,)), ("frames/pose", (t, n, 3)),
-                            ("frames/contact_force", (t, n)),
+        for name, shape in (("floes/thickness", (n,)), ("floes/area", (n,)), ("floes/fixed", (n,)),
+                            ("frames/pose", (t, n, 3)), ("frames/contact_force", (t, n)),
                             ("frames/speed", (t, n + len(f["bodies/area"]))),
                             ("frames/velocity", (t, n + len(f["bodies/area"]), 2)),
                             ("frames/net_force", (t, n + len(f["bodies/area"]), 2))):
