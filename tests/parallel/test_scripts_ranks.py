@@ -7,7 +7,8 @@ import pytest
 from harness import BERGTOW, DONE, TOW, USAGE, changed, differing, environment, quick, write_case
 from test_ranks_output import mpirun, ours
 
-CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=14, ice__concentration=0.3, ice__size=0.9)
+CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=14, ice__concentration=0.3, ice__size=0.9,
+               estimate__length_scale=30)
 
 
 @pytest.mark.parametrize("command", quick(["budget", "capability", "converge", "design", "outlines"], "design",
