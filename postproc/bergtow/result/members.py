@@ -236,8 +236,8 @@ class Members:
 
     @cached_property
     def base(self):
-        """{key: text} of the case of which a Latin hypercube varies keys, without those whose value there is outside
-        their range; {} of a grid, which has the values that it names."""
+        """{key: text} of the base case of a Latin hypercube, without varied keys whose value there is outside their
+        range; {} of a grid, which has the values that it names."""
         study, _, case = self.study.partition("# base case")
         base = parse_case(case.partition("\n")[2]) if self.sampled else {}
         def inside(key):

@@ -86,7 +86,8 @@ def _of_a_chain(chain):
 def relative_numerics(rows, own):
     """The numerical error, relative to the mean, from the rows of converge.json and the values that the study runs
     with, {quantity: value}: {"sd", NaN if nothing is known; "biases": {quantity: relative effect}; "unknown":
-    {quantity: why sd does not bound it}; "within": those of them of which sd has what is known}; None without rows."""
+    {quantity: why sd does not bound it}; "within": those of them that sd includes as far as they are known}; None
+    without rows."""
     squares, biases, unknown, within = [], {}, {}, []
     for name in QUANTITIES:
         chain = compared.chain(rows, name, own.get(name))
