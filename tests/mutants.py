@@ -272,7 +272,7 @@ MUTANTS = {
         ("gaps->gap[i] += cell->laws->limits[j].grown[i];", ";", "crushed ice is pushed apart"),
         ("solver->shifted = totals.most > world->par.slop;", "solver->shifted = totals.most > 2 * world->par.slop;",
          "no shift below two slops"),
-        (".tolerance = 0.1 * bt_max(world->par.slop", ".tolerance = bt_max(world->par.slop", "projection ends early"),
+        (".tolerance = 0.1 * world->par.slop", ".tolerance = world->par.slop", "projection ends early"),
         (".length = 25", ".length = 5", "rounds of another length"),
         ("st->projected = st->projected && work.residual <= problem.tolerance;", "",
          "what is left of overlap is not reported"),

@@ -438,7 +438,8 @@ bt_key bt_case_keys[] = {
          "is the same to the last bit"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the previous step"),
     REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]",
-         "overlap that the position projection tolerates / mean floe size, assumed [Metrikin 2014 for the projection]"),
+         "overlap that the position projection tolerates / mean floe size, assumed [Metrikin 2014 for the projection]; "
+         "values below 1e-6 count as that"),
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]",
         "work limit of the position projection, in updates of every contact, residual passes included; assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "= 1e-3 m/s (basin), 0.01 x reference speed (geographic)",

@@ -9,8 +9,6 @@
 #include "space/phases.h"
 #include "space/shore.h"
 
-#define LEAST_NEAR 1e-6 // of the mean floe size: nearer bodies touch
-
 /// Part `part` of body i, as bt_contacts_parts sees it.
 static bt_moving moving_part(const bt_bodies *bodies, bt_idx i, int part, const bt_vel *v)
 {
@@ -46,9 +44,7 @@ static bool meet_without(const bt_world *world, const bt_cell *cell, const bt_co
         bt_bodies_offset(world, pairs[i].a, pairs[i].b, d);
         const bt_moving p = moving_part(bodies, pairs[i].a, pairs[i].part[0], &va),
                         q = moving_part(bodies, pairs[i].b, pairs[i].part[1], &vb);
-        // with a slop of 0 the distance of bodies that touch, and its direction, would be rounding
-        const double near = bt_max(world->par.slop, LEAST_NEAR * world->par.size);
-        if (bt_sweep_meets(&p, &q, d[0], d[1], near, world->par.dt)) return true;
+        if (bt_sweep_meets(&p, &q, d[0], d[1], world->par.slop, world->par.dt)) return true;
     }
     return false;
 }

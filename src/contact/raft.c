@@ -55,8 +55,6 @@ static const bt_law_total totals[] = {
                            "work taken by friction between floes that lie over each other"},
 };
 
-#define LEAST_BLEND 1e-6 // of the mean floe, assumed: far beyond rounding, far below any slop but 0
-
 static void setup(const bt_case *input, double own[BT_MAX_CONTACT_OWN])
 {
     const double rise = bt_case_rise(input->ice.density, input->water.density);
@@ -116,9 +114,6 @@ static double stored_load(const bt_world *world, bt_idx a, bt_idx b)
     const double *h = world->bodies.thickness;
     return bt_min(own_of(world)[BT_RAFT_RISE] * h[a] * h[b], line_load(world, a, b));
 }
-
-/// Length below which rounding and residuals must not decide, m.
-static double least_blend(const bt_world *world) { return bt_max(world->par.slop, LEAST_BLEND * world->par.size); }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
@@ -184,7 +179,7 @@ static bool contact(const bt_world *world, const bt_pair *pair, const bt_memory 
     bt_overlap_clip(world, pair->a, pair->b, pair->part, 0, 0, &overlap);
     bt_overlap_area(&overlap, centroid);
     // rounding must not decide which edge is inside
-    bt_overlap_gradient(world, pair->a, pair->b, pair->part, &overlap, least_blend(world), grad);
+    bt_overlap_gradient(world, pair->a, pair->b, pair->part, &overlap, world->par.slop, grad);
     bt_bodies_offset(world, pair->a, pair->b, off);
     *edge = (bt_manifold){.a = pair->a, .b = pair->b};
     *sheets = (bt_manifold){.a = pair->a, .b = pair->b};
@@ -192,7 +187,7 @@ static bool contact(const bt_world *world, const bt_pair *pair, const bt_memory 
     const double length = bt_hypot(grad[0], grad[1]);
     if (!(length > LEAST_LENGTH * thinner(&world->bodies, pair->a, pair->b))) return false;
     edge_of(grad, length, (memory->value[0] - memory->value[1]) / length, centroid, off, edge);
-    const double part = length_of_ends(&overlap, edge, length, least_blend(world));
+    const double part = length_of_ends(&overlap, edge, length, world->par.slop);
     sheets->nx = -part * edge->ny, sheets->ny = part * edge->nx;
     return true;
 }
@@ -223,7 +218,7 @@ static double reached(const bt_world *world, const bt_contact *edge, double gap)
     const double before = bt_mean_normal_velocity(edge, &bodies->vel_start[edge->a], &bodies->vel_start[edge->b]),
                  free = bt_mean_normal_velocity(edge, &bodies->vel_free[edge->a], &bodies->vel_free[edge->b]);
     const double way = world->par.dt * bt_max(0, -bt_min(before, free));
-    return bt_max(0, 1 - gap / (way + least_blend(world)));
+    return bt_max(0, 1 - gap / (way + world->par.slop));
 }
 
 /// edge: the edge contact of the same pair, already bounded (detect.c puts sheets after all others), −1 = none.

@@ -24,6 +24,9 @@
 #include "base/elementary.h"
 
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
+// Of the mean floe size, assumed. Below it rounding would decide whether and in which direction bodies touch, and the
+// position projection could not reach its tolerance.
+#define LEAST_SLOP 1e-6
 #define LARGE_RATIO                                                                                                    \
     8.0 // factor on the mean radius: larger floes are in no cell, so that cells fit the largest of the others
 
@@ -50,7 +53,7 @@ bt_params bt_setup_params(const bt_case *input, double size)
         .plain_schedule = input->solver.plain_schedule,
         .inner_sweeps = input->solver.inner_sweeps,
         .cell = input->solver.cell_size,
-        .slop = input->solver.slop * size,
+        .slop = bt_max(input->solver.slop, LEAST_SLOP) * size,
         .position_sweeps = input->solver.position_sweeps,
         .rest_speed = input->solver.rest_speed,
         .size = size,

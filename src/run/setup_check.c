@@ -249,7 +249,7 @@ static void name_body(const bt_roster *roster, bt_gid gid, char out[64])
 /// construction; a field file, floes given by hand, body and walls may not be.
 static bool check_apart(const bt_case *input, bt_world *world, const bt_roster *roster, bt_errors *err)
 {
-    const double allowed = bt_max(world->par.slop, 1e-9 * roster->mean_size);
+    const double allowed = world->par.slop;
     const bt_overlaps overlaps = bt_world_overlaps(world, allowed);
     if (overlaps.pairs == 0) return true;
     char a[64], b[64];

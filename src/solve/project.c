@@ -30,7 +30,6 @@
 #include "space/phases.h"
 #include "solve/rounds.h"
 
-#define LEAST_SLOP 1e-6 // of the mean floe size: with a slop of 0 the projection has no tolerance to reach
 enum { TURNS, N_FOUND };
 enum { LEFT = 5 }; // overlap that a rotation may leave, in slops: half of the warning threshold of a run, assumed
 
@@ -200,7 +199,7 @@ static void solve_apart(bt_world *world)
     bt_problem problem = {.residual = residual_at_rest,
                           .sweep = world->par.plain_sweeps ? sweep_plain : bt_solver_sweep_cell,
                           .vel = world->solver->shift,
-                          .tolerance = 0.1 * bt_max(world->par.slop, LEAST_SLOP * world->par.size),
+                          .tolerance = 0.1 * world->par.slop,
                           .cap = 0.9,
                           .length = 25,
                           .limit = (double)world->par.position_sweeps,

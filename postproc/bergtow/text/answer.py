@@ -89,9 +89,9 @@ def _of(a):
 
 
 def _own(a, key):
-    """A time of the condition of the value, or else of the first that has one: those of conditions are of their case;
-    what is asked is at full scale. An earlier answer.json has no hours there; its time scales, in whole samples, tell
-    a model."""
+    """A time of the condition that gives the value, or else of the first condition that has one. Times of a condition
+    are at the scale of its case, those asked for at full scale. An earlier answer.json has no hours of conditions; its
+    time scales, in whole samples, show whether the case is a model."""
     some = sorted(a["conditions"], key=lambda c: c["id"] != _of(a))
     scale = next((c["time_scale_s"] for c in some if known(c.get("time_scale_s"))), math.inf)
     faster = scale / a["asked"]["time_scale_s"]
@@ -306,7 +306,7 @@ def plan(p):
     each = f" ({p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min)"
     fields = each if p["window_hours"] > 0 else ""
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
-             "nothing": "not one", "no_window": "none of which has a number if its window is as short as that"
+             "nothing": "not one", "no_window": "but none gives a value if its window is as short as that"
              }[p["gives"]]
     return (f"A design value needs about {short(p['needs_hours'], 2)} h of simulated tow after the start{fields}, "
             f"about {short(p['needs_min'], 2)} min of computing here. The budget allows {p['budget_fields']} fields, "
