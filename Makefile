@@ -165,7 +165,15 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/libbergtow.a
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) $(filter %.o %.a,$^) -lcmocka $(LDLIBS) -o $@
 
-$(BUILD)/tests/fuzz/test_corpus: tests/fuzz/test_corpus.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+# Kept inputs that have no name of their own.
+CORPUS := $(wildcard tests/fuzz/corpus/*.tar.gz)
+build/corpus: $(CORPUS)
+	@rm -rf $@
+	@for packed in $(CORPUS:.tar.gz=); do \
+	    mkdir -p $@/$${packed##*/} && tar -xzf $$packed.tar.gz -C $@/$${packed##*/} || exit 1; \
+	done
+
+$(BUILD)/tests/fuzz/test_corpus: tests/fuzz/test_corpus.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP) | build/corpus
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -Itests $(filter %.c %.o,$^) $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
 

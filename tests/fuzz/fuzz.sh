@@ -1,14 +1,17 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; the word "keep" in place of the seconds puts the
-# smallest set of inputs that reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 20 kB and 150
+# libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; the word "keep" in place of the seconds adds the
+# smallest set of inputs that reaches what all found inputs reach to tests/fuzz/corpus/NAME.tar.gz, up to 20 kB and 150
 # files. Found inputs stay in build/fuzz/found/NAME; one that breaks something is in build/fuzz/broken/: mend the
-# program and keep the input.
+# program and keep the input as tests/fuzz/corpus/NAME/WHAT-IT-DID.
 set -eu
 name=$1 what=${2:-60}
-build=build/fuzz found=build/fuzz/found/$name kept=tests/fuzz/corpus/$name
+build=build/fuzz found=build/fuzz/found/$name named=tests/fuzz/corpus/$name packed=tests/fuzz/corpus/$name.tar.gz
 [ -x $build/fuzz_"$name" ] || { echo "$build/fuzz_$name is missing; run: make CONFIG=fuzz $build/fuzz_$name"; exit 1; }
-mkdir -p "$found" "$kept" $build/broken
+kept=$build/kept/$name
+rm -rf "$kept"
+mkdir -p "$found" "$kept" "$named" $build/broken
+[ ! -e "$packed" ] || tar -xzf "$packed" -C "$kept"
 export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1 OMP_NUM_THREADS=1
 export LSAN_OPTIONS=suppressions=tests/lsan.supp:print_suppressions=0
 
@@ -46,7 +49,7 @@ most=4000 slow=100
 
 if [ "$what" = keep ]; then
     merged=$(mktemp -d)
-    $build/fuzz_"$name" -merge=1 -max_len=2000 "$merged" "$kept" "$found" >$build/merge.log 2>&1
+    $build/fuzz_"$name" -merge=1 -max_len=2000 "$merged" "$named" "$kept" "$found" >$build/merge.log 2>&1
     total=0 count=0
     find "$merged" -type f -printf '%s %p\n' | sort -n | while read -r size path; do
         total=$((total + size))
@@ -55,8 +58,9 @@ if [ "$what" = keep ]; then
         cp "$path" "$kept"/
     done
     rm -rf "$merged"
+    tar --sort=name --mtime=@0 --owner=0 --group=0 --numeric-owner --mode=644 -C "$kept" -cf - . | gzip -n9 >"$packed"
     du -sb "$kept"
 else
     $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=$most -len_control=$slow \
-        -dict="$words" -artifact_prefix=$build/broken/"$name"- -print_final_stats=1 "$found" "$kept" </dev/null
+        -dict="$words" -artifact_prefix=$build/broken/"$name"- -print_final_stats=1 "$found" "$named" "$kept" </dev/null
 fi
