@@ -17,34 +17,17 @@
 #include "run/setup.h"
 #include "split/law.h"
 
-static bt_check_ice ice_of_case(const bt_case *input)
-{
-    return (bt_check_ice){.count = bt_case_expected_floes(input) + input->n_floes,
-                          .made = bt_case_floes_made(input),
-                          .size = bt_case_mean_size(input),
-                          .thickness = input->ice.thickness,
-                          .volume = input->ice.thickness * BT_PI / 4 * bt_case_size_moment(input, 2),
-                          .concentration = input->ice.concentration};
-}
-
-static bt_check_ice ice_of_field(const bt_case *input, const bt_field *field)
-{
-    bt_check_ice ice = {.count = field->n + input->n_floes, .concentration = field->concentration};
-    for (bt_idx i = 0; i < field->n; i++) {
-        ice.size += sqrt(4 * field->area[i] / BT_PI) / field->n;
-        ice.thickness += field->thickness[i] / field->n;
-        ice.volume += field->area[i] * field->thickness[i] / field->n;
-    }
-    return ice;
-}
-
 /// The ice of the field that was read, or the expected ice of the field to be generated, and the floes given by hand.
 static bt_check_ice ice_of(const bt_case *input, const bt_field *field)
 {
-    bt_check_ice ice = bt_case_reads_field(input) ? ice_of_field(input, field) : ice_of_case(input);
-    const bt_hand_means by_hand = bt_case_hand_means(input);
-    if (ice.count == input->n_floes && by_hand.size > 0)
-        ice.size = by_hand.size, ice.thickness = by_hand.thickness, ice.volume = by_hand.volume;
+    const bool read = bt_case_reads_field(input);
+    const bt_floe_means mean = bt_setup_mean_floe(input, field);
+    bt_check_ice ice = {.count = (read ? field->n : bt_case_expected_floes(input)) + input->n_floes,
+                        .made = bt_case_floes_made(input),
+                        .size = mean.size,
+                        .thickness = mean.thickness,
+                        .volume = mean.volume,
+                        .concentration = read ? field->concentration : input->ice.concentration};
     ice.corners = bt_cost_corners(input, field, ice.count);
     ice.split = (double)field->outlines.split, ice.parts = (double)field->outlines.parts;
     return ice;

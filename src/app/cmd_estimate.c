@@ -66,10 +66,8 @@ static void order_speeds(const bt_case *input, const bt_field *field, bt_estimat
     double ice[2], body[2];
     const bool walls = input->domain.ends == BT_BOUND_WALL || input->domain.sides == BT_BOUND_WALL;
     if (bt_environment_changes(input) || (walls && in->concentration < BT_BOUND_CONCENTRATION - BT_MADE_OFF)) return;
-    const bt_hand_means by_hand = bt_case_hand_means(input);
-    const bool alone = field->n == 0 && bt_case_expected_floes(input) == 0 && by_hand.size > 0;
-    const double size = alone ? by_hand.size : field->n > 0 ? bt_field_mean_size(field) : bt_case_mean_size(input);
-    bt_setup_drift(input, size, alone ? by_hand.thickness : in->thickness, in->concentration, ice, body);
+    const bt_floe_means floe = bt_setup_mean_floe(input, field);
+    bt_setup_drift(input, floe.size, floe.thickness, in->concentration, ice, body);
     bt_estimate_ordered(input, ice, &ordered);
     in->speed = ordered.speed;
     in->along = in->ordered = ordered.along;

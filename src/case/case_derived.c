@@ -174,9 +174,9 @@ double bt_case_made_area(const bt_case *input)
     return bt_max(0, input->ice.concentration * area);
 }
 
-bt_hand_means bt_case_hand_means(const bt_case *input)
+bt_floe_means bt_case_hand_means(const bt_case *input)
 {
-    bt_hand_means mean = {0};
+    bt_floe_means mean = {0};
     double v[2 * BT_MAX_VERTICES];
     int64_t count = 0;
     for (bt_idx i = 0; i < input->n_floes; i++) {
@@ -187,7 +187,7 @@ bt_hand_means bt_case_hand_means(const bt_case *input)
         count++;
     }
     if (count == 0) return mean;
-    return (bt_hand_means){mean.size / (double)count, mean.thickness / (double)count, mean.volume / (double)count};
+    return (bt_floe_means){mean.size / (double)count, mean.thickness / (double)count, mean.volume / (double)count};
 }
 
 double bt_case_area_by_hand(const bt_case *input)

@@ -49,12 +49,13 @@ void bt_case_ice_region(const bt_case *input, double low[2], double high[2]);
 /// generator.
 double bt_case_made_area(const bt_case *input);
 
-/// Means over the floes given by hand that can move; all 0 if there are none. A quay or a shore is no floe.
-typedef struct bt_hand_means {
+/// Means over floes.
+typedef struct bt_floe_means {
     double size, thickness, volume; ///< equivalent diameter, m; m; m³
-} bt_hand_means;
+} bt_floe_means;
 
-bt_hand_means bt_case_hand_means(const bt_case *input);
+/// Means over the floes given by hand that can move; all 0 if there are none. A quay or a shore is no floe.
+bt_floe_means bt_case_hand_means(const bt_case *input);
 
 /// Area of the floes given by hand, m².
 double bt_case_area_by_hand(const bt_case *input);

@@ -472,10 +472,25 @@ static void create_splitting(const bt_case *input, bt_world *world, const bt_ros
     };
 }
 
+bt_floe_means bt_setup_mean_floe(const bt_case *input, const bt_field *field)
+{
+    if (field->n > 0) {
+        bt_floe_means mean = {.size = bt_field_mean_size(field)};
+        for (bt_idx i = 0; i < field->n; i++) {
+            mean.thickness += field->thickness[i] / field->n;
+            mean.volume += field->area[i] * field->thickness[i] / field->n;
+        }
+        return mean;
+    }
+    const bt_floe_means by_hand = bt_case_hand_means(input);
+    if (by_hand.size > 0 && bt_case_expected_floes(input) == 0) return by_hand;
+    const double thickness = input->ice.thickness;
+    return (bt_floe_means){bt_case_mean_size(input), thickness, thickness * BT_PI / 4 * bt_case_size_moment(input, 2)};
+}
+
 bt_status bt_setup_world(const bt_case *input, const bt_field *field, bt_world **out, bt_roster *roster, bt_errors *err)
 {
-    const double by_hand = bt_case_hand_means(input).size,
-                 size = field->n ? bt_field_mean_size(field) : by_hand > 0 ? by_hand : input->ice.size;
+    const double size = bt_setup_mean_floe(input, field).size;
     if (!bt_setup_check_field(input, field, err)) return BT_ERR_CASE;
     bt_params par = bt_setup_params(input, size);
     bt_world *world = bt_world_create(&par);

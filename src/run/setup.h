@@ -6,6 +6,7 @@
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 #include "bergtow/world.h"
+#include "case/case_derived.h"
 #include "case/track.h"
 #include "output/gather.h"
 #include "tow/tow.h"
@@ -14,6 +15,10 @@
 /// BT_ERR_CASE (from a field file: a floe outside the domain or overlapping the body).
 bt_status bt_setup_world(const bt_case *input, const bt_field *field, bt_world **world, bt_roster *roster,
                          bt_errors *err);
+
+/// The mean floe: of a field that has floes; without them of the ice that is to be generated; without that of the floes
+/// given by hand that can move; and if there are none, of ice.size and ice.thickness.
+bt_floe_means bt_setup_mean_floe(const bt_case *input, const bt_field *field);
 
 /// Free drift at time zero (force/drift.h), m/s: `floe`, of a round floe of this size and thickness (m) in ice of this
 /// concentration, with an estimated lee (force/exposure.h); `body`, of the towed body. NaN if ice.start, the tow or a
