@@ -265,12 +265,12 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
                      hits[i].before > bt_max(place[i], world->par.rest_speed);
     }
     double area[2];
-    const bt_patch now = bt_law_patch(world, pair->part, manifold, closing.gap + slop, &area[0]);
+    const bt_patch now = bt_law_patch(world, cell, pair, manifold, closing.gap + slop, &area[0]);
     const double free_way = bt_max(dt * closing.approach - closing.gap, least_way);
     double way = free_way;
     resistance ice[2], found[2];
     for (int look = 0; look < LOOKS; look++) {
-        const bt_patch then = bt_law_patch(world, pair->part, manifold, closing.gap + way, &area[1]);
+        const bt_patch then = bt_law_patch(world, cell, pair, manifold, closing.gap + way, &area[1]);
         double length[2][2], all = now.length + then.length;
         for (int i = 0; i < manifold->n_points; i++) {
             const double share = bt_law_share(manifold, i, now, &closing);
@@ -308,16 +308,16 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
     const bt_contact *contact = &cell->contacts[j];
     if (cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0) return INFINITY;
     const bt_manifold manifold = {.a = contact->a, .b = contact->b, .nx = contact->nx, .ny = contact->ny};
-    const uint16_t *part = cell->search.pairs[contact->pair].part;
+    const bt_pair *pair = &cell->search.pairs[contact->pair];
     const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), touch = TOUCH * world->par.size,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, least = own[BT_CRUSH_LEAST] * h;
     double gap = INFINITY, way = LEAST_WAY * world->par.size, length[2], area[2];
     for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
-    length[0] = bt_law_patch(world, part, &manifold, gap + touch, &area[0]).length;
+    length[0] = bt_law_patch(world, cell, pair, &manifold, gap + touch, &area[0]).length;
     resistance ice = {0};
     for (int k = 0; k < ITERATIONS; k++) {
-        length[1] = bt_law_patch(world, part, &manifold, gap + way, &area[1]).length;
+        length[1] = bt_law_patch(world, cell, pair, &manifold, gap + way, &area[1]).length;
         const double force = line * bt_max(least, bt_max(length[0], length[1]));
         if (!(force > 0)) return INFINITY; // the outlines pass each other
         ice = resistance_of(length, area, least, line, touch, way);

@@ -47,11 +47,12 @@
 // next edge) takes the present overlap, at most the pair's deepest crush, as its depth: sliding neither crushes nor
 // restores overlap. A depth belongs to this pair alone: a third floe meets the original outline.
 //
-// Not modelled: the length and area of an overlap are those of the two convex parts that hold the contact. Where a floe
-// that is not convex is struck at a corner at which a cut between its parts ends, the other part's share is left out:
-// the corner bears as little as 0.71 of what it should, and is crushed 1.4 times as deep.
-// A record holds two points, so a crushed corner that was not found is forgotten once two other features
-// of the pair have been crushed; its depth is then the present overlap, as for a new point.
+// Parts. Where several parts of a floe that is not convex touch at one place (contact/detect.c), one contact stands for
+// all, and its overlap is that of all of them: a corner at which a cut ends bears as one piece.
+//
+// Not modelled: pieces of a shore (space/shore.h) overlap each other, so a contact has the overlap of its own alone.
+// A record holds two points, so a crushed corner that was not found is forgotten once two other features of the pair
+// have been crushed; its depth is then the present overlap, as for a new point.
 // Crushed ice does not pile up, extrude or lose mass, and the pressure does not fall with the area of contact.
 // Surfaces that were crushed askew stay tilted against each other, and sliding along them changes gaps without the
 // normal rows noticing: such steps leave overlap (up to 2.5 % of a floe in the basin's jams, more between floes in

@@ -52,10 +52,12 @@ static bool same_place(const touch *p, int i, const touch *q, int j, double reac
     return fabs(p->m->nx * dy - p->m->ny * dx) <= reach; // along the surface: their heights differ by half of the gaps
 }
 
-static void drop(bt_manifold *manifold, int i)
+/// Remove point i, which `into` has too.
+static void drop(bt_manifold *manifold, int i, const bt_manifold *into)
 {
     if (i + 1 < manifold->n_points) manifold->p[i] = manifold->p[i + 1];
     manifold->n_points--;
+    manifold->into = into;
 }
 
 /// Of points that p and q share, keep those of q, unless that of p is deeper by more than the slop.
@@ -70,9 +72,9 @@ static void settle(const bt_world *world, const touch *p, const touch *q)
         for (int j = o->n_points - 1; j >= 0; j--) {
             if (!same_place(p, i, q, j, reach)) continue;
             if (m->p[i].gap < o->p[j].gap - deeper) {
-                drop(o, j);
+                drop(o, j, m);
             } else {
-                drop(m, i);
+                drop(m, i, o);
                 break;
             }
         }
@@ -244,12 +246,15 @@ typedef struct {
 static void merge(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch)
 {
     bt_merge_parts(world, scratch->man, scratch->n);
+    for (size_t k = 0; k < scratch->n; k++) {
+        if (scratch->man[k].n_points > 0) continue;
+        const bt_manifold *into = scratch->man[k].into;
+        while (into->n_points == 0) into = into->into;
+        cell->search.pairs[scratch->pair[k]].contact = BT_MERGED_INTO(scratch->pair[into - scratch->man]);
+    }
     size_t kept = 0;
     for (size_t k = 0; k < scratch->n; k++) {
-        if (scratch->man[k].n_points == 0) {
-            cell->search.pairs[scratch->pair[k]].contact = -1;
-            continue;
-        }
+        if (scratch->man[k].n_points == 0) continue;
         scratch->man[kept] = scratch->man[k];
         scratch->pair[kept++] = scratch->pair[k];
     }

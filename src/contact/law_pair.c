@@ -60,20 +60,26 @@ bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, 
     return closing;
 }
 
-bt_patch bt_law_patch(const bt_world *world, const uint16_t part[2], const bt_manifold *manifold, double way,
-                      double *area)
+bt_patch bt_law_patch(const bt_world *world, const bt_cell *cell, const bt_pair *pair, const bt_manifold *manifold,
+                      double way, double *area)
 {
-    bt_overlap overlap;
-    double centroid[2];
-    bt_overlap_clip(world, manifold->a, manifold->b, part, -way * manifold->nx, -way * manifold->ny, &overlap);
-    double low = INFINITY, high = -INFINITY;
-    for (int k = 0; k < overlap.n; k++) {
-        const double t = manifold->nx * overlap.v[overlap.now][2 * k + 1] -
-                         manifold->ny * overlap.v[overlap.now][2 * k];
-        low = bt_min(low, t), high = bt_max(high, t);
+    const bt_pair *pairs = cell->search.pairs, *end = pairs + cell->search.n_pairs, *first = pair;
+    const bt_idx merged = BT_MERGED_INTO((bt_idx)(pair - pairs));
+    double low = INFINITY, high = -INFINITY, centroid[2];
+    *area = 0;
+    while (first > pairs && first[-1].a == pair->a && first[-1].b == pair->b) first--;
+    for (const bt_pair *p = first; p < end && p->a == pair->a && p->b == pair->b; p++) {
+        if (p != pair && p->contact != merged) continue;
+        bt_overlap overlap;
+        bt_overlap_clip(world, p->a, p->b, p->part, -way * manifold->nx, -way * manifold->ny, &overlap);
+        for (int k = 0; k < overlap.n; k++) {
+            const double t = manifold->nx * overlap.v[overlap.now][2 * k + 1] -
+                             manifold->ny * overlap.v[overlap.now][2 * k];
+            low = bt_min(low, t), high = bt_max(high, t);
+        }
+        *area += bt_overlap_area(&overlap, centroid);
     }
-    *area = bt_overlap_area(&overlap, centroid);
-    return overlap.n > 0 ? (bt_patch){high - low, 0.5 * (low + high)} : (bt_patch){0, NAN};
+    return low <= high ? (bt_patch){high - low, 0.5 * (low + high)} : (bt_patch){0, NAN};
 }
 
 double bt_law_share(const bt_manifold *manifold, int i, bt_patch patch, const bt_closing *closing)

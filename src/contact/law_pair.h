@@ -41,9 +41,10 @@ typedef struct bt_patch {
 } bt_patch;
 
 /// Extent along the tangent of the overlap of a and b after b has moved `way`, m, towards a along the normal; *area: of
-/// the overlap, m².
-bt_patch bt_law_patch(const bt_world *world, const uint16_t part[2], const bt_manifold *manifold, double way,
-                      double *area);
+/// the overlap, m². Of bodies in parts: of the pair of parts that has the contact, and of those whose contacts have been
+/// merged into it. Parts do not overlap, so no area counts twice. `pair` is one of the cell.
+bt_patch bt_law_patch(const bt_world *world, const bt_cell *cell, const bt_pair *pair, const bt_manifold *manifold,
+                      double way, double *area);
 
 /// Share of point i of the manifold in a uniform pressure on the patch, replaced by forces at the points that take
 /// part. Equal shares if the patch is NaN.

@@ -778,4 +778,37 @@ TEST(parts_share_their_dent)
     bt_world_free(w);
 }
 
+/// A right-angled corner runs into a wall. The cuts from notches at the far side end at it, so that the parts found
+/// there share it: it bears k y, k = 2 p h tan(φ/2), and is crushed v √(m/k) deep as if there were no cut.
+TEST(a_corner_bears_with_all_parts_that_share_it)
+{
+    double outlines[3][18] = {{-0.5, -1, 0.5, 0, -0.5, 1},
+                              {-0.5, -1, 0.5, 0, -0.5, 1, -0.1, 0},
+                              {-0.5, -1, 0.5, 0, -0.5, 1, -0.5, 0.5, -0.2, 0.3, -0.5, 0.2, -0.5, -0.2, -0.2, -0.3, -0.5,
+                               -0.5}};
+    const int corners[] = {3, 4, 9}, n_parts[] = {1, 2, 3};
+    const double v = 0.5, h = 0.1, k = 2 * pressure * h;
+    for (int i = 0; i < 3; i++)
+        for (int long_step = 0; long_step < 2; long_step++) {
+            bt_params p = params(long_step ? 0.1 : 1e-3);
+            p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+            bt_world *w = bt_world_create(&p);
+            double outline[18];
+            memcpy(outline, outlines[i], sizeof outline);
+            bt_body_def d = scene_prism(corners[i], outline, sheet);
+            bt_parts parts;
+            if (i > 0) {
+                assert_true(bt_outline_split(corners[i], outline, &parts));
+                d.parts = &parts;
+                assert_int_equal(parts.n, n_parts[i]);
+            }
+            d.vx = v, d.thickness = h;
+            bt_world_add(w, &d);
+            scene_wall(w, outline[2], -50, 5, 50, 0);
+            for (int s = 0; s < (long_step ? 10 : 500); s++) bt_world_step(w);
+            CHECK_CLOSE(pose(w, 0)->x, v * sqrt(sheet * bt_shape_moments(corners[i], outline).area / k), 3e-4);
+            bt_world_free(w);
+        }
+}
+
 TEST_MAIN(NULL, NULL)
