@@ -39,6 +39,9 @@ void bt_cells_idle(bt_cell *cell)
     free(cell->gaps);
     free(cell->laws->limits);
     free(cell->laws->rises);
+    free(cell->laws->overlaps);
+    cell->laws->overlaps = NULL;
+    cell->laws->n_overlaps = cell->laws->cap_overlaps = 0;
     cell->contacts = NULL;
     cell->gaps = NULL;
     cell->laws->limits = NULL;

@@ -35,7 +35,6 @@ typedef struct bt_manifold {
     /// cells->beside, whether or not the other end is a contact point; 0 = a corner, or no law bounds contacts
     double flush;
     bt_point p[2];
-    const struct bt_manifold *into; ///< set by bt_merge_parts
 } bt_manifold;
 
 /// Collective. Set cells->bound to the largest speed in and around each cell at velocities v and v2; with `keep` it is
@@ -66,7 +65,7 @@ bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t
 
 /// Among the manifolds man [n], sorted by gids and parts, remove the duplicate points of bodies that are not convex and
 /// of shores: points also found by another part of the same pair of bodies, or by another piece of the shore with the
-/// same body. A manifold without a point left has n_points = 0, and `into` names the one that has its last point.
+/// same body. A manifold without a point left has n_points = 0.
 void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n);
 
 // --- pairs that pass -------------------------------------------------------------------------------------------------

@@ -7,10 +7,11 @@
 #include <stdlib.h>
 
 #include "base/inside.h"
-#include "contact/overlap.h"
+#include "contact/bearing.h"
 #include "body/bodies.h"
 #include "contact/row.h"
 #include "contact/law_pair.h"
+#include "space/shore.h"
 
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01
@@ -107,30 +108,46 @@ static double count(const bt_world *world, const bt_memory *memory, bt_sum *numb
 
 BT_ASCENDING_BY(by_bodies, bt_memory, a, b)
 
-/// Depth of each point from the earlier crushing of the two bodies, in these parts or in others: contact that moves
-/// from part to part is sliding. So is a point that is found again: meanwhile they may have crushed each other deeper
-/// at another feature.
-static void inherit(const bt_cell *cell, const bt_memory *names, const bt_manifold *manifold, bt_limit *limit)
+/// The records of the cell among which those of the same two outlines are.
+static const bt_memory *records_of(const bt_cell *cell, const bt_memory *names, bool shore, const bt_memory **end)
 {
-    if (cell->laws->n_memory == 0) return;
-    const bt_memory *any = bsearch(names, cell->laws->memory, (size_t)cell->laws->n_memory, sizeof *names, by_bodies);
-    if (!any) return;
-    const bt_memory *end = any + 1, *own = NULL;
-    while (any > cell->laws->memory && by_bodies(any - 1, names) == 0) any--;
-    while (end < cell->laws->memory + cell->laws->n_memory && by_bodies(end, names) == 0) end++;
+    const bt_memory *all = cell->laws->memory, *last = all + cell->laws->n_memory;
+    *end = last;
+    if (shore || cell->laws->n_memory == 0) return all;
+    const bt_memory *any = bsearch(names, all, (size_t)cell->laws->n_memory, sizeof *names, by_bodies);
+    if (!any) return last;
+    *end = any + 1;
+    while (any > all && by_bodies(any - 1, names) == 0) any--;
+    while (*end < last && by_bodies(*end, names) == 0) ++*end;
+    return any;
+}
+
+/// Depth of each point from the earlier crushing of the two bodies, in these parts or in others, or of the body by any
+/// piece of the shore: contact that moves from one to the other is sliding. So is a point that is found again:
+/// meanwhile they may have crushed each other deeper at another feature.
+static void recall(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
+{
+    bt_limit *limit = &cell->laws->limits[j];
+    const bt_memory names = bt_law_names(world, pair, BT_LAW_CRUSHING);
+    const bool shore_a = bt_shore_holds(world, pair->a), shore = shore_a || bt_shore_holds(world, pair->b);
+    const bt_gid body = shore_a ? names.b : names.a;
+    const bt_memory *end, *own = NULL;
     double deepest = 0;
-    for (const bt_memory *memory = any; memory < end; memory++) {
+    for (const bt_memory *memory = records_of(cell, &names, shore, &end); memory < end; memory++) {
         if (memory->law != BT_LAW_CRUSHING) continue;
+        if (shore && !(memory->a == body && bt_shore_has(world->shore, memory->b)) &&
+            !(memory->b == body && bt_shore_has(world->shore, memory->a)))
+            continue;
         deepest = bt_max(deepest, depth_of(memory));
-        if (bt_memory_by_names(memory, names) == 0) own = memory;
+        if (bt_memory_by_names(memory, &names) == 0) own = memory;
     }
     if (own) limit->record[BT_LAW_CRUSHING] = (int32_t)(own - cell->laws->memory);
     for (int i = 0; i < manifold->n_points; i++) {
         limit->rise->depth[i] = bt_min(deepest, bt_max(0, -manifold->p[i].gap));
-        for (int j = 0; own && j < own->n_points; j++)
-            if (own->feature[j] == manifold->p[i].feature)
+        for (int k = 0; own && k < own->n_points; k++)
+            if (own->feature[k] == manifold->p[i].feature)
                 limit->rise->depth[i] =
-                    own->value[UNSEEN + j] > 0 ? bt_max(own->value[j], limit->rise->depth[i]) : own->value[j];
+                    own->value[UNSEEN + k] > 0 ? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];
     }
 }
 
@@ -239,6 +256,7 @@ static void bound_push(bt_limit *limit, int i, const resistance *ice, double way
 
 static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
+    (void)pair;
     enum { LOOKS = 4 };
     const bt_bodies *bodies = &world->bodies;
     const bt_contact *contact = &cell->contacts[j];
@@ -248,10 +266,9 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, slop = world->par.slop;
     const bt_mass mass = bt_mass_of(contact, bodies->inv);
-    const bt_memory names = bt_law_names(world, pair, BT_LAW_CRUSHING);
     // then its edges bear no more than the rafting load, and give way by rafting
     const bool rafts = limit->record[BT_LAW_RAFTING] >= 0;
-    if (!rafts) inherit(cell, &names, manifold, limit);
+    if (rafts) limit->record[BT_LAW_CRUSHING] = -1, limit->rise->depth[0] = limit->rise->depth[1] = 0;
     for (int i = 0; i < manifold->n_points; i++) gaps->gap[i] += limit->rise->depth[i];
     const bt_closing closing = bt_law_closing(world, cell, j, manifold);
     const double least = own[BT_CRUSH_LEAST] * h / closing.n, least_way = bt_max(LEAST_WAY * world->par.size, 2 * slop);
@@ -264,20 +281,14 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
         strikes[i] = !rafts && !(bt_pair_restitution(bodies, manifold->a, manifold->b) > 0) && closing.point[i] &&
                      hits[i].before > bt_max(place[i], world->par.rest_speed);
     }
-    double area[2];
-    const bt_patch now = bt_law_patch(world, cell, pair, manifold, closing.gap + slop, &area[0]);
     const double free_way = bt_max(dt * closing.approach - closing.gap, least_way);
     double way = free_way;
     resistance ice[2], found[2];
     for (int look = 0; look < LOOKS; look++) {
-        const bt_patch then = bt_law_patch(world, cell, pair, manifold, closing.gap + way, &area[1]);
-        double length[2][2], all = now.length + then.length;
+        bt_bearing of[2];
+        bt_bearing_of(world, cell, j, manifold, &closing, (double[2]){closing.gap + slop, closing.gap + way}, of);
         for (int i = 0; i < manifold->n_points; i++) {
-            const double share = bt_law_share(manifold, i, now, &closing);
-            length[i][0] = now.length * share, length[i][1] = then.length * bt_law_share(manifold, i, then, &closing);
-            const double part = all > 0 ? (length[i][0] + length[i][1]) / all : 0, first = area[0] * share;
-            found[i] = resistance_of(length[i], (double[2]){first, first + (area[1] - area[0]) * part}, least, line,
-                                     slop, way);
+            found[i] = resistance_of(of[i].length, of[i].area, least, line, slop, way);
             if (look == 0) ice[i] = found[i];
             take_resistance(&hits[i], &found[i], dt);
         }
@@ -307,17 +318,15 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
     const double PRECISION = 1e-4, TOUCH = 1e-6; // of the depth; depth of the first length / mean floe size
     const bt_contact *contact = &cell->contacts[j];
     if (cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0) return INFINITY;
-    const bt_manifold manifold = {.a = contact->a, .b = contact->b, .nx = contact->nx, .ny = contact->ny};
-    const bt_pair *pair = &cell->search.pairs[contact->pair];
     const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), touch = TOUCH * world->par.size,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
     const double line = own[BT_CRUSH_PRESSURE] * h, least = own[BT_CRUSH_LEAST] * h;
     double gap = INFINITY, way = LEAST_WAY * world->par.size, length[2], area[2];
     for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
-    length[0] = bt_law_patch(world, cell, pair, &manifold, gap + touch, &area[0]).length;
+    length[0] = bt_bearing_whole(world, cell, j, gap + touch, &area[0]);
     resistance ice = {0};
     for (int k = 0; k < ITERATIONS; k++) {
-        length[1] = bt_law_patch(world, cell, pair, &manifold, gap + way, &area[1]).length;
+        length[1] = bt_bearing_whole(world, cell, j, gap + way, &area[1]);
         const double force = line * bt_max(least, bt_max(length[0], length[1]));
         if (!(force > 0)) return INFINITY; // the outlines pass each other
         ice = resistance_of(length, area, least, line, touch, way);
@@ -393,6 +402,7 @@ const bt_law bt_crush_law = {.name = "crushing",
                              .totals = totals,
                              .n_totals = sizeof totals / sizeof *totals,
                              .applies = applies,
+                             .recall = recall,
                              .bound = bound,
                              .bears = bears,
                              .keeps = keeps,

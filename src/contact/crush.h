@@ -47,10 +47,10 @@
 // next edge) takes the present overlap, at most the pair's deepest crush, as its depth: sliding neither crushes nor
 // restores overlap. A depth belongs to this pair alone: a third floe meets the original outline.
 //
-// Parts. Where several parts of a floe that is not convex touch at one place (contact/detect.c), one contact stands for
-// all, and its overlap is that of all of them: a corner at which a cut ends bears as one piece.
+// Outlines in several polygons bear where they would in one piece (contact/bearing.h), and what one part of a floe, or
+// piece of a shore, has crushed is open to the others.
 //
-// Not modelled: pieces of a shore (space/shore.h) overlap each other, so a contact has the overlap of its own alone.
+// Not modelled: the least length holds for each contact, so pieces of a shore that are shorter bear too much together.
 // A record holds two points, so a crushed corner that was not found is forgotten once two other features of the pair
 // have been crushed; its depth is then the present overlap, as for a new point.
 // Crushed ice does not pile up, extrude or lose mass, and the pressure does not fall with the area of contact.

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/inside.h"
+#include "contact/bearing.h"
 #include "contact/contacts.h"
 #include "contact/law.h"
 #include "contact/law_pair.h"
@@ -52,12 +53,10 @@ static bool same_place(const touch *p, int i, const touch *q, int j, double reac
     return fabs(p->m->nx * dy - p->m->ny * dx) <= reach; // along the surface: their heights differ by half of the gaps
 }
 
-/// Remove point i, which `into` has too.
-static void drop(bt_manifold *manifold, int i, const bt_manifold *into)
+static void drop(bt_manifold *manifold, int i)
 {
     if (i + 1 < manifold->n_points) manifold->p[i] = manifold->p[i + 1];
     manifold->n_points--;
-    manifold->into = into;
 }
 
 /// Of points that p and q share, keep those of q, unless that of p is deeper by more than the slop.
@@ -72,9 +71,9 @@ static void settle(const bt_world *world, const touch *p, const touch *q)
         for (int j = o->n_points - 1; j >= 0; j--) {
             if (!same_place(p, i, q, j, reach)) continue;
             if (m->p[i].gap < o->p[j].gap - deeper) {
-                drop(o, j, m);
+                drop(o, j);
             } else {
-                drop(m, i, o);
+                drop(m, i);
                 break;
             }
         }
@@ -242,19 +241,26 @@ typedef struct {
     bt_pack_scratch pack;
 } thread_scratch;
 
+/// Is one of the pair a polygon of several: a part of a floe, or a piece of a shore?
+static bool in_several(const bt_world *world, const bt_pair *pair)
+{
+    return pair->part[0] || pair->part[1] || bt_shore_holds(world, pair->a) || bt_shore_holds(world, pair->b);
+}
+
 /// Merge contacts found by several parts of a floe, or pieces of a shore.
 static void merge(const bt_world *world, bt_cell *cell, bt_pack_scratch *scratch)
 {
-    bt_merge_parts(world, scratch->man, scratch->n);
-    for (size_t k = 0; k < scratch->n; k++) {
-        if (scratch->man[k].n_points > 0) continue;
-        const bt_manifold *into = scratch->man[k].into;
-        while (into->n_points == 0) into = into->into;
-        cell->search.pairs[scratch->pair[k]].contact = BT_MERGED_INTO(scratch->pair[into - scratch->man]);
+    for (size_t k = 0; bt_laws_rise(&world->par) && k < scratch->n; k++) {
+        const bt_pair *pair = &cell->search.pairs[scratch->pair[k]];
+        if (in_several(world, pair)) bt_bearing_note(cell, scratch->pair[k], &scratch->man[k]);
     }
+    bt_merge_parts(world, scratch->man, scratch->n);
     size_t kept = 0;
     for (size_t k = 0; k < scratch->n; k++) {
-        if (scratch->man[k].n_points == 0) continue;
+        if (scratch->man[k].n_points == 0) {
+            cell->search.pairs[scratch->pair[k]].contact = -1;
+            continue;
+        }
         scratch->man[kept] = scratch->man[k];
         scratch->pair[kept++] = scratch->pair[k];
     }
@@ -294,6 +300,7 @@ static void narrow_phase(bt_world *world, bt_idx k, const void *scratch, bt_tota
     bt_pairs_update(world, k, cell, cell->margin, &s->pairs);
     bt_pack_begin(&s->pack, 2 * (size_t)cell->search.n_pairs); // a pair may have a second contact (replace)
     bool several = false; // polygons of one outline
+    cell->laws->n_overlaps = 0;
     const bool near = bt_pairs_near(world, k, cell, cell->margin);
     const double far = cell->margin + bt_pairs_near_gap(world);
     for (bt_idx j = 0, n = near ? cell->search.n_near : cell->search.n_pairs; j < n; j++) {
@@ -314,8 +321,7 @@ static void narrow_phase(bt_world *world, bt_idx k, const void *scratch, bt_tota
             continue;
         }
         s->pack.n++;
-        several = several || pair->part[0] || pair->part[1] || bt_shore_holds(world, pair->a) ||
-                  bt_shore_holds(world, pair->b);
+        several = several || in_several(world, pair);
     }
     if (several) merge(world, cell, &s->pack);
     if (cell->laws->n_memory > 0) replace(world, cell, &s->pack);

@@ -87,7 +87,7 @@ void bt_laws_reserve(bt_cell *cell)
                                          : NULL;
 }
 
-void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
+void bt_laws_recall(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
     bt_limit *limit = &cell->laws->limits[j];
     *limit = (bt_limit){
@@ -95,6 +95,15 @@ void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
         .rise = cell->laws->rises ? &cell->laws->rises[j] : NULL};
     if (limit->rise) *limit->rise = (bt_rise){0};
     for (int law = 0; law < BT_ALL_LAWS; law++) limit->record[law] = -1;
+    for (int law = 0; manifold->n_points > 0 && law < BT_LAWS; law++)
+        if (bt_laws[law]->recall && bt_law_on(&world->par, law) &&
+            bt_laws[law]->applies(world, manifold->a, manifold->b))
+            bt_laws[law]->recall(world, cell, j, pair, manifold);
+}
+
+void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
+{
+    bt_limit *limit = &cell->laws->limits[j];
     if (manifold->n_points > 0 && world->par.added_laws > 0)
         memcpy(limit->closes, bt_law_closing(world, cell, j, manifold).point, sizeof limit->closes);
     // In reverse order: where a pair has rafted, gaps are not measured from crushed surfaces.

@@ -16,9 +16,9 @@
 // of the state, whatever the law. The impulses of the last step, which every pair keeps, travel and are saved in the
 // same way, as the record of the rigid law.
 //
-// In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace the contacts of the
-// outlines (contact/raft.h); the sweeps know only bounds; after them `gives_way` tells which points are at the bound,
-// `give_way` books the work of those that approach, and `remember` writes the record.
+// In a step: detection prunes the records (`keeps`), may replace the contacts of the outlines (contact/raft.h), reads
+// the records (`recall`) and forms the bounds (`bound`); the sweeps know only bounds; after them `gives_way` tells which
+// points are at the bound, `give_way` books the work of those that approach, and `remember` writes the record.
 //
 // A law that bounds the load of points from the record of their pair is one source file (bergtow/contact.h,
 // contact/added.h). One that changes what touches, or whose bound rises with the approach, is one source file with its
@@ -117,6 +117,8 @@ typedef struct bt_law {
     /// (contact/raft.h). NULL = the outlines.
     bool (*contact)(const bt_world *world, const bt_pair *pair, const bt_memory *memory, bt_manifold *edge,
                     bt_manifold *sheets);
+    /// Take over into limits[j] what the bounds, also of other contacts, need of the record of the pair. NULL = nothing
+    void (*recall)(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
     /// Narrow the bounds of contact j of the cell, made from the manifold of the pair; its gaps become those between
     /// the remaining surfaces.
     void (*bound)(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
@@ -172,7 +174,10 @@ void bt_laws_prune(const bt_world *world, bt_cell *cell);
 /// Make room for the bounds of the contacts of a cell.
 void bt_laws_reserve(bt_cell *cell);
 
-/// Set the bounds of contact j of the cell, which was made from this manifold of the pair.
+/// Begin the bounds of contact j of the cell, which was made from this manifold of the pair: no law bounds it yet, and
+/// records have been read. For all contacts before any is bounded.
+void bt_laws_recall(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
+/// Set its bounds.
 void bt_laws_bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold);
 
 /// The most that contact j of the cell bears until its bodies have lost this energy of their approach, J; N, INFINITY

@@ -35,51 +35,57 @@ void bt_law_put(bt_cell *cell, bt_idx at, const bt_memory *memory)
 
 // --- points that take part -------------------------------------------------------------------------------------------
 
-bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold)
+double bt_law_approach(const bt_world *world, const bt_contact *contact, int i)
 {
     const bt_bodies *bodies = &world->bodies;
-    const bt_contact *contact = &cell->contacts[j];
-    const double *gap = cell->gaps[j].gap, slop = world->par.slop;
+    const bt_idx a = contact->a, b = contact->b;
+    const double before = bt_normal_velocity(contact, i, &bodies->vel_start[a], &bodies->vel_start[b]),
+                 free = bt_normal_velocity(contact, i, &bodies->vel_free[a], &bodies->vel_free[b]);
+    return bt_max(0, -bt_min(before, free));
+}
+
+bt_closing bt_law_closing_at(const bt_world *world, int n, const double gap[2], const double outline[2],
+                             const double approach[2])
+{
+    const double slop = world->par.slop;
     bt_closing closing = {.gap = INFINITY};
-    double nearest = INFINITY; // of the outlines
-    for (int i = 0; i < contact->n; i++)
-        closing.gap = bt_min(closing.gap, bt_max(gap[i], 0)), nearest = bt_min(nearest, manifold->p[i].gap);
-    for (int i = 0; i < contact->n; i++) {
-        const double before = bt_normal_velocity(contact, i, &bodies->vel_start[contact->a],
-                                                 &bodies->vel_start[contact->b]),
-                     free = bt_normal_velocity(contact, i, &bodies->vel_free[contact->a],
-                                               &bodies->vel_free[contact->b]);
-        const double approach = bt_max(0, -bt_min(before, free));
+    double nearest = INFINITY;
+    for (int i = 0; i < n; i++)
+        closing.gap = bt_min(closing.gap, bt_max(gap[i], 0)), nearest = bt_min(nearest, outline[i]);
+    for (int i = 0; i < n; i++) {
         // These points are found whatever the margin: it is at least the slop, and the distance that two bodies at the
         // highest speed nearby cover (space/cells.h, except for its cap); and manifold.c looks a slop farther.
-        closing.point[i] = gap[i] <= bt_max(world->par.dt * approach, slop) || gap[i] <= closing.gap ||
-                           manifold->p[i].gap <= nearest + slop;
+        closing.point[i] = gap[i] <= bt_max(world->par.dt * approach[i], slop) || gap[i] <= closing.gap ||
+                           outline[i] <= nearest + slop;
         closing.n += closing.point[i];
-        if (closing.point[i]) closing.approach = bt_max(closing.approach, approach);
+        if (closing.point[i]) closing.approach = bt_max(closing.approach, approach[i]);
     }
     return closing;
 }
 
-bt_patch bt_law_patch(const bt_world *world, const bt_cell *cell, const bt_pair *pair, const bt_manifold *manifold,
-                      double way, double *area)
+bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold)
 {
-    const bt_pair *pairs = cell->search.pairs, *end = pairs + cell->search.n_pairs, *first = pair;
-    const bt_idx merged = BT_MERGED_INTO((bt_idx)(pair - pairs));
-    double low = INFINITY, high = -INFINITY, centroid[2];
-    *area = 0;
-    while (first > pairs && first[-1].a == pair->a && first[-1].b == pair->b) first--;
-    for (const bt_pair *p = first; p < end && p->a == pair->a && p->b == pair->b; p++) {
-        if (p != pair && p->contact != merged) continue;
-        bt_overlap overlap;
-        bt_overlap_clip(world, p->a, p->b, p->part, -way * manifold->nx, -way * manifold->ny, &overlap);
-        for (int k = 0; k < overlap.n; k++) {
-            const double t = manifold->nx * overlap.v[overlap.now][2 * k + 1] -
-                             manifold->ny * overlap.v[overlap.now][2 * k];
-            low = bt_min(low, t), high = bt_max(high, t);
-        }
-        *area += bt_overlap_area(&overlap, centroid);
+    const bt_contact *contact = &cell->contacts[j];
+    double outline[2], approach[2];
+    for (int i = 0; i < contact->n; i++)
+        outline[i] = manifold->p[i].gap, approach[i] = bt_law_approach(world, contact, i);
+    return bt_law_closing_at(world, contact->n, cell->gaps[j].gap, outline, approach);
+}
+
+bt_patch bt_law_patch(const bt_world *world, const uint16_t part[2], const bt_manifold *manifold, double way,
+                      double *area)
+{
+    bt_overlap overlap;
+    double centroid[2];
+    bt_overlap_clip(world, manifold->a, manifold->b, part, -way * manifold->nx, -way * manifold->ny, &overlap);
+    double low = INFINITY, high = -INFINITY;
+    for (int k = 0; k < overlap.n; k++) {
+        const double t = manifold->nx * overlap.v[overlap.now][2 * k + 1] -
+                         manifold->ny * overlap.v[overlap.now][2 * k];
+        low = bt_min(low, t), high = bt_max(high, t);
     }
-    return low <= high ? (bt_patch){high - low, 0.5 * (low + high)} : (bt_patch){0, NAN};
+    *area = bt_overlap_area(&overlap, centroid);
+    return overlap.n > 0 ? (bt_patch){high - low, 0.5 * (low + high)} : (bt_patch){0, NAN};
 }
 
 double bt_law_share(const bt_manifold *manifold, int i, bt_patch patch, const bt_closing *closing)

@@ -29,6 +29,14 @@ typedef struct bt_closing {
 /// depend.
 bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold);
 
+/// Approach of point i at the start of the step or at the velocities without contacts, whichever is faster; at least 0,
+/// m/s.
+double bt_law_approach(const bt_world *world, const bt_contact *contact, int i);
+
+/// The same from the gaps between the remaining surfaces and between the outlines, m, and the approaches of n points.
+bt_closing bt_law_closing_at(const bt_world *world, int n, const double gap[2], const double outline[2],
+                             const double approach[2]);
+
 /// Place of point i along the tangent, from the centroid of a, m.
 static inline double bt_law_along(const bt_manifold *manifold, int i)
 {
@@ -41,10 +49,9 @@ typedef struct bt_patch {
 } bt_patch;
 
 /// Extent along the tangent of the overlap of a and b after b has moved `way`, m, towards a along the normal; *area: of
-/// the overlap, m². Of bodies in parts: of the pair of parts that has the contact, and of those whose contacts have been
-/// merged into it. Parts do not overlap, so no area counts twice. `pair` is one of the cell.
-bt_patch bt_law_patch(const bt_world *world, const bt_cell *cell, const bt_pair *pair, const bt_manifold *manifold,
-                      double way, double *area);
+/// the overlap, m².
+bt_patch bt_law_patch(const bt_world *world, const uint16_t part[2], const bt_manifold *manifold, double way,
+                      double *area);
 
 /// Share of point i of the manifold in a uniform pressure on the patch, replaced by forces at the points that take
 /// part. Equal shares if the patch is NaN.

@@ -20,6 +20,26 @@ static const double *outline_of(const bt_bodies *bodies, bt_idx i, int part)
     return bodies->outline + 2 * (bodies->offset[i] + part);
 }
 
+const double *bt_overlap_polygon(const bt_world *world, bt_idx i, int part, int *n)
+{
+    *n = count_of(&world->bodies, i, part);
+    return outline_of(&world->bodies, i, part);
+}
+
+void bt_overlap_cut(const bt_world *world, bt_idx i, int part, const double place[2], bt_overlap *overlap)
+{
+    const double *q = outline_of(&world->bodies, i, part);
+    const int n = count_of(&world->bodies, i, part);
+    for (int e = 0; e < n && overlap->n > 0; e++) {
+        const double *p0 = q + 2 * e, *p1 = q + 2 * (e + 1 < n ? e + 1 : 0);
+        const double at[2] = {p0[0] + place[0], p0[1] + place[1]}, along[2] = {p1[0] - p0[0], p1[1] - p0[1]};
+        const int now = overlap->now, next = 1 - now;
+        overlap->n = (int)bt_polygon_cut(overlap->n, overlap->v[now], overlap->of_b[now], at, along, overlap->v[next],
+                                         overlap->of_b[next]);
+        overlap->now = next;
+    }
+}
+
 void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double dx, double dy,
                      bt_overlap *overlap)
 {
@@ -27,20 +47,11 @@ void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t p
     double off[2];
     bt_bodies_offset(world, a, b, off);
     off[0] += dx, off[1] += dy;
-    const double *q = outline_of(bodies, b, part[1]);
-    const int n_b = count_of(bodies, b, part[1]);
     overlap->n = count_of(bodies, a, part[0]);
     overlap->now = 0;
     memcpy(overlap->v[0], outline_of(bodies, a, part[0]), 2 * (size_t)overlap->n * sizeof(double));
     memset(overlap->of_b[0], 0, (size_t)overlap->n);
-    for (int e = 0; e < n_b && overlap->n > 0; e++) {
-        const double *p0 = q + 2 * e, *p1 = q + 2 * (e + 1 < n_b ? e + 1 : 0);
-        const double at[2] = {p0[0] + off[0], p0[1] + off[1]}, along[2] = {p1[0] - p0[0], p1[1] - p0[1]};
-        const int now = overlap->now, next = 1 - now;
-        overlap->n = (int)bt_polygon_cut(overlap->n, overlap->v[now], overlap->of_b[now], at, along, overlap->v[next],
-                                         overlap->of_b[next]);
-        overlap->now = next;
-    }
+    bt_overlap_cut(world, b, part[1], off, overlap);
 }
 
 double bt_overlap_area(const bt_overlap *overlap, double centroid[2])

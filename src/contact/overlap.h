@@ -14,10 +14,16 @@ typedef struct bt_overlap {
     double push[2 * BT_MAX_VERTICES][2]; ///< contribution of each edge to −grad, m: by bt_overlap_gradient
 } bt_overlap;
 
+/// The outline [2n] of a part of body i from its centroid, m.
+const double *bt_overlap_polygon(const bt_world *world, bt_idx i, int part, int *n);
+
 /// Intersection of these parts of a and b when b has been moved by (dx, dy): cut by the edges of b one after the other
 /// (Sutherland & Hodgman 1974, Comm. ACM 17). The bits depend on the poses alone.
 void bt_overlap_clip(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double dx, double dy,
                      bt_overlap *overlap);
+
+/// Cut an overlap by the edges of a part of body i, whose centroid is at `place` in the frame of the overlap, m.
+void bt_overlap_cut(const bt_world *world, bt_idx i, int part, const double place[2], bt_overlap *overlap);
 
 /// Area (m²) and centroid (m, in the frame of a).
 double bt_overlap_area(const bt_overlap *overlap, double centroid[2]);

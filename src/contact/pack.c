@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "contact/bearing.h"
 #include "contact/law.h"
 #include "body/bodies.h"
 #include "contact/row.h"
@@ -22,6 +23,7 @@ void bt_pack_scratch_free(bt_pack_scratch *scratch)
 {
     free(scratch->man);
     free(scratch->pair);
+    free(scratch->place);
     free(scratch->held);
     free(scratch->colour);
     free(scratch->used);
@@ -35,6 +37,7 @@ void bt_pack_begin(bt_pack_scratch *scratch, size_t n)
     scratch->cap = n + n / 2 + 16;
     scratch->man = bt_realloc(scratch->man, scratch->cap, sizeof *scratch->man);
     scratch->pair = bt_realloc(scratch->pair, scratch->cap, sizeof *scratch->pair);
+    scratch->place = bt_realloc(scratch->place, scratch->cap, sizeof *scratch->place);
     scratch->held = bt_realloc(scratch->held, scratch->cap, sizeof *scratch->held);
     scratch->colour = bt_realloc(scratch->colour, scratch->cap, sizeof *scratch->colour);
 }
@@ -240,19 +243,26 @@ void bt_pack_contacts(bt_world *world, bt_idx k, bt_pack_scratch *scratch)
     bt_idx next[MAX_COLOURS + 2] = {0};
     if (cell->phase < BT_COLOURS) colour_contacts(world, cell, scratch, next);
     else memset(scratch->colour, 0, scratch->n); // in sequence
+    bt_idx *place = scratch->place;
     for (size_t i = 0; i < scratch->n; i++) {
-        bt_pair *pair = &cell->search.pairs[scratch->pair[i]];
-        const bt_idx at = next[scratch->colour[i]]++;
-        bt_contact *contact = &cell->contacts[at];
+        const bt_idx at = place[i] = next[scratch->colour[i]]++;
         if (scratch->man[i].n_points == 0) {
-            fill_sheets(&scratch->man[i], scratch->pair[i], contact, &cell->gaps[at]);
-            bt_laws_bound(world, cell, at, pair, &scratch->man[i]);
-            continue;
+            fill_sheets(&scratch->man[i], scratch->pair[i], &cell->contacts[at], &cell->gaps[at]);
+        } else {
+            fill_contact(world, &scratch->man[i], scratch->pair[i], &scratch->held[i], &cell->contacts[at],
+                         &cell->gaps[at]);
+            cell->search.pairs[scratch->pair[i]].contact = at;
         }
-        fill_contact(world, &scratch->man[i], scratch->pair[i], &scratch->held[i], contact, &cell->gaps[at]);
-        if (bounded) bt_laws_bound(world, cell, at, pair, &scratch->man[i]); // this may change the gaps
+        if (bounded) bt_laws_recall(world, cell, at, &cell->search.pairs[scratch->pair[i]], &scratch->man[i]);
+    }
+    if (cell->laws->n_overlaps > 0) bt_bearing_assign(world, cell);
+    for (size_t i = 0; i < scratch->n; i++) {
+        const bt_idx at = place[i];
+        bt_contact *contact = &cell->contacts[at];
+        if (bounded) // this may change the gaps
+            bt_laws_bound(world, cell, at, &cell->search.pairs[scratch->pair[i]], &scratch->man[i]);
+        if (contact->n == 0) continue;
         bt_pack_set_row(world, cell, at, row_state(world, cell, at, &scratch->man[i], &scratch->held[i]));
-        pair->contact = at;
         cell->n_points += contact->n;
         // Overlap of the remaining outlines. 0 − gap, not −gap: a contact that just touches must not make the deepest
         // overlap −0 on the only rank that holds it.

@@ -25,6 +25,7 @@ typedef struct bt_held {
 typedef struct bt_pack_scratch {
     bt_manifold *man; ///< [n]
     bt_idx *pair;     ///< [n] which pair
+    bt_idx *place;    ///< [n] index of its contact in the cell
     bt_held *held;    ///< [n] contact of that pair in the step before
     uint8_t *colour;  ///< [n]
     size_t n, cap;

@@ -73,12 +73,10 @@ typedef struct bt_axes {
 _Static_assert(BT_MAX_VERTICES <= 128, "an edge in a byte with a sign");
 
 /// A pair near enough to be tested for contact.
-#define BT_MERGED_INTO(pair) (-2 - (pair)) // index in the cell of the pair that has the contact, as a bt_pair.contact
-
 typedef struct bt_pair {
     bt_idx a, b;         ///< gid[a] < gid[b]
-    /// index in the cell of its contact at the last detection (not of its sheets), which the next contact of the pair
-    /// takes over features and impulses from; −1 = none; BT_MERGED_INTO: that of another pair bears for it
+    /// index in the cell of its contact at the last detection (not of its sheets), −1 = none; the next contact of the
+    /// pair takes over features and impulses from it
     bt_idx contact;
     uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
     bt_axes axes;

@@ -6,6 +6,7 @@
 #include "contact/crush.h"
 #include "contact/hit.h"
 #include "contact/law_pair.h"
+#include "space/shore.h"
 
 static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
 
@@ -809,6 +810,87 @@ TEST(a_corner_bears_with_all_parts_that_share_it)
             CHECK_CLOSE(pose(w, 0)->x, v * sqrt(sheet * bt_shape_moments(corners[i], outline).area / k), 3e-4);
             bt_world_free(w);
         }
+}
+
+/// A quay whose face is x = 0, in rectangles from y to y, m.
+static void add_quay(bt_world *w, int n, const double (*from_to)[2])
+{
+    for (int i = 0; i < n; i++) {
+        const double half = 0.5 * (from_to[i][1] - from_to[i][0]);
+        double v[] = {-2, -half, 2, -half, 2, half, -2, half};
+        const bt_body_def d = {.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = 2,
+                               .y = 0.5 * (from_to[i][0] + from_to[i][1])};
+        bt_world_add(w, &d);
+    }
+    bt_shore_create(w);
+}
+
+typedef struct {
+    int n;
+    double from_to[4][2];
+} quay;
+
+static const quay quays[] = {
+    {1, {{-9, 9}}},                                          // whole
+    {2, {{-9, 0}, {0, 9}}},                                  // flush
+    {2, {{0, 9}, {-9, 0}}},                                  // in the other order
+    {4, {{-9, -0.3}, {-0.3, 0}, {0, 0.2}, {0.2, 9}}},        // with short pieces
+    {2, {{-9, 0.25}, {-0.25, 9}}},                           // overlapping
+    {3, {{-9, 0.4}, {-0.4, 9}, {-0.2, 0.3}}},                // three times in places
+};
+enum { QUAYS = sizeof quays / sizeof *quays };
+
+/// A floe runs into a quay in pieces, face on, then with a corner at a seam. It stops as deep as at a whole one, at
+/// m v²/(2 p h L) and v √(m/k), and does not turn.
+TEST(a_quay_in_pieces_bears_like_a_whole_one)
+{
+    const double h = 0.1, speed = 0.5, face = sheet * speed * speed / (2 * pressure * h),
+                 corner = speed * sqrt(sheet / (2 * pressure * h));
+    for (int i = 0; i < QUAYS; i++)
+        for (int k = 0; k < 4; k++) {
+            const bool long_step = k & 1, by_corner = k & 2;
+            bt_params p = params(long_step ? 0.2 : 2e-3);
+            p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+            bt_world *w = bt_world_create(&p);
+            add_quay(w, quays[i].n, quays[i].from_to);
+            double v[8];
+            scene_square(1, v);
+            const double half = by_corner ? sqrt(0.5) : 0.5;
+            const bt_gid floe = quays[i].n;
+            add_floe(w, 4, v, -half, 0, by_corner ? 0.25 * BT_PI : 0, speed, h);
+            for (int s = 0; s < (long_step ? 10 : 300); s++) bt_world_step(w);
+            const double depth = by_corner ? corner : face;
+            CHECK_CLOSE(pose(w, floe)->x, -half + depth, 5e-3 * depth);
+            CHECK_CLOSE(pose(w, floe)->yaw - (by_corner ? 0.25 * BT_PI : 0), 0, 1e-3);
+            assert_true(w->stats.overlap <= 1e-3 * depth);
+            bt_world_free(w);
+        }
+}
+
+/// A crushed corner slides along the quay, over its seams, and stays as deep as it is.
+TEST(a_dent_goes_with_the_corner_from_piece_to_piece)
+{
+    const double h = 0.1;
+    bt_pose whole = {0};
+    for (int i = 0; i < QUAYS; i++) {
+        bt_params p = params(0.02);
+        bt_world *w = bt_world_create(&p);
+        add_quay(w, quays[i].n, quays[i].from_to);
+        double v[8];
+        scene_square(1, v);
+        const bt_gid floe = quays[i].n;
+        add_floe(w, 4, v, -sqrt(0.5), -0.6, 0.25 * BT_PI, 0.5, h);
+        vel(w, floe)->y = 0.4;
+        for (int s = 0; s < 100; s++) {
+            bt_world_step(w);
+            assert_true(w->stats.overlap <= 1e-9);
+        }
+        if (i == 0) whole = *pose(w, floe);
+        assert_true(pose(w, floe)->y > 0.1);
+        CHECK_CLOSE(pose(w, floe)->x, whole.x, 1e-4);
+        CHECK_CLOSE(pose(w, floe)->yaw, whole.yaw, 1e-4);
+        bt_world_free(w);
+    }
 }
 
 TEST_MAIN(NULL, NULL)
