@@ -308,8 +308,12 @@ def test_a_quay_is_hit_once_however_it_is_cut(tmp_path, changes):
 
 
 def test_a_quay_that_crushes_bears_as_one(tmp_path):
-    """At most what the ice bears along the whole contact, 4 m."""
+    """At most what the ice bears along the whole contact, 4 m. In the end nearly nothing moves, which is no loss of
+    momentum."""
     case = {"ice__crushing": {"pressure": "20 kPa"}}
+    for pieces in [(20, 0)], QUAY_CUTS[0]:
+        still = run(tmp_path / str(len(pieces)), quay(*pieces, **case))
+        assert still.summary["momentum_residual"] < 1e-9
     hit = rows(run(tmp_path, quay(*QUAY_CUTS[0], **case)))
     assert len(hit["time"]) == 1 and hit["peak"][0] == pytest.approx(20e3 * 1 * 4, rel=5e-3)
 
