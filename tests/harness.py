@@ -37,6 +37,16 @@ TOW = {
     "tow": {"speed": 0.13, "ramp": 2},
     "output": {"frame_interval": 3},
 }
+# A square block drifts against a quay, flush with it.
+QUAY = {
+    "run": {"dt": 0.1, "duration": 3},
+    "domain": {"length": 80, "width": 40, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0, "thickness": 1, "size": 4, "start": "rest", "friction": 0},
+    "body": {"shape": "square", "length": 4, "draft": 1, "x": 27, "y": 0, "vx": 0.5},
+    "tow": {"mode": "none"},
+    "output": {"window_start": 0.5},
+}
+QUAY_CUTS = [(9, -5.5), (2, 0), (9, 5.5)], [(9, -5.5), (0.8, -0.6), (0.4, 0), (0.8, 0.6), (9, 5.5)]
 # Walls that close on dense ice: thousands of contacts at once, so that every loop that may run in parallel does.
 PRESS = {
     "run": {"dt": 0.1, "duration": 2},
@@ -113,6 +123,12 @@ MADE = ("concentration", "shape", "sides", "aspect", "size", "size_law", "size_s
 def reading(base, field):
     """A copy of a case that reads its ice from a field file, without the keys that this leaves without effect."""
     return changed(base, ice__field=str(field), **{f"ice__{key}": None for key in MADE})
+
+
+def quay(*pieces, **changes):
+    """The quay in pieces (width, y)."""
+    return changed(QUAY, **changes, floes=[{"shape": "rectangle", "length": 4, "width": width, "x": 32, "y": y,
+                                            "fixed": True} for width, y in pieces])
 
 
 def write_case(folder, case, name="case.yml"):

@@ -190,6 +190,17 @@ bt_floe_means bt_case_hand_means(const bt_case *input)
     return (bt_floe_means){mean.size / (double)count, mean.thickness / (double)count, mean.volume / (double)count};
 }
 
+int64_t bt_case_nonconvex_by_hand(const bt_case *input)
+{
+    double v[2 * BT_MAX_VERTICES];
+    int64_t count = 0;
+    for (bt_idx i = 0; i < input->n_floes; i++) {
+        const int n = bt_case_floe_outline(&input->floes[i], v);
+        count += n && !input->floes[i].fixed && !bt_outline_convex(n, v);
+    }
+    return count;
+}
+
 double bt_case_area_by_hand(const bt_case *input)
 {
     double area = 0, v[2 * BT_MAX_VERTICES];

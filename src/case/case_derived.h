@@ -57,6 +57,9 @@ typedef struct bt_floe_means {
 /// Means over the floes given by hand that can move; all 0 if there are none. A quay or a shore is no floe.
 bt_floe_means bt_case_hand_means(const bt_case *input);
 
+/// Number of the floes given by hand that can move and are not convex.
+int64_t bt_case_nonconvex_by_hand(const bt_case *input);
+
 /// Area of the floes given by hand, m².
 double bt_case_area_by_hand(const bt_case *input);
 

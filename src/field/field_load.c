@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bergtow/field.h"
+#include "case/case_derived.h"
 #include "case/warning.h"
 #include "case/ice_bounds.h"
 #include "case/case_check.h"
@@ -128,11 +129,13 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
                 "%lld of %lld outlines have no property `thickness`%s: they have the thickness of the case, %g m on "
                 "average",
                 (long long)counts->bare, (long long)counts->read, "", input->ice.thickness);
-    if (counts->split && input->ice.rafting_kappa > 0)
+    const int64_t by_hand = bt_case_nonconvex_by_hand(input);
+    if (counts->split + by_hand > 0 && input->ice.rafting_kappa > 0)
         bt_warn(warnings, BT_WARN_STAYS_RIGID,
-                "ice.rafting: %lld floes are not convex and consist of convex parts: they stay rigid; ice.nonconvex: "
-                "hull lets them raft, with their hulls' outlines",
-                (long long)counts->split);
+                "ice.rafting: %lld floes are not convex and consist of convex parts: they stay rigid%s%s",
+                (long long)(counts->split + by_hand),
+                counts->split ? "; ice.nonconvex: hull lets those that are read raft, with their hulls' outlines" : "",
+                by_hand ? "; floes by hand raft if their vertices are a convex outline" : "");
     if (counts->read && !counts->bare && input->n_floes == 0 && bt_case_changed(input, "ice.thickness"))
         bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
                 "ice.thickness: no effect, because all outlines have their own thickness");

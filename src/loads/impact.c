@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/elementary.h"
 #include "base/inside.h"
@@ -28,6 +29,12 @@ typedef struct {
     double c, s; ///< of the yaw of the towed body at X1
 } contact_rows;
 
+/// Masses without the drag included in the solver's: a collision is short compared with the step.
+static bt_inv bare(const bt_bodies *bodies, bt_idx i)
+{
+    return bodies->inv[i].m > 0 ? (bt_inv){1 / bodies->mass[i], 1 / bodies->inertia[i]} : (bt_inv){0};
+}
+
 static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, const bt_cell *cell, bt_idx j,
                               bt_idx towed, double c, double s)
 {
@@ -37,12 +44,14 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
     const bt_idx other = is_b ? contact->a : contact->b;
     const double sign = is_b ? 1 : -1;
     const bt_collision collision = bt_contact_collision(world, contact);
+    const bt_inv inverse = bare(bodies, other);
 
     // Arms in world axes from their products with n and t, rotated into the body's frame at X1.
     const double along = is_b ? contact->rbt : contact->rat, arm = is_b ? collision.rbn : collision.ran;
     const double nx = c * contact->nx + s * contact->ny, ny = c * contact->ny - s * contact->nx;
     bt_body_contact t = {
         .gid = (double)bodies->gid[other],
+        .outline = (double)bt_shore_outline(world->shore, bodies->gid[other]),
         .x = along * nx + arm * ny,
         .y = along * ny - arm * nx,
         .nx = sign * nx,
@@ -53,6 +62,10 @@ static bt_body_contact row_of(const bt_world *world, const bt_impacts *impacts, 
         .approach = collision.approach,
         .rest = collision.rest,
         .mass = collision.mass,
+        .arm = sign * arm,
+        .other_arm = sign * (is_b ? collision.ran : collision.rbn),
+        .inverse_mass = inverse.m,
+        .inverse_inertia = inverse.i,
         .most = bt_collision_bears(world, cell, j, &collision),
         .thickness = bodies->mass[other] > 0 ? bodies->mass[other] / (impacts->sheet * bodies->area[other])
                                              : impacts->body_height,
@@ -86,16 +99,17 @@ static void add_cell(const bt_world *world, const bt_impacts *impacts, bt_idx k,
     }
 }
 
-static int by_gid(const void *a, const void *b)
+static int by_outline(const void *a, const void *b)
 {
     // A pair has one manifold; a floe of several parts has more, sorted by place.
     const bt_body_contact *p = a, *q = b;
+    if (p->outline != q->outline) return p->outline < q->outline ? -1 : 1;
     if (p->gid != q->gid) return p->gid < q->gid ? -1 : 1;
     if (p->x != q->x) return p->x < q->x ? -1 : 1;
     return (p->y > q->y) - (p->y < q->y);
 }
 
-/// Collective. All manifolds on the towed body with an impulse, [*n], in the order of gids, on rank 0; NULL on other
+/// Collective. All manifolds on the towed body with an impulse, [*n], outline by outline, on rank 0; NULL on other
 /// ranks. The caller frees them. Call after the solve and before poses move.
 static bt_body_contact *collect_body_contacts(const bt_world *world, const bt_impacts *impacts, int64_t *n)
 {
@@ -127,7 +141,7 @@ static bt_body_contact *collect_body_contacts(const bt_world *world, const bt_im
         rows = (bt_body_contact *)(void *)bt_domain_gather(world, all.n, CONTACT_WIDTH, mine, n);
         free(all.row);
     }
-    if (*n > 0) qsort(rows, (size_t)*n, sizeof *rows, by_gid);
+    if (*n > 0) qsort(rows, (size_t)*n, sizeof *rows, by_outline);
     return rows;
 }
 
@@ -218,11 +232,27 @@ static void close_event(bt_impacts *impacts, const bt_impact_open *o)
     bt_impact_convert(&impacts->rule, o->most, impact);
 }
 
-/// Add contacts `contact[n]` of one floe in this step to its event; o: its open event, or empty. True if there is an
-/// event that may continue.
-static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t n, double time, bt_impact_open *o,
+/// m_e of contacts `contact[n]` that take the part `sum` of a collision together, kg.
+static double mass_together(const bt_world *world, const bt_body_contact *contact, int64_t n, double sum)
+{
+    const bt_inv body = bare(&world->bodies, bt_world_towed(world));
+    double x = 0, y = 0, arm = 0, other_arm = 0;
+    for (int64_t i = 0; i < n; i++) {
+        const double share = contact[i].collision / sum;
+        if (share == 1) return contact[i].mass;
+        x += share * contact[i].nx, y += share * contact[i].ny;
+        arm += share * contact[i].arm, other_arm += share * contact[i].other_arm;
+    }
+    return 1 / ((body.m + contact->inverse_mass) * (x * x + y * y) + body.i * arm * arm +
+                contact->inverse_inertia * other_arm * other_arm);
+}
+
+/// Add contacts `contact[n]` with one outline in this step to its event; o: its open event, or empty. True if there is
+/// an event that may continue.
+static bool follow(const bt_world *world, bt_body_contact *contact, int64_t n, double time, bt_impact_open *o,
                    bool *begun)
 {
+    const bt_impacts *impacts = world->impacts;
     double sum = 0, approach = 0, rest = 0, bears = 0;
     int64_t most = 0;
     for (int64_t i = 0; i < n; i++) {
@@ -236,7 +266,7 @@ static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t 
         for (int64_t i = 0; i < n; i++) contact[i].collision = 0; // quasi-static
         return false;
     }
-    if (!continues) *o = (bt_impact_open){.so_far = {.time = time, .gid = contact[0].gid, .approach = approach}};
+    if (!continues) *o = (bt_impact_open){.so_far = {.time = time, .approach = approach}};
     *begun = true;
     bt_impact *impact = &o->so_far;
     impact->impulse += sum;
@@ -244,30 +274,39 @@ static bool follow(const bt_impacts *impacts, bt_body_contact *contact, int64_t 
     o->most = bt_max(o->most, bears);
     if (contact[most].collision > o->largest) {
         o->largest = contact[most].collision;
+        impact->gid = contact[most].gid;
         impact->x = contact[most].x, impact->y = contact[most].y;
         impact->panel = bt_panels_at(&impacts->panels, impact->x, impact->y, contact[most].nx, contact[most].ny);
-        impact->mass = contact[most].mass, impact->thickness = contact[most].thickness,
-        impact->corner = contact[most].corner;
+        impact->mass = mass_together(world, contact, n, sum);
+        impact->thickness = contact[most].thickness, impact->corner = contact[most].corner;
     }
     return rest > impacts->tolerance;
 }
 
-/// Merge this step's contacts into the open events; both are in the order of gids.
-static void follow_events(bt_impacts *impacts, double time)
+/// The outline that a collision under way is with.
+static double outline_of(const bt_world *world, const bt_impact_open *o)
 {
+    return (double)bt_shore_outline(world->shore, (bt_gid)o->so_far.gid);
+}
+
+/// Merge this step's contacts into the open events; both are in the order of outlines.
+static void follow_events(bt_world *world, double time)
+{
+    bt_impacts *impacts = world->impacts;
     bt_impact_open *next = NULL;
     int64_t n_next = 0, at = 0;
     if (impacts->n_contacts > 0) next = bt_alloc((size_t)impacts->n_contacts, sizeof *next);
     for (int64_t i = 0; i < impacts->n_contacts;) {
         int64_t end = i + 1;
-        while (end < impacts->n_contacts && impacts->contact[end].gid == impacts->contact[i].gid) end++;
-        while (at < impacts->n_open && impacts->open[at].so_far.gid < impacts->contact[i].gid)
+        const double outline = impacts->contact[i].outline;
+        while (end < impacts->n_contacts && impacts->contact[end].outline == outline) end++;
+        while (at < impacts->n_open && outline_of(world, &impacts->open[at]) < outline)
             close_event(impacts, &impacts->open[at++]);
-        const bool was_open = at < impacts->n_open && impacts->open[at].so_far.gid == impacts->contact[i].gid;
+        const bool was_open = at < impacts->n_open && outline_of(world, &impacts->open[at]) == outline;
         const bt_impact_open before = was_open ? impacts->open[at++] : (bt_impact_open){0};
         bt_impact_open o = before;
         bool there = was_open;
-        const bool stays = follow(impacts, impacts->contact + i, end - i, time, &o, &there);
+        const bool stays = follow(world, impacts->contact + i, end - i, time, &o, &there);
         const bool same = was_open && o.so_far.time == before.so_far.time;
         if (was_open && (!same || !stays)) {
             // Close it as it is, with this step's part if there was one; another may have begun.
@@ -283,6 +322,38 @@ static void follow_events(bt_impacts *impacts, double time)
     impacts->n_open = n_next;
 }
 
+/// Add collision b, under way beside a with the same outline.
+static void add_event(bt_impact_open *a, const bt_impact_open *b)
+{
+    const bt_impact_open *of = b->largest > a->largest ? b : a;
+    bt_impact_open both = *of;
+    both.so_far.time = bt_min(a->so_far.time, b->so_far.time);
+    both.so_far.impulse = a->so_far.impulse + b->so_far.impulse;
+    both.so_far.approach = bt_max(a->so_far.approach, b->so_far.approach);
+    both.rest = bt_max(a->rest, b->rest);
+    both.most = a->most > 0 && b->most > 0 ? a->most + b->most : 0;
+    *a = both;
+}
+
+void bt_impacts_resume(bt_world *world)
+{
+    bt_impacts *impacts = world->impacts;
+    int64_t n = 0;
+    for (int64_t k = 0; k < impacts->n_open; k++) {
+        const bt_impact_open o = impacts->open[k];
+        const double outline = outline_of(world, &o);
+        int64_t to = n;
+        while (to > 0 && outline_of(world, &impacts->open[to - 1]) > outline) to--;
+        if (to > 0 && outline_of(world, &impacts->open[to - 1]) == outline) {
+            add_event(&impacts->open[to - 1], &o);
+            continue;
+        }
+        memmove(&impacts->open[to + 1], &impacts->open[to], (size_t)(n++ - to) * sizeof o);
+        impacts->open[to] = o;
+    }
+    impacts->n_open = n;
+}
+
 // --- one step --------------------------------------------------------------------------------------------------------
 
 /// Add the impulses of the step to panels and sums. c, s: cosine and sine of the body's yaw at X1.
@@ -296,7 +367,7 @@ static void add_loads(bt_impacts *impacts, double c, double s)
                      fy = contact->normal * contact->ny + contact->friction * contact->nx,
                      part = contact->collision / contact->normal;
         hit[0] += part * fx, hit[1] += part * fy;
-        push = contact->normal - contact->collision + (i > 0 && contact[-1].gid == contact->gid ? push : 0);
+        push = contact->normal - contact->collision + (i > 0 && contact[-1].outline == contact->outline ? push : 0);
         impacts->largest_quasi_static_load = bt_max(impacts->largest_quasi_static_load, push / impacts->dt);
         for (int k = 0; k < 2; k++) {
             if (!(contact->point[k] > 0)) continue;
@@ -316,7 +387,7 @@ void bt_impacts_take(bt_world *world)
     free(impacts->contact);
     impacts->contact = collect_body_contacts(world, impacts, &impacts->n_contacts);
     impacts->n_closed = 0;
-    follow_events(impacts, (double)(world->step + 1) * world->par.dt);
+    follow_events(world, (double)(world->step + 1) * world->par.dt);
     bt_panels_clear(&impacts->panels);
     double s, c;
     bt_sincos(world->bodies.pose[bt_world_towed(world)].yaw, &s, &c);
@@ -363,12 +434,6 @@ bt_contact_corner bt_contact_corner_of(const bt_world *world, const bt_contact *
     const bool reference_b = feature >> 31, of_reference = feature & 1u, of_b = reference_b == of_reference;
     return (bt_contact_corner){interior_angle(world, of_b ? contact->b : contact->a, part[of_b],
                                               (feature & 0xfffffu) >> 1), of_b};
-}
-
-/// Masses without the drag included in the solver's: a collision is short compared with the step.
-static bt_inv bare(const bt_bodies *bodies, bt_idx i)
-{
-    return bodies->inv[i].m > 0 ? (bt_inv){1 / bodies->mass[i], 1 / bodies->inertia[i]} : (bt_inv){0};
 }
 
 bt_collision bt_contact_collision(const bt_world *world, const bt_contact *contact)

@@ -19,6 +19,14 @@
 // peak depends on Δt. Approaches below a least speed count as quasi-static: a contact that has converged to the
 // tolerance still creeps, and a contact that slides over a corner of the hull meets a new normal every step.
 //
+// Collision. What lies within one outline is hit once: a floe with all its parts, and a shore (space/shore.h) with all
+// its pieces, however it is cut. Its manifolds act together in a step as the points of one do: λ_c adds up, and with
+// the shares s_k = λ_c,k / Σ λ_c, m_e = 1/W of J = Σ s_k J_k. So two faces of a shore that meet in a bay, or two of its
+// quays that the body hits in the same step, are one collision, of which x, y, panel, thickness, corner and the name
+// (of the floe, or the piece of the shore) are those of the manifold with the largest λ_c. Two shores are two
+// collisions. A quasi-static load, too, is that of an outline. Rejected: one collision for each piece, which divided a
+// blow, and its peak, by the cuts; faces told apart by their normals, for which a limit would have to be chosen.
+//
 // Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step stops the
 // rest. So a collision continues in the next step if the last one left an approach above the solver's tolerance and
 // this rest is now stopped; impulses add up. Where the force must be known at once (step/splitting.h), the sum follows
@@ -50,6 +58,7 @@
 /// One manifold on the towed body in one step. Numbers only, so that ranks can exchange it as a row.
 typedef struct bt_body_contact {
     double gid;           ///< of the other body
+    double outline;       ///< of that body: bt_shore_outline
     double x, y;          ///< pressure centre, m, body frame
     double nx, ny;        ///< direction of the normal force on the towed body, body frame; the tangent is (−ny, nx)
     double normal, friction; ///< λ, λ_t on the towed body, N s
@@ -57,6 +66,8 @@ typedef struct bt_body_contact {
     double approach;      ///< −v1 if the contact closes, otherwise 0, m/s
     double rest;          ///< −v2 if it still closes, otherwise 0, m/s
     double mass;          ///< m_e, kg
+    double arm, other_arm; ///< r×n of the pressure centre on the towed body and on the other, m
+    double inverse_mass, inverse_inertia; ///< of the other body, 1/kg, 1/(kg m²)
     double most;          ///< force that the contact laws let it bear as a collision, N; may be INFINITY
     double thickness;     ///< of the ice that is crushed, m
     double corner;        ///< interior angle of the corner in contact, rad; NaN if it has none
@@ -66,7 +77,7 @@ typedef struct bt_body_contact {
 /// A collision.
 typedef struct bt_impact {
     double time;          ///< end of the step in which it began, s
-    double gid;           ///< of the floe (or wall)
+    double gid;           ///< of the floe (or wall, or piece of a shore)
     double x, y;          ///< on the hull, m, body frame
     double panel;
     double impulse;       ///< λ_c, N s
@@ -82,7 +93,7 @@ typedef struct bt_impact {
 typedef struct bt_impact_open {
     bt_impact so_far;
     double rest;          ///< approach that the last step left, m/s
-    double largest;       ///< largest λ_c of one manifold so far, which gives place, mass and corner, N s
+    double largest;       ///< largest λ_c of one manifold so far, which gives name, place and corner, N s
     double most;          ///< force that the contact laws let the contacts of one step bear, the largest so far, N;
                           ///< 0 = not known, from a checkpoint of version 0.1.0
 } bt_impact_open;
@@ -106,14 +117,14 @@ typedef struct bt_impacts {
     double body_height;   ///< thickness of the towed body, for contacts with walls, m
     bt_panels panels;
     // the last step
-    bt_body_contact *contact;    ///< [n_contacts] by gid
+    bt_body_contact *contact;    ///< [n_contacts] by outline
     int64_t n_contacts;
-    bt_impact *closed;    ///< [n_closed] collisions that ended in the step, by gid
+    bt_impact *closed;    ///< [n_closed] collisions that ended in the step, by outline
     int64_t n_closed, cap_closed;
     double collision_x, collision_y; ///< share of collisions in the contact impulse on the body, world frame, N s
-    double largest_quasi_static_load;  ///< Σ (λ − λ_c) / Δt over the manifolds of one floe or wall, N
+    double largest_quasi_static_load;  ///< Σ (λ − λ_c) / Δt over the manifolds of one outline, N
     // carried over to the next step
-    bt_impact_open *open; ///< [n_open] by gid
+    bt_impact_open *open; ///< [n_open] one for each outline, in that order
     int64_t n_open;
 } bt_impacts;
 
@@ -128,6 +139,10 @@ void bt_impacts_free(bt_impacts *impacts);
 
 /// Collective. Take the step just solved: after the solve and before poses move.
 void bt_impacts_take(bt_world *world);
+
+/// After a state was read: bring the open collisions into order. An earlier program had one for each piece of a shore;
+/// they become one.
+void bt_impacts_resume(bt_world *world);
 
 /// At the end of the run: move the open collisions, as they are, to `closed`.
 void bt_impacts_end(bt_impacts *impacts);

@@ -20,7 +20,8 @@ static const struct {
 #define ROW(name_, member, whole_, units_, text) {name_, units_, text, offsetof(bt_impact, member), whole_}
     ROW("time", time, false, "s", "end of the step in which the collision began"),
     ROW("floe", gid, true, "1",
-        "row of /floes; from n_floes on one of /bodies, as a wall; after these a row of /pieces"),
+        "row of /floes; from n_floes on one of /bodies, as a wall; after these a row of /pieces; of fixed floes that "
+        "lie against each other, which are one collision, the one with the largest part"),
     ROW("x", x, false, "m", "where on the hull, in the frame of the towed body"),
     ROW("y", y, false, "m", "where on the hull, in the frame of the towed body"),
     ROW("panel", panel, true, "1", "panel of the hull"),

@@ -554,7 +554,8 @@ static bool same_constants(const bt_params *now, const bt_params *then, bool ste
            now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
 }
 
-/// Collisions that may continue. A row of version 0.1.0 ends before `most`, and does not name the panel.
+/// Collisions that may continue. A row of version 0.1.0 ends before `most`, and does not name the panel; there each
+/// piece of a shore had its own.
 static bt_impact_open *load_open(bt_snapshot *snap, const bt_panels *panels, int64_t *n)
 {
     const bt_item *item = bt_snapshot_find(snap, "impacts/open");
@@ -609,6 +610,7 @@ bt_status bt_state_load(bt_world *world, const bt_comm *comm, bt_snapshot *snap,
         free(memory);
         return status;
     }
+    if (world->impacts && comm->rank == 0) bt_impacts_resume(world);
     bt_domain_create(world, comm);
     bt_cells_restore(world, memory, n);
     if (bt_world_hash(world) == hash) return BT_OK;

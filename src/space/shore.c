@@ -19,6 +19,7 @@ typedef struct { double low[2], high[2]; } box;
 struct bt_shore {
     bt_gid n_gids;
     int64_t *first;             ///< [n_gids] of the faces of a body, −1 = part of no shore
+    bt_gid *outline;            ///< [n_gids] lowest id in the shore of a body; until all are found, one on the way
     bt_face *face;              ///< [n_faces] one for each vertex
     bt_shore_polygon *polygon;  ///< [n] in the order of the tree
     int n;
@@ -30,6 +31,7 @@ void bt_shore_free(bt_shore *shore)
 {
     if (!shore) return;
     free(shore->first);
+    free(shore->outline);
     free(shore->face);
     free(shore->polygon);
     free(shore->node);
@@ -37,6 +39,11 @@ void bt_shore_free(bt_shore *shore)
 }
 
 bool bt_shore_has(const bt_shore *shore, bt_gid gid) { return shore && gid < shore->n_gids && shore->first[gid] >= 0; }
+
+bt_gid bt_shore_outline(const bt_shore *shore, bt_gid gid)
+{
+    return bt_shore_has(shore, gid) ? shore->outline[gid] : gid;
+}
 
 const bt_face *bt_shore_faces(const bt_shore *shore, bt_gid gid, int part)
 {
@@ -253,6 +260,19 @@ typedef struct {
     int n_spans, cap_spans, edge;
 } about;
 
+static bt_gid lowest(const bt_shore *shore, bt_gid gid)
+{
+    while (shore->outline[gid] != gid) gid = shore->outline[gid];
+    return gid;
+}
+
+/// Two bodies lie against each other: one shore.
+static void join(bt_shore *shore, bt_gid a, bt_gid b)
+{
+    const bt_gid p = lowest(shore, a), q = lowest(shore, b), low = p < q ? p : q;
+    shore->outline[p] = shore->outline[q] = shore->outline[a] = shore->outline[b] = low;
+}
+
 static void take_beside(void *context, const bt_shore_polygon *q)
 {
     about *around = context;
@@ -262,6 +282,7 @@ static void take_beside(void *context, const bt_shore_polygon *q)
     const polygon shape = polygon_of(around->b, around->of, none), other = polygon_of(around->b, q, around->shift);
     if (apart_by_edge_of(&shape, &other, around->reach) || apart_by_edge_of(&other, &shape, around->reach)) return;
     around->alone = false;
+    join(around->s, around->of->gid, q->gid);
     if (!around->face) return;
     double x[2], u[2], w[2], span[2];
     bool near;
@@ -357,7 +378,8 @@ void bt_shore_create(bt_world *world)
     bt_shore *shore = bt_alloc(1, sizeof *shore);
     shore->n_gids = bodies->n_global;
     shore->first = bt_alloc((size_t)shore->n_gids + 1, sizeof *shore->first);
-    for (bt_gid g = 0; g < shore->n_gids; g++) shore->first[g] = -1;
+    shore->outline = bt_alloc((size_t)shore->n_gids + 1, sizeof *shore->outline);
+    for (bt_gid g = 0; g < shore->n_gids; g++) shore->first[g] = -1, shore->outline[g] = g;
     collect(world, shore);
     about around = {.b = bodies, .s = shore, .reach = bt_max(world->par.slop, 1e-9 * world->par.size)};
     int64_t n_faces = 0;
@@ -387,5 +409,6 @@ void bt_shore_create(bt_world *world)
         find_faces(world, &around);
     }
     free(around.span);
+    for (bt_gid g = 0; g < shore->n_gids; g++) shore->outline[g] = lowest(shore, g);
     world->shore = shore;
 }

@@ -44,6 +44,8 @@ static inline bool bt_shore_holds(const bt_world *world, bt_idx i)
 {
     return world->shore && bt_shore_has(world->shore, world->bodies.gid[i]);
 }
+/// The body that stands for the outline of body gid: of a shore, the one with the lowest id; otherwise gid itself.
+bt_gid bt_shore_outline(const bt_shore *shore, bt_gid gid);
 /// Faces of the polygon of body gid that starts at its vertex `part`; NULL if the body is part of no shore.
 const bt_face *bt_shore_faces(const bt_shore *shore, bt_gid gid, int part);
 /// Does the corner of a face count in the direction of the unit vector n?

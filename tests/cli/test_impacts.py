@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import CASE, DONE, IO, TOW, call, changed, differing, run, script, write_case
+from harness import CASE, DONE, IO, QUAY, QUAY_CUTS, TOW, call, changed, differing, quay, run, script, write_case
 from resuming import assert_same_result, done, killed_after
 
 from bergtow.plot import impacts as plot_impacts
@@ -290,6 +290,55 @@ def test_the_resolved_file_holds_what_follows_from_other_keys(line, tmp_path):
 def test_bad_values_are_refused(tmp_path, key, value):
     r = call("check", write_case(tmp_path, changed(TOW, **{f"impact__{key}": value})))
     assert r.returncode == CASE and f"impact.{key}" in r.stderr
+
+
+@pytest.mark.parametrize("changes", [{"impact": {"conversion": "duration"}}, {"impact": {"conversion": "crushing"}}])
+def test_a_quay_is_hit_once_however_it_is_cut(tmp_path, changes):
+    whole = run(tmp_path / "whole", quay((20, 0), **changes))
+    once = rows(whole)
+    assert len(once["time"]) == 1 and once["peak"][0] > 1e5
+    for pieces in QUAY_CUTS:
+        cut = run(tmp_path / str(len(pieces)), quay(*pieces, **changes))
+        hit = rows(cut)
+        assert len(hit["time"]) == 1 and 0 <= hit["floe"][0] < len(pieces)
+        for key in "time", "impulse", "approach", "effective_mass", "mean", "peak", "duration":
+            assert hit[key] == pytest.approx(once[key], rel=1e-9), (pieces, key)
+        assert cut.dataset("/panels/max_peak").max() == pytest.approx(once["peak"][0], rel=1e-9)
+        assert cut.summary["impacts"]["largest"]["peak_n"] == pytest.approx(once["peak"][0], rel=1e-9)
+
+
+def test_a_quay_that_crushes_bears_as_one(tmp_path):
+    """At most what the ice bears along the whole contact, 4 m. In the end nearly nothing moves, which is no loss of
+    momentum."""
+    case = {"ice__crushing": {"pressure": "20 kPa"}}
+    for pieces in [(20, 0)], QUAY_CUTS[0]:
+        still = run(tmp_path / str(len(pieces)), quay(*pieces, **case))
+        assert still.summary["momentum_residual"] < 1e-9
+    hit = rows(run(tmp_path, quay(*QUAY_CUTS[0], **case)))
+    assert len(hit["time"]) == 1 and hit["peak"][0] == pytest.approx(20e3 * 1 * 4, rel=5e-3)
+
+
+def test_two_quays_are_two_collisions_and_a_bay_is_one(tmp_path):
+    """A gap keeps two quays apart. In a corner, at 45 degrees, both faces take m v each, together as a body of twice
+    the mass that comes at the speed normal to each."""
+    apart = rows(run(tmp_path / "apart", quay((9, -5), (9, 5))))
+    assert sorted(apart["floe"]) == [0, 1]
+    corner = [{"shape": "rectangle", "length": 4, "width": 14, "x": 32, "y": 3, "fixed": True},
+              {"shape": "rectangle", "length": 20, "width": 4, "x": 20, "y": 8, "fixed": True}]
+    bay = changed(QUAY, floes=corner, body__x=27.2, body__y=3.2, body__vy=0.5)
+    both = rows(run(tmp_path / "bay", bay))
+    assert len(both["time"]) == 1
+    one = rows(run(tmp_path / "face", changed(bay, floes=corner[:1])))
+    assert both["impulse"][0] == pytest.approx(2 * one["impulse"][0], rel=1e-2)
+    assert both["effective_mass"][0] == pytest.approx(2 * one["effective_mass"][0], rel=1e-9)
+
+
+def test_pushed_against_a_quay(tmp_path):
+    """A quasi-static load, too, is that of the whole quay."""
+    wind = {"air": {"wind_x": 15}, "run__duration": 8}
+    last = [run(tmp_path / str(len(pieces)), quay(*pieces, **wind)).series("largest_quasi_static_load")[-1]
+            for pieces in ([(20, 0)], QUAY_CUTS[1])]
+    assert last[0] > 10 and last[1] == pytest.approx(last[0], rel=1e-6)
 
 
 @pytest.mark.parametrize("impact, key", [({"pressure": "1 MPa", "corner_angle": 60}, "corner_angle"),

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, IO, area, call, changed, placed, run, texts, write_case
+from harness import CASE, DONE, IO, TOW, area, call, changed, placed, run, texts, write_case
 
 BASE = {
     "run": {"dt": 0.1, "duration": 2},
@@ -182,6 +182,19 @@ def test_hull_and_split_are_counted(tmp_path):
     assert "1 floes in 3 convex parts" in said and "stay rigid" not in said
     said = call("check", write_case(tmp_path, changed(BASE, ice__nonconvex="split", ice__rafting={"kappa": 10}))).stdout
     assert "ice.rafting: 1 floes are not convex" in said
+
+
+def test_floes_by_hand_that_do_not_raft(tmp_path):
+    """As those of a file: check and a run count floes in convex parts that can move, and no others."""
+    code = '"stays_rigid"'
+    hand = {"shape": "polygon", "vertices": C_SHAPE, "y": 0}
+    case = changed(TOW, ice__concentration=0, ice__rafting={"kappa": 10}, run__duration=0.2)
+    for name, floes, said in (("free", [hand | {"x": 8}], True), ("fixed", [hand | {"x": 8, "fixed": True}], False),
+                              ("convex", [{"length": 1, "x": 8, "y": 0}], False)):
+        r = run(tmp_path / name, changed(case, floes=floes))
+        assert (code in json.dumps(r.summary)) == said
+        check = call("check", write_case(tmp_path / name, changed(case, floes=floes)), "--json")
+        assert (code in check.stdout) == said
 
 
 def test_many_vertices_become_a_hull(tmp_path):

@@ -6,7 +6,8 @@ import h5py
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, launcher, quick, run
+from harness import DONE, QUAY_CUTS, TOW, VALIDATE, Run, changed, differing, environment, launcher, quay, quick, run
+from made_up_ensemble import edited
 from resuming import assert_same_result, done
 
 KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
@@ -57,3 +58,31 @@ def test_counted_over_the_window_that_is_found(tmp_path):
     done(2, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
     assert_counted_over_the_window(Run(tmp_path / "cut", None))
     assert_same_result(alone.dir, tmp_path / "cut")
+
+
+def test_a_quay_in_pieces(tmp_path):
+    """One collision on any ranks, also when it is resumed; an earlier program had one under way for each piece."""
+    case = quay(*QUAY_CUTS[1], run__duration=2.6)
+    alone = run(tmp_path, case, "--threads", 1)
+    done(2, "run", "case.yml", "-o", "two", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(alone.dir, tmp_path / "two")
+    for name in "cut", "earlier":
+        done(1, "run", "case.yml", "-o", name, "--quiet", "--threads", 1, "--steps", 21, cwd=tmp_path)
+    done(2, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(alone.dir, tmp_path / "cut")
+    with edited(tmp_path / "earlier/checkpoint.h5") as f:
+        one = f["impacts/open"][:]
+        assert len(one) == 1
+        rows = one.repeat(len(QUAY_CUTS[1]), axis=0)
+        column = {"floe": 1, "impulse": 5, "largest": 14}  # as bt_impact and bt_impact_open in loads/impact.h
+        share = [0.35, 0.24, 0.13, 0.18, 0.1]
+        rows[:, column["floe"]] = range(len(QUAY_CUTS[1]))
+        rows[:, column["impulse"]] *= share
+        rows[:, column["largest"]] = rows[:, column["impulse"]]
+        del f["impacts/open"]
+        f["impacts/open"] = rows
+    done(2, "resume", "earlier", "--quiet", "--threads", 1, cwd=tmp_path)
+    with h5py.File(tmp_path / "earlier/result.h5") as f, h5py.File(alone.dir / "result.h5") as g:
+        assert len(f["impacts/time"]) == 1
+        for key in "time", "impulse", "approach", "peak":
+            assert f["impacts"][key][0] == pytest.approx(g["impacts"][key][0], rel=1e-12), key

@@ -203,7 +203,7 @@ def impacts(run):
         f"{i['collisions_whole_run']:.0f} in the whole run"
     ), ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))),
             ("mean ice resistance, quasi-static", force(run.number("impacts.mean_quasi_static_resistance_n"))),
-            ("largest quasi-static normal load of a floe or wall",
+            ("largest quasi-static normal load of a floe, wall or shore",
              force(run.number("impacts.largest_quasi_static_load_n")) +
              start_peak(run, "impacts.start_largest_quasi_static_load_n"))]
     big = i.get("largest")
