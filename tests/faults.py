@@ -36,6 +36,7 @@ OTHER = changed(CASE, ice__friction=0.1)
 WRITES = ("write", "pwrite64", "writev")
 NAMES = ("openat", "open", "mkdir", "mkdirat", "rename", "renameat", "unlink", "unlinkat", "rmdir")
 SYNCS = ("fsync", "fdatasync")
+LOCKS = ("flock", "fcntl")
 # fault -> what the shim is told, and the calls it can befall
 FAULTS = {
     "full disk": ({"BT_CALLS_WITH": errno.ENOSPC, "BT_CALLS_ON": 1},

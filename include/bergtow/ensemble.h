@@ -78,8 +78,8 @@ typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_memb
 
 /// Collective. Run the rest of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another
 /// study, a file that it names has changed, its members would be the same run, the study needs more ranks than there
-/// are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (stopped: another call resumes, or other processes work
-/// on the rest); the worst status of a failed member if all others are done.
+/// are), BT_ERR_IO (also: a member is not sound, or the file system has no locks), BT_ERR_SIGNAL (stopped: another call
+/// resumes, or other processes work on the rest); the worst status of a failed member if all others are done.
 bt_status bt_ensemble_run(const struct bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                           bt_errors *err);
 

@@ -57,7 +57,8 @@ static void leave_argp(void)
     if (code != BT_OK) _exit(bt_comm_end(code));
 }
 
-// All ranks have the same command line, so they find the same errors in it and exit with the same code; one prints why.
+// All ranks have the same command line (checked in main.c), so they find the same errors in it and exit with the same
+// code; one prints why.
 static void parse_aloud(const struct argp *argp, int argc, char **argv, void *input)
 {
     check_options(argp, argc, argv);

@@ -165,10 +165,38 @@ static int list_of(const char *word)
     return -1;
 }
 
+// Ranks with different commands or options (mpirun's colon form) would wait for each other for ever. So compare all
+// words before any is parsed. Rejected: comparing only command, folder and number of steps, after parsing: by then a
+// rank with an error in its options has left, and other options end one rank, too. Threads may differ, as nodes do.
+static bool same_words(int argc, char **argv)
+{
+    char **words = bt_alloc((size_t)argc + 1, sizeof *words);
+    int n = 0;
+    for (int i = 1; i < argc; i++) {
+        char *word = argv[i];
+        const size_t length = strcspn(word, "=");
+        const bool name = length > 2 && !strncmp(word, "--threads", length); // or the first letters of it
+        if (!name && strncmp(word, "-t", 2)) words[n++] = word;
+        else if (!word[name ? length : 2]) i++; // their number is the next word
+    }
+    char *text = bt_cmd_join(n, words);
+    const bool same = bt_comm_same(bt_comm_world(), "", text, NULL) == BT_OK;
+    free(text);
+    free(words);
+    return same;
+}
+
 // Exit code of this rank.
 static int bergtow(int argc, char **argv)
 {
     const bool first = bt_comm_world()->rank == 0;
+    bt_errors err = {0};
+    if (!same_words(argc, argv))
+        return bt_cmd_end(bt_comm_world(),
+                          bt_fail(&err, BT_ERR_CASE,
+                                  "the command line is not the same on all of the %d ranks; give each the same words, "
+                                  "but for the number of --threads", bt_comm_world()->size),
+                          &err);
     if (argc < 2) {
         if (first) print_help(stderr);
         return BT_ERR_USAGE;

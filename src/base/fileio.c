@@ -376,9 +376,11 @@ int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *
             bt_file_fail(path, "make the file", errno, err);
             break;
         }
+        const int refused = flock(fd, LOCK_EX | LOCK_NB) != 0 ? errno : 0;
         // on a file system without locks, go without one
-        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno != ENOLCK && errno != EOPNOTSUPP && errno != ENOSYS) {
-            if (busy) *busy = errno == EWOULDBLOCK;
+        const bool without = refused == ENOLCK || refused == EOPNOTSUPP || refused == ENOSYS;
+        if (refused && !without) {
+            if (busy) *busy = refused == EWOULDBLOCK;
             tell_holder(fd, dir, err);
             close(fd);
             fd = -1;
@@ -386,6 +388,9 @@ int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *
         }
         taken = still_there(fd, path);
         if (!taken) close(fd);
+        else if (without)
+            bt_errors_warn("warning: %s: no locks here (%s), so nothing keeps a second run out of this folder; start "
+                           "no other one in it", dir, strerror(refused));
     }
     if (fd >= 0) {
         char host[128] = "unknown host", who[200];

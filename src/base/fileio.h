@@ -90,7 +90,8 @@ char *bt_file_folder(const char *path);
 
 /// Take the lock dir/run.lock, which names host and process; the system releases it when the process ends, in whatever
 /// way. Returns a descriptor for bt_lock_drop; −1 with a message if another process holds it or it cannot be made.
-/// *busy (may be NULL): another process holds it, so that a later attempt may succeed.
+/// *busy (may be NULL): another process holds it, so that a later attempt may succeed. On a file system without locks
+/// it warns, and goes without: one run alone needs none.
 int bt_lock_take(const char *dir, bool *busy, bt_errors *err);
 /// The same with another file, since run.lock stands for a run. That file is not removed.
 int bt_lock_take_file(const char *dir, const char *name, bool *busy, bt_errors *err);

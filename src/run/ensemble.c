@@ -158,11 +158,11 @@ static bt_status gather(bt_ensemble *ensemble, bool wait)
 {
     bt_status status = BT_OK;
     const double t0 = bt_clock();
-    const int fd = bt_member_open(ensemble->o->dir, "lock", O_RDWR | O_CREAT);
-    if (fd < 0 && wait) status = bt_file_fail(ensemble->o->dir, "open the lock in the folder", errno, ensemble->err);
-    else if (fd >= 0 && bt_member_take_lock(fd, wait))
-        status = bt_ensemble_gather(ensemble->s, ensemble->o->dir, &ensemble->records, &ensemble->warnings,
-                                    wait ? ensemble->err : NULL);
+    bt_errors *err = wait ? ensemble->err : NULL;
+    const int fd = bt_ensemble_take_lock(ensemble->o->dir, wait, err);
+    if (fd >= 0)
+        status = bt_ensemble_gather(ensemble->s, ensemble->o->dir, &ensemble->records, &ensemble->warnings, err);
+    else if (wait) status = BT_ERR_IO;
     if (fd >= 0 && wait) complete_journal(ensemble);
     if (fd >= 0) close(fd);
     ensemble->gathered = bt_clock();

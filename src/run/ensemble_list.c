@@ -120,8 +120,9 @@ bt_status bt_ensemble_prepare_folder(const bt_study *study, const bt_ensemble_op
     bool old = false;
     bt_study_files_find(&files, study);
     bt_status status = bt_file_make_dir(BT_PATH(options->dir, "members"), err);
-    const int fd = status == BT_OK ? bt_member_open(options->dir, "lock", O_RDWR | O_CREAT) : -1;
-    if (fd >= 0) bt_member_take_lock(fd, true); // for calls that begin together
+    // for calls that begin together; without locks no process could tell a member that is taken from one that waits
+    const int fd = status == BT_OK ? bt_ensemble_take_lock(options->dir, true, err) : -1;
+    if (fd < 0) status = BT_ERR_IO;
     if (status == BT_OK) status = keep_resolved(options->dir, text, &old, digest, err);
     if (status == BT_OK) status = bt_study_files_keep(&files, options->dir, old, err);
     if (status == BT_OK) status = bt_file_write(BT_PATH(options->dir, "study.yml"), study->text, err);

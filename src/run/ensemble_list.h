@@ -21,6 +21,9 @@ int bt_member_open(const char *folder, const char *name, int flags);
 /// Lock an open file (wait: until it is free): the system releases the lock when the file is closed or the process
 /// ends, however it ends.
 bool bt_member_take_lock(int fd, bool wait);
+/// Open and lock the file `lock` of the ensemble in dir; −1 with a message if it cannot be opened, is taken (without
+/// wait), or the file system has no locks.
+int bt_ensemble_take_lock(const char *dir, bool wait, bt_errors *err);
 
 /// Is any process, this one included, at work on the member?
 bool bt_member_held(const char *folder);

@@ -32,6 +32,22 @@ bool bt_member_take_lock(int fd, bool wait)
     return !failed;
 }
 
+int bt_ensemble_take_lock(const char *dir, bool wait, bt_errors *err)
+{
+    const int fd = bt_member_open(dir, "lock", O_RDWR | O_CREAT);
+    if (fd < 0) {
+        bt_file_fail(dir, "open the lock in the folder", errno, err);
+    } else if (!bt_member_take_lock(fd, wait)) {
+        bt_errors_add(err, "%s: cannot lock a file here (%s), and without locks the processes of an ensemble cannot "
+                      "share its members; mount the disk with locks (Lustre: flock), or give a folder on another disk "
+                      "with -o",
+                      dir, strerror(errno));
+        close(fd);
+        return -1;
+    }
+    return fd;
+}
+
 bool bt_member_held(const char *folder)
 {
     const int fd = bt_member_open(folder, "lock", O_RDWR);

@@ -161,9 +161,9 @@ static bt_status take_folder(const bt_comm *comm, const bt_run_options *options,
 
 int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked)
 {
+    const int share = bt_cores_share(comm); // called by all ranks, whatever the options and environment of each
     if (asked > 0) return asked;
     if (input->run.threads > 0) return (int)input->run.threads;
-    const int share = bt_cores_share(comm); // called by all ranks, whatever the environment of each
     bt_limit_threads();
     return getenv("OMP_NUM_THREADS") ? omp_get_max_threads() : share;
 }

@@ -289,6 +289,33 @@ def test_a_base_case_that_one_rank_cannot_read(tmp_path):
     assert result.returncode == IO and "base.yml: cannot" in result.stderr and "Stale file" in result.stderr, result
 
 
+def watched(folder, **how):
+    """A call whose locks are logged, or refused."""
+    words = [BERGTOW, "ensemble", folder / "study.yml", "-o", folder / "all", "--threads", 1]
+    return faults.started(words, faults.shim(folder, BT_CALLS=",".join(faults.LOCKS), **how), folder)
+
+
+@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK])
+def test_a_disk_without_locks_is_refused(tmp_path, number):
+    """Every member seemed to be taken by another process, and was waited for."""
+    prepare(tmp_path)
+    result = watched(tmp_path, BT_CALLS_AT=1, BT_CALLS_ON=1, BT_CALLS_WITH=number)
+    assert result.returncode == IO and os.strerror(number) in result.stderr, result
+    assert not result.stdout and not journal(tmp_path)
+    assert ensemble(tmp_path).returncode == DONE
+
+
+def test_a_lock_that_is_refused_at_the_end(tmp_path):
+    """ensemble.h5 is not made in its turn: the call says so, whatever stands there."""
+    prepare(tmp_path)
+    assert ensemble(tmp_path).returncode == DONE
+    assert watched(tmp_path, BT_CALLS_LOG=tmp_path / "log").returncode == DONE
+    locks = [c.path for c in faults.logged(tmp_path / "log") if c.name in faults.LOCKS]
+    last = max(n for n, path in enumerate(locks, 1) if path == str(tmp_path / "all/lock"))
+    result = watched(tmp_path, BT_CALLS_AT=last, BT_CALLS_WITH=errno.ENOLCK)
+    assert result.returncode == IO and os.strerror(errno.ENOLCK) in result.stderr, result
+
+
 def test_a_member_that_another_run_is_at_stays_open(tmp_path):
     """A `bergtow resume` of it: with --no-wait the call ends with 6 and records no failure, without it waits."""
     prepare(tmp_path)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Checkpoints as a user meets them: stops and limits, damage, full disks, two processes in one folder, failures that
 can be met again."""
+import errno
 import json
 import os
 import re
@@ -13,6 +14,7 @@ import time
 import h5py
 import pytest
 
+import faults
 from harness import (BERGTOW, CASE as REFUSED, DONE, FAULT, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed,
                      environment, heard, quick, run, write_case)
 from made_up_ensemble import edited, seal
@@ -266,6 +268,17 @@ def test_what_cannot_be_resumed(tmp_path, arguments, code, text):
         call("field", write_case(tmp_path, TOW), "-o", tmp_path / "empty/field.h5")
     result = call("resume", *arguments, cwd=tmp_path)
     assert result.returncode == code and text in result.stderr, result.stderr
+
+
+@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
+def test_without_locks_it_is_said_once(tmp_path, number):
+    write_case(tmp_path, TOW)
+    env = faults.shim(tmp_path, BT_CALLS=",".join(faults.LOCKS), BT_CALLS_AT=1, BT_CALLS_ON=1, BT_CALLS_WITH=number)
+    for words in ["run", "case.yml", "-o", "out", "--steps", 20], ["resume", "out"]:
+        result = call(*words, "--quiet", cwd=tmp_path, env=env)
+        assert result.returncode == DONE, result.stderr
+        assert [os.strerror(number) in line for line in result.stderr.splitlines()] == [True], result.stderr
+    assert Run(tmp_path / "out", result).hash == run(tmp_path, TOW, "--quiet", name="locked").hash
 
 
 # ---- damage ----

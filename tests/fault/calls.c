@@ -84,6 +84,8 @@ static const struct {
     {"mkdirat", SYS_mkdirat, AT, 0, 0},
     {"unlinkat", SYS_unlinkat, AT, 0, 0},
     {"renameat", SYS_renameat, AT, 1, 0},
+    {"flock", SYS_flock, FD, 0, 0},
+    {"fcntl", SYS_fcntl, FD, 0, 0}, // locks only
 #ifdef SYS_open
     {"open", SYS_open, PATH, 0, 0},
     {"mkdir", SYS_mkdir, PATH, 0, 0},
@@ -158,6 +160,8 @@ static void note(const char *name, const char *path, const char *second, long re
 static long take(int k, const long *a)
 {
     char path[MOST], second[MOST];
+    const int locks = a[1] == F_OFD_SETLK || a[1] == F_OFD_SETLKW || a[1] == F_OFD_GETLK;
+    if (calls[k].number == SYS_fcntl && !locks) return make(SYS_fcntl, a);
     path_of(calls[k].kind, a, path);
     *second = 0;
     if (calls[k].pairs) path_of(calls[k].kind, a + 1 + (calls[k].kind == AT), second);

@@ -44,6 +44,11 @@ def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, env=No
     return done
 
 
+def colon(words):
+    """The words of mpirun for one more rank, with a command line of its own."""
+    return [":", "-n", 1, BERGTOW, *words]
+
+
 def ours(result):
     """What bergtow itself has written on stderr."""
     return [line for line in result.stderr.splitlines() if line.startswith("bergtow")]
@@ -69,6 +74,28 @@ def test_ranks_that_read_different_files_are_refused(tmp_path, differs):
     result = mpirun(3, *words, "-o", tmp_path / "out", program=rank, cwd=tmp_path)
     assert result.returncode == CASE and len(ours(result)) == 1 and "ranks" in ours(result)[0], result.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("other", [
+    ["run", "case.yml", "-o", "out", "-t", 1, "--steps", 20],
+    ["run", "case.yml", "-o", "other", "-t", 1, "--steps", 10],
+    ["resume", "out"],
+    ["check", "case.yml"],
+    ["run", "case.yml", "-o", "out", "-t", 1, "--steps", "ten"],
+    ["run", "case.yml", "-o", "out", "-t", 1, "--steps", 10, "--dump-contacts", "5:contacts.h5"],
+])  # yapf: disable
+def test_ranks_with_different_commands_are_refused(tmp_path, other):
+    write_case(tmp_path, SHORT)
+    result = mpirun(1, "run", "case.yml", "-o", "out", "-t", 1, "--steps", 10, *colon(other), cwd=tmp_path, timeout=20)
+    assert result.returncode == CASE and len(ours(result)) == 1 and "ranks" in ours(result)[0], result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("threads", [["-t2"], ["-t", 2], ["--threads", 2], ["--threads=2"], ["--thr", 2], []])
+def test_ranks_may_have_different_threads(tmp_path, threads):
+    words = ["run", write_case(tmp_path, SHORT), "-o", "out", "--steps", 3]
+    result = mpirun(1, *words, "--threads", 1, *colon([*words, *threads]), cwd=tmp_path)
+    assert result.returncode == DONE and ours(result) == [], result.stderr
 
 
 @pytest.mark.parametrize("ranks", quick([1, 2, 3, 4], 3))
