@@ -5,11 +5,11 @@
 // outline touch a body (parts of a body that is not convex, pieces of a shore), one contact may have to bear the overlap
 // of others too: points found twice are merged (contact/detect.c), and a polygon that only overlaps deeper in has no
 // point at all, for its corners do not count along the normal (contact/manifold.c). So
-//   the overlap of a pair of polygons is shared out to the points found on it; if a point has been merged, its share goes
-//   to the nearest point that is left; if none was found, so does the whole.
+//   the points found on the overlap of two polygons share it; if one has been merged, the nearest point that is left
+//   takes its share; if none was found, that point takes the whole overlap.
 // Then a face that is cut bears what it would bear in one piece, and at the same places; so does a corner at which cuts
-// end. What one pair bears is not borne again: a stretch of the face along which the overlap of another part is wider
-// below than at the surface, and the common part of pieces of a shore, which may overlap.
+// end. Nothing is borne twice: the overlaps of two parts can cover the same stretch of the face at different depths, and
+// pieces of a shore may overlap.
 #ifndef BERGTOW_BEARING_H
 #define BERGTOW_BEARING_H
 

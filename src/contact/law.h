@@ -17,8 +17,8 @@
 // same way, as the record of the rigid law.
 //
 // In a step: detection prunes the records (`keeps`), may replace the contacts of the outlines (contact/raft.h), reads
-// the records (`recall`) and forms the bounds (`bound`); the sweeps know only bounds; after them `gives_way` tells which
-// points are at the bound, `give_way` books the work of those that approach, and `remember` writes the record.
+// the records (`recall`) and forms the bounds (`bound`); the sweeps know only bounds; after them `gives_way` tells
+// which points are at the bound, `give_way` books the work of those that approach, and `remember` writes the record.
 //
 // A law that bounds the load of points from the record of their pair is one source file (bergtow/contact.h,
 // contact/added.h). One that changes what touches, or whose bound rises with the approach, is one source file with its
