@@ -2,14 +2,14 @@
 // The length on which each contact point bears, for laws that bound a load by the overlap of the outlines.
 //
 // The overlap of two convex polygons is borne by the one or two points of their contact. Where several polygons of an
-// outline touch a body (parts of a body that is not convex, pieces of a shore), one contact may have to bear the overlap
-// of others too: points found twice are merged (contact/detect.c), and a polygon that only overlaps deeper in has no
-// point at all, for its corners do not count along the normal (contact/manifold.c). So
+// outline touch a body (parts of a body that is not convex, pieces of a shore), one contact may have to bear the
+// overlap of others too: points found twice are merged (contact/detect.c), and a polygon that only overlaps deeper in
+// has no point at all, for its corners do not count along the normal (contact/manifold.c). So
 //   the points found on the overlap of two polygons share it; if one has been merged, the nearest point that is left
 //   takes its share; if none was found, that point takes the whole overlap.
-// Then a face that is cut bears what it would bear in one piece, and at the same places; so does a corner at which cuts
-// end. Nothing is borne twice: the overlaps of two parts can cover the same stretch of the face at different depths, and
-// pieces of a shore may overlap.
+// Then a face that is cut bears what it would bear in one piece, and at the same places; so does a corner at which
+// cuts end. Nothing is borne twice: the overlaps of two parts can cover the same stretch of the face at different
+// depths, and pieces of a shore may overlap.
 #ifndef BERGTOW_BEARING_H
 #define BERGTOW_BEARING_H
 
