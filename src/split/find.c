@@ -182,7 +182,7 @@ static double bound(const bt_split_floe *floe, const form *outline, const sums *
 static double safe_length(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law,
                           double least)
 {
-    double high = INFINITY, low = bt_max(2 * outline->inradius, least);
+    double high = INFINITY, low = bt_max(2 * (floe->convex ? outline->inradius : outline->radius), least);
     while (!(bound_between(floe, outline, s, law, low, high) > 1)) {
         high = low;
         if (!(low > least)) break;
@@ -373,7 +373,7 @@ static void search_necks(search *s)
     bt_chord chord;
     for (int i = 0; i < n; i++)
         for (int k = 0; k < n; k++)
-            if (bt_chord_across(n, s->floe->outline, i, k, s->law->slop, &chord)) consider(s, chord, BY_NECK);
+            if (bt_chord_across(n, s->floe->outline, i, k, s->safe, s->law->slop, &chord)) consider(s, chord, BY_NECK);
 }
 
 static void search_sections(search *s)

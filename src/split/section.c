@@ -128,7 +128,7 @@ static bool is_crossed(int n, const double *v, const double *o, double dx, doubl
     return false;
 }
 
-bool bt_chord_across(int n, const double *v, int vertex, int edge, double slop, bt_chord *chord)
+bool bt_chord_across(int n, const double *v, int vertex, int edge, double longest, double slop, bt_chord *chord)
 {
     const int before = vertex > 0 ? vertex - 1 : n - 1, after = vertex + 1 < n ? vertex + 1 : 0;
     if (edge == vertex || edge == before) return false;
@@ -138,17 +138,19 @@ bool bt_chord_across(int n, const double *v, int vertex, int edge, double slop, 
     const double turn = cross(in[0], in[1], out[0], out[1]);
     if (!(turn < -STRAIGHT * sqrt(square(in[0], in[1]) * square(out[0], out[1])))) return false;
 
-    double x = b[0] - a[0], y = b[1] - a[1];
-    const double along = (o[0] - a[0]) * x + (o[1] - a[1]) * y, l2 = x * x + y * y;
-    const bt_chord_end end = place_on(n, v, edge, along <= 0 ? 0 : along < l2 ? along / l2 : 1, slop);
-    if (end.edge != edge) return false; // a vertex, where the next edge begins
-    if (end.t > 0) {
-        if (!(cross(x, y, o[0] - a[0], o[1] - a[1]) > 0)) return false; // at the back of the edge
-    } else {
+    const double x = b[0] - a[0], y = b[1] - a[1], l2 = x * x + y * y;
+    const double along = (o[0] - a[0]) * x + (o[1] - a[1]) * y, off = cross(x, y, o[0] - a[0], o[1] - a[1]);
+    if (!(along < l2)) return false; // a vertex, where the next edge begins
+    const bool foot = along > 0 && along * along > slop * slop * l2;
+    if (foot && !(off > 0)) return false; // at the back of the edge
+    if (!((foot ? off * off : square(o[0] - a[0], o[1] - a[1]) * l2) < longest * longest * l2)) return false;
+    if (!foot) {
         const double *c = v + 2 * (edge > 0 ? edge - 1 : n - 1);
-        x = c[0] - a[0], y = c[1] - a[1];
-        if ((o[0] - a[0]) * x + (o[1] - a[1]) * y > slop * bt_hypot(x, y)) return false;
+        const double back = (o[0] - a[0]) * (c[0] - a[0]) + (o[1] - a[1]) * (c[1] - a[1]);
+        if (back > 0 && back * back > slop * slop * square(c[0] - a[0], c[1] - a[1])) return false;
     }
+    const bt_chord_end end = foot ? place_on(n, v, edge, along / l2, slop) : (bt_chord_end){edge, 0};
+    if (end.edge != edge) return false;
 
     double to[2];
     bt_chord_place(n, v, end, to);

@@ -688,7 +688,7 @@ TEST(test_narrowest_is_tried)
         bt_chord c;
         for (int i = 0; i < g.n; i++)
             for (int k = 0; k < g.n; k++) {
-                if (!bt_chord_across(g.n, g.v, i, k, 1e-6, &c)) continue;
+                if (!bt_chord_across(g.n, g.v, i, k, INFINITY, 1e-6, &c)) continue;
                 double a[2], b[2], x, y;
                 bt_chord_place(g.n, g.v, c.a, a);
                 bt_chord_place(g.n, g.v, c.b, b);
