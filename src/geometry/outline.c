@@ -115,8 +115,9 @@ static bool left_turn(const double *a, const double *b, const double *c)
     return cross(a, b, c) > NEAR * bt_hypot(b[0] - a[0], b[1] - a[1]) * bt_hypot(c[0] - b[0], c[1] - b[1]);
 }
 
-/// Shape of an ear a, b, c: twice the area over the square of the longest side; −1 if it is not an ear.
-static double ear_quality(int m, const int *loop, int i, const double *v)
+/// Shape of an ear a, b, c: twice the area over the square of the longest side; −1 if it is not an ear. near, m²:
+/// another vertex is in the ear up to this cross product beyond a side.
+static double ear_quality(int m, const int *loop, int i, const double *v, double near)
 {
     const int before = loop[i > 0 ? i - 1 : m - 1], here = loop[i], after = loop[i + 1 < m ? i + 1 : 0];
     const double *a = v + 2 * before, *b = v + 2 * here, *c = v + 2 * after;
@@ -125,7 +126,7 @@ static double ear_quality(int m, const int *loop, int i, const double *v)
     for (int k = 0; k < m; k++) {
         if (loop[k] == before || loop[k] == here || loop[k] == after) continue;
         const double *p = v + 2 * loop[k];
-        if (cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0) return -1;
+        if (cross(a, b, p) >= -near && cross(b, c, p) >= -near && cross(c, a, p) >= -near) return -1;
     }
     const double ab = bt_hypot(b[0] - a[0], b[1] - a[1]), bc = bt_hypot(c[0] - b[0], c[1] - b[1]),
                  ca = bt_hypot(a[0] - c[0], a[1] - c[1]);
@@ -160,7 +161,8 @@ static bool join(ring *a, const ring *b, const double *v)
     return false;
 }
 
-bool bt_outline_split(int n, const double *v, bt_parts *parts)
+/// near, m²: vertices with a cross product up to this are on one line.
+static bool split(int n, const double *v, double near, bt_parts *parts)
 {
     *parts = (bt_parts){0};
     ring *part = bt_alloc((size_t)n, sizeof *part);
@@ -171,12 +173,19 @@ bool bt_outline_split(int n, const double *v, bt_parts *parts)
         int best = -1;
         double quality = -1;
         for (int i = 0; i < m; i++) {
-            const double q = ear_quality(m, loop, i, v);
+            const double q = ear_quality(m, loop, i, v, near);
             if (q > quality) quality = q, best = i;
+        }
+        for (int i = 0; i < m && near > 0; i++) { // an ear of no area, as at the tip of a line there and back
+            const int a = loop[i > 0 ? i - 1 : m - 1], c = loop[i + 1 < m ? i + 1 : 0];
+            if (!(fabs(cross(v + 2 * a, v + 2 * loop[i], v + 2 * c)) <= near)) continue;
+            best = i, quality = 0;
+            break;
         }
         sound = best >= 0;
         if (!sound) break;
-        part[n_parts++] = (ring){3, {loop[best > 0 ? best - 1 : m - 1], loop[best], loop[best + 1 < m ? best + 1 : 0]}};
+        if (quality > 0) part[n_parts++] =
+            (ring){3, {loop[best > 0 ? best - 1 : m - 1], loop[best], loop[best + 1 < m ? best + 1 : 0]}};
         memmove(loop + best, loop + best + 1, (size_t)(m - best - 1) * sizeof *loop);
         m--;
     }
@@ -202,6 +211,13 @@ bool bt_outline_split(int n, const double *v, bt_parts *parts)
     }
     free(part);
     return sound && fabs(kept - whole) <= 1e-6 * whole;
+}
+
+bool bt_outline_split(int n, const double *v, bt_parts *parts)
+{
+    // Where several vertices lie on one line, such as on both sides of a neck, rounding may leave no ear.
+    const double extent = extent_of(n, v);
+    return split(n, v, 0, parts) || split(n, v, NEAR * extent * extent, parts);
 }
 
 // --- projection ------------------------------------------------------------------------------------------------------

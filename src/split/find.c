@@ -182,7 +182,7 @@ static double bound(const bt_split_floe *floe, const form *outline, const sums *
 static double safe_length(const bt_split_floe *floe, const form *outline, const sums *s, const bt_split_law *law,
                           double least)
 {
-    double high = INFINITY, low = bt_max(2 * outline->inradius, least);
+    double high = INFINITY, low = bt_max(2 * (floe->convex ? outline->inradius : outline->radius), least);
     while (!(bound_between(floe, outline, s, law, low, high) > 1)) {
         high = low;
         if (!(low > least)) break;
@@ -237,6 +237,9 @@ static bt_split_refusal refusal_of(const bt_split_floe *floe, const bt_chord *ch
     return BT_SPLIT_ALLOWED;
 }
 
+/// What a section was chosen by.
+typedef enum { BY_CONTACT, BY_MIDDLE, BY_NECK } choice;
+
 /// A search through the sections of one floe under loads that act at the same time.
 typedef struct search {
     const bt_split_floe *floe;
@@ -246,6 +249,7 @@ typedef struct search {
     double least, safe;              ///< m: sections from one length up to the other may split
     const bt_split_law *law;
     bt_split *best;
+    bool neck;                       ///< a section at a neck is the best so far
 } search;
 
 /// Largest stress / strength of a section.
@@ -280,26 +284,49 @@ static bool is_corner(const search *s, const bt_chord *chord)
     return bt_min(area, s->form->area - area) * sqrt(3) < s->law->least_width * s->law->least_width;
 }
 
+static double ends_of(const search *s, const bt_chord *chord, double a[2], double b[2])
+{
+    bt_chord_place(s->floe->n, s->floe->outline, chord->a, a);
+    bt_chord_place(s->floe->n, s->floe->outline, chord->b, b);
+    return bt_hypot(b[0] - a[0], b[1] - a[1]);
+}
+
+/// Is the middle of one section nearer to the first load, in their order, from which both are not as far? Of equal
+/// sections, such as the two ends of a straight neck, this tells one however the vertices are numbered.
+static bool is_nearer(const search *s, const bt_chord *chord, const bt_chord *than)
+{
+    double a[2], b[2], c[2], d[2];
+    ends_of(s, chord, a, b), ends_of(s, than, c, d);
+    for (int k = 0; k < s->loads->n; k++) {
+        if (!bt_load_acts(s->loads, k)) continue;
+        const double x = s->loads->load[k].x, y = s->loads->load[k].y;
+        const double one = bt_hypot((a[0] + b[0]) / 2 - x, (a[1] + b[1]) / 2 - y);
+        const double other = bt_hypot((c[0] + d[0]) / 2 - x, (c[1] + d[1]) / 2 - y);
+        if (fabs(one - other) > s->law->slop) return one < other;
+    }
+    return false;
+}
+
 /// Take a section if it is the best so far. A section from a contact keeps its direction, others are turned so that
 /// bending opens b: if the pieces are equal, the direction decides which is the first.
-static void consider(const search *s, bt_chord chord, bool from_contact)
+static void consider(search *s, bt_chord chord, choice by)
 {
     double a[2], b[2];
-    bt_chord_place(s->floe->n, s->floe->outline, chord.a, a);
-    bt_chord_place(s->floe->n, s->floe->outline, chord.b, b);
-    const double l = bt_hypot(b[0] - a[0], b[1] - a[1]);
+    const double l = ends_of(s, &chord, a, b);
     const bt_load_case *loads = s->loads;
     if (!(l >= s->least) || !(l > s->law->slop) || l >= s->safe) return;
     if (!(bound_between(s->floe, s->form, &s->sums, s->law, l, l) > 1)) return;
     const bt_section section = bt_section_of(s->floe, s->form->area, s->form->polar, loads, &chord, s->law->slop);
     bt_split_mode mode;
     const double ratio = demand(s, &section, &mode);
-    if (!from_contact && section.moment < 0) chord = (bt_chord){chord.b, chord.a};
+    if (by != BY_CONTACT && section.moment < 0) chord = (bt_chord){chord.b, chord.a};
     bt_split *best = s->best;
-    if (!(ratio > 1) || !(ratio > best->ratio * (1 + EQUAL))) return;
+    if (!(ratio > 1)) return;
+    const bool tie = by == BY_NECK && s->neck && ratio > best->ratio * (1 - EQUAL);
+    if (!(ratio > best->ratio * (1 + EQUAL)) && !(tie && is_nearer(s, &chord, &best->chord))) return;
     const bt_split_refusal refused = refusal_of(s->floe, &chord, s->law);
     if (refused) {
-        if (l < s->law->least_width && is_corner(s, &chord)) return;
+        if ((by == BY_NECK || l < s->law->least_width) && is_corner(s, &chord)) return;
         if (ratio > best->refused_ratio) best->refused_ratio = ratio, best->refused = refused;
         return;
     }
@@ -308,18 +335,20 @@ static void consider(const search *s, bt_chord chord, bool from_contact)
     best->ratio = ratio;
     best->length = l;
     best->peak = loads->peak;
+    s->neck = by == BY_NECK;
 }
 
-static void consider_from(const search *s, bt_chord_end from, double dx, double dy)
+static void consider_from(search *s, bt_chord_end from, double dx, double dy)
 {
     bt_chord chord;
-    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &chord)) consider(s, chord, true);
+    if (bt_chord_from(s->floe->n, s->floe->outline, from, dx, dy, s->law->slop, &chord)) consider(s, chord, BY_CONTACT);
 }
 
-static void consider_through(const search *s, double x, double y, double dx, double dy)
+static void consider_through(search *s, double x, double y, double dx, double dy)
 {
     bt_chord chord;
-    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &chord)) consider(s, chord, false);
+    if (bt_chord_through(s->floe->n, s->floe->outline, x, y, dx, dy, s->law->slop, &chord))
+        consider(s, chord, BY_MIDDLE);
 }
 
 /// Unit vector of the larger eigenvalue of a symmetric 2 × 2 matrix; false when both differ by less than 2 tiny.
@@ -338,7 +367,16 @@ static double load_size(const bt_load_case *loads, int k)
     return bt_hypot(loads->load[k].load->fx, loads->load[k].load->fy) + loads->load[k].load->opening;
 }
 
-static void search_sections(const search *s)
+static void search_necks(search *s)
+{
+    const int n = s->floe->n;
+    bt_chord chord;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < n; k++)
+            if (bt_chord_across(n, s->floe->outline, i, k, s->safe, s->law->slop, &chord)) consider(s, chord, BY_NECK);
+}
+
+static void search_sections(search *s)
 {
     const bt_load_case *loads = s->loads;
     const bt_split_floe *floe = s->floe;
@@ -421,7 +459,10 @@ bool bt_split_find(const bt_split_floe *floe, bt_floe_load *load, int n_loads, c
         const bt_load_case loads = bt_load_case_of(on_edge, n_loads, k);
         const sums s = sums_of(&loads);
         const double safe = safe_length(floe, &outline, &s, law, least);
-        if (safe > least) search_sections(&(search){floe, &outline, &loads, s, least, safe, law, best});
+        if (!(safe > least)) continue;
+        search one = {floe, &outline, &loads, s, least, safe, law, best, false};
+        search_sections(&one);
+        if (!floe->convex) search_necks(&one);
     }
     if (on_edge != few) free(on_edge);
     return best->ratio > 0;

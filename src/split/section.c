@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+static const double STRAIGHT = 1e-9; // sine of the angle of a corner: less is rounding
+
 static double cross(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
 static double square(double x, double y) { return x * x + y * y; }
 
@@ -104,6 +106,61 @@ bool bt_chord_through(int n, const double *v, double x, double y, double dx, dou
     if (best < 0) return false;
     *chord = (bt_chord){place_on(n, v, at[best].edge, at[best].t, slop),
                         place_on(n, v, at[best + 1].edge, at[best + 1].t, slop)};
+    return true;
+}
+
+/// Is a point of the outline on the segment of this length from o along (dx, dy), further than the slop from its ends?
+static bool is_crossed(int n, const double *v, const double *o, double dx, double dy, double length, double slop)
+{
+    const double *p = v + 2 * (n - 1);
+    double s = cross(dx, dy, p[0] - o[0], p[1] - o[1]), along = dx * (p[0] - o[0]) + dy * (p[1] - o[1]);
+    for (int i = 0; i < n; i++) {
+        p = v + 2 * i;
+        const double s_next = cross(dx, dy, p[0] - o[0], p[1] - o[1]);
+        const double next = dx * (p[0] - o[0]) + dy * (p[1] - o[1]);
+        if (fabs(s_next) <= slop && next > slop && next < length - slop) return true;
+        if ((s > 0) != (s_next > 0)) {
+            const double at = along + s / (s - s_next) * (next - along);
+            if (at > slop && at < length - slop) return true;
+        }
+        s = s_next, along = next;
+    }
+    return false;
+}
+
+bool bt_chord_across(int n, const double *v, int vertex, int edge, double longest, double slop, bt_chord *chord)
+{
+    const int before = vertex > 0 ? vertex - 1 : n - 1, after = vertex + 1 < n ? vertex + 1 : 0;
+    if (edge == vertex || edge == before) return false;
+    const double *o = v + 2 * vertex, *p = v + 2 * before, *q = v + 2 * after;
+    const double *a = v + 2 * edge, *b = v + 2 * (edge + 1 < n ? edge + 1 : 0);
+    const double in[2] = {o[0] - p[0], o[1] - p[1]}, out[2] = {q[0] - o[0], q[1] - o[1]};
+    const double turn = cross(in[0], in[1], out[0], out[1]);
+    if (!(turn < -STRAIGHT * sqrt(square(in[0], in[1]) * square(out[0], out[1])))) return false;
+
+    const double x = b[0] - a[0], y = b[1] - a[1], l2 = x * x + y * y;
+    const double along = (o[0] - a[0]) * x + (o[1] - a[1]) * y, off = cross(x, y, o[0] - a[0], o[1] - a[1]);
+    if (!(along < l2)) return false; // a vertex, where the next edge begins
+    const bool foot = along > 0 && along * along > slop * slop * l2;
+    if (foot && !(off > 0)) return false; // at the back of the edge
+    if (!((foot ? off * off : square(o[0] - a[0], o[1] - a[1]) * l2) < longest * longest * l2)) return false;
+    if (!foot) {
+        const double *c = v + 2 * (edge > 0 ? edge - 1 : n - 1);
+        const double back = (o[0] - a[0]) * (c[0] - a[0]) + (o[1] - a[1]) * (c[1] - a[1]);
+        if (back > 0 && back * back > slop * slop * square(c[0] - a[0], c[1] - a[1])) return false;
+    }
+    const bt_chord_end end = foot ? place_on(n, v, edge, along / l2, slop) : (bt_chord_end){edge, 0};
+    if (end.edge != edge) return false;
+
+    double to[2];
+    bt_chord_place(n, v, end, to);
+    double dx = to[0] - o[0], dy = to[1] - o[1];
+    const double length = bt_hypot(dx, dy);
+    if (!unit(&dx, &dy)) return false;
+    // From a reflex vertex a line leads inside if it is left of either edge.
+    if (!(cross(in[0], in[1], dx, dy) > 0) && !(cross(out[0], out[1], dx, dy) > 0)) return false;
+    if (is_crossed(n, v, o, dx, dy, length, slop)) return false;
+    *chord = (bt_chord){{vertex, 0}, end};
     return true;
 }
 

@@ -108,6 +108,11 @@ bool bt_chord_from(int n, const double *v, bt_chord_end end, double dx, double d
 /// The section along (dx, dy) through (x, y), or if that lies outside the floe, the nearest section on the same line.
 bool bt_chord_through(int n, const double *v, double x, double y, double dx, double dy, double slop, bt_chord *chord);
 
+/// The section from a reflex vertex to the point of an edge nearest to it: the foot of the perpendicular, or the vertex
+/// at which the edge begins. False if it is as long as `longest`, m, if the vertex is not reflex, if the outline beside
+/// that point is nearer, or if it is in between, the latter two up to the slop.
+bool bt_chord_across(int n, const double *v, int vertex, int edge, double longest, double slop, bt_chord *chord);
+
 /// Outline of the part left of the chord, written to out[at most n + 2][2], m: a, b, and on around to a. Returns the
 /// number of vertices, fewer than 3 if there is no such part. The right part is the left part of the chord from b to a.
 int bt_chord_piece(int n, const double *v, const bt_chord *chord, double *out);

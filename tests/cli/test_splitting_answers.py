@@ -117,6 +117,44 @@ def test_a_floe_bears_what_statics_say_and_no_more(tmp_path, scene, size, mode):
     assert 1 < whole_until.sum() < len(told) and told[whole_until].max() <= stress.max() / 1.01 * (1 + 1e-6)
 
 
+def bent_at_its_neck(width):
+    """Blocks of 10 and 30 m with a neck of 1 m between them, held at two posts and pressed by a body on a line, 8 m
+    from the end of the neck near the posts."""
+    w = width / 2
+    outline = [[0, -5], [10, -5], [10, -w], [11, -w], [11, -5], [41, -5], [41, 5], [11, 5], [11, w], [10, w], [10, 5],
+               [0, 5]]
+    at = lambda corners: [[x + 40, y] for x, y in corners]
+    posts = [floe(at([[12.5, 5 + 1e-6], [13.5, 7], [11.5, 7]]), fixed=True),
+             floe(at([[38, -5 - 1e-6], [37, -7], [39, -7]]), fixed=True)]
+    return {
+        "run": {"dt": 0.05, "duration": 60.0},
+        "domain": {"length": 120, "width": 200, "ends": "open", "sides": "open"},
+        "ice": {"concentration": 0, "thickness": 1.0, "friction": 0.0, "size": 10.0, "start": "rest",
+                "splitting": {"toughness": TOUGHNESS, "strength": STRENGTH, "generations": 1}},
+        "body": {"shape": "square", "length": 2.0, "draft": 1.0, "x": 43.0, "y": -6 - 1e-6,
+                 "drag": {"water_form": 0, "water_skin": 0, "air_form": 0, "air_skin": 0}},
+        "tow": {"mode": "line", "speed": 0.2, "direction": 90.0, "line_length": 20, "line_stiffness": 2e4,
+                "line_damping": 1e3, "hull_x": 0, "hull_y": 0, "ramp": 5},
+        "impact": {"conversion": "none"},
+        "output": {"frame_interval": 0.1},
+        "floes": [floe(at(outline)), *posts]}
+
+
+@pytest.mark.parametrize("width", [0.8, 1.5])
+def test_a_floe_breaks_at_its_neck(tmp_path, width):
+    """And bears until then what the neck does; no load that is told is larger."""
+    r = run(tmp_path, bent_at_its_neck(width))
+    one, s = made(r), r.summary["splitting"]
+    force = STRENGTH / math.sqrt(1 + width / (1.4 * TOUGHNESS / STRENGTH)**2) * width**2 / 6 / 8
+    assert s["splits"] == 1 and one["mode"].tolist() == [2] and one["parent"].tolist() == [0]
+    np.testing.assert_allclose(np.sort(one["crack"].reshape(2, 2), axis=0), [[51, -width / 2], [51, width / 2]],
+                               atol=0.02)
+    assert one["area"].sum() == pytest.approx(400 + width, rel=1e-12)
+    whole = np.isfinite(r.dataset("frames/pose")[:, 0, 0])
+    told = r.dataset("frames/contact_force")[whole, 1].max() * (38 - 12.5) / (38 - 3)  # by the post beside the neck
+    assert 1 < whole.sum() < len(whole) and 0.98 * force < told < 1.001 * force
+
+
 # --- collisions ------------------------------------------------------------------------------------------------------
 
 

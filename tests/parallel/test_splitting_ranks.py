@@ -33,6 +33,30 @@ def test_ranks_and_threads_split_alike(one, tmp_path, ranks, threads):
     assert (tmp_path / "out" / "summary.json").read_text().count(one.summary["state_hash"]) == 1
 
 
+def test_ranks_break_floes_at_the_same_necks(tmp_path):
+    """Of two lobes each, pressed by walls."""
+    at = np.arange(24) * np.pi / 12
+    floes = []
+    for k in range(36):
+        out = 12 * (0.62 + 0.33 * np.cos(2 * at + k))
+        floes.append({"shape": "polygon", "vertices": np.transpose([out * np.cos(at), out * np.sin(at)]).tolist(),
+                      "x": 13.0 + 25 * (k // 6), "y": -62.5 + 25 * (k % 6)})
+    path = write_case(tmp_path, {
+        "run": {"dt": 0.2, "duration": 50}, "body": {"shape": "none"}, "output": {"frame_interval": 10}, "floes": floes,
+        "domain": {"length": 151, "width": 151, "ends": "wall", "sides": "wall", "ends_closing": 0.3,
+                   "sides_closing": 0.3},
+        "ice": {"concentration": 0, "thickness": 1, "size": 20, "splitting": {"toughness": 150e3}}})
+    for ranks in (1, 3):
+        words = "run", str(path), "-o", str(tmp_path / str(ranks)), "--threads", "1"
+        subprocess.run([*launcher(ranks), BERGTOW, *words], env=environment(OMP_NUM_THREADS=1), capture_output=True,
+                       check=True, timeout=240)
+    assert differing(tmp_path / "1" / "result.h5", tmp_path / "3" / "result.h5") == []
+    with h5py.File(tmp_path / "1" / "result.h5") as f:
+        crack = f["splits/crack"][()]
+    length = np.hypot(crack[:, 2] - crack[:, 0], crack[:, 3] - crack[:, 1])
+    assert (length < 7.5).sum() > 3  # a neck is 7.0 m wide, half of one 3.5 m
+
+
 def test_a_run_that_stopped_between_splits_goes_on(one, tmp_path):
     with h5py.File(one.dir / "result.h5") as f:
         times = np.unique(f["splits/time"][()])

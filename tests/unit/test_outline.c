@@ -151,6 +151,30 @@ TEST(parts_fill_the_outline_once)
 }
 
 /// 1 degree of latitude and of longitude at 60° N are 111.4 km and 55.8 km; across 180° it is the short way.
+/// Four corners on a line on either side, and rounding has its say when the outline is turned. It left no ear.
+TEST(parts_of_two_notches_that_face_each_other)
+{
+    const double notched[] = {0, -5, 10, -5, 10, -4.95, 11, -4.95, 11, -5, 13, -5, 13, 5, 11, 5, 11, 4.95, 10, 4.95,
+                              10, 5, 0, 5};
+    for (int k = 0; k < 400; k++) {
+        double v[24];
+        for (int i = 0; i < 12; i++) {
+            const double *p = notched + 2 * ((i + k) % 12);
+            v[2 * i] = cos(k) * p[0] - sin(k) * p[1], v[2 * i + 1] = sin(k) * p[0] + cos(k) * p[1];
+        }
+        bt_parts p;
+        assert_true(bt_outline_split(12, v, &p));
+        double area2 = 0;
+        for (int i = 0, from = 0; i < p.n; from += p.count[i++]) {
+            double own[2 * BT_MAX_VERTICES];
+            for (int j = 0; j < p.count[i]; j++) memcpy(own + 2 * j, v + 2 * p.corner[from + j], 2 * sizeof *own);
+            assert_null(bt_shape_fault(p.count[i], own));
+            area2 += bt_outline_area2(p.count[i], own);
+        }
+        CHECK_CLOSE(area2, 2 * (130 - 2 * 0.05), 1e-6);
+    }
+}
+
 TEST(projection_of_known_lengths)
 {
     const double d = BT_PI / 180;

@@ -473,6 +473,44 @@ static void shuffle(bt_rng *r, bt_floe_load *load, int n)
     }
 }
 
+/// Outline of f turned about its centroid, mirrored at y = 0 if `mirror`, numbered from vertex `first` on.
+static floe turned(const floe *f, double turn, bool mirror, int first)
+{
+    floe g = *f;
+    const double cs = cos(turn), sn = sin(turn);
+    for (int i = 0; i < f->n; i++) {
+        const int from = ((mirror ? -i : i) + first + f->n) % f->n;
+        const double x = f->v[2 * from], y = mirror ? -f->v[2 * from + 1] : f->v[2 * from + 1];
+        g.v[2 * i] = cs * x - sn * y, g.v[2 * i + 1] = sn * x + cs * y;
+    }
+    return g;
+}
+
+static bt_floe_load turned_load(const bt_floe_load *p, double turn, bool mirror)
+{
+    const double cs = cos(turn), sn = sin(turn), sign = mirror ? -1 : 1;
+    bt_floe_load q = *p;
+    q.x = cs * p->x - sn * sign * p->y, q.y = sn * p->x + cs * sign * p->y;
+    q.fx = cs * p->fx - sn * sign * p->fy, q.fy = sn * p->fx + cs * sign * p->fy;
+    q.edge_x = cs * p->edge_x - sn * sign * p->edge_y, q.edge_y = sn * p->edge_x + cs * sign * p->edge_y;
+    return q;
+}
+
+/// Do both ends of a section lie at the ends of the other, one of floe f, the other of f turned?
+static void assert_same_chord(const floe *f, const bt_chord *c, const floe *g, const bt_chord *d, double turn,
+                              bool mirror, double error)
+{
+    const double cs = cos(turn), sn = sin(turn);
+    double p[2], q[4];
+    bt_chord_place(g->n, g->v, d->a, q);
+    bt_chord_place(g->n, g->v, d->b, q + 2);
+    for (int k = 0; k < 2; k++) { // which of the ends is a may depend on rounding
+        bt_chord_place(f->n, f->v, k ? c->b : c->a, p);
+        const double x = p[0], y = mirror ? -p[1] : p[1], px = cs * x - sn * y, py = sn * x + cs * y;
+        assert_within(fmin(hypot(q[0] - px, q[1] - py), hypot(q[2] - px, q[3] - py)), 0, error);
+    }
+}
+
 /// The order of the loads changes no bit; turned or mirrored, the same section is found to rounding.
 TEST(test_same_from_all_sides)
 {
@@ -497,38 +535,169 @@ TEST(test_same_from_all_sides)
         assert_memory_equal(&again, &best, sizeof best);
         n_split += split;
         for (int mirror = 0; mirror < 2; mirror++) {
-            const double turn = 6 * bt_rng_uniform(&r), cs = cos(turn), sn = sin(turn);
-            floe g = f;
-            for (int i = 0; i < f.n; i++) {
-                const int from = mirror ? f.n - 1 - i : i;
-                const double x = f.v[2 * from], y = mirror ? -f.v[2 * from + 1] : f.v[2 * from + 1];
-                g.v[2 * i] = cs * x - sn * y, g.v[2 * i + 1] = sn * x + cs * y;
-            }
-            for (int k = 0; k < n; k++) {
-                const double sign = mirror ? -1 : 1;
-                const bt_floe_load *p = &load[k];
-                other[k] = *p;
-                other[k].x = cs * p->x - sn * sign * p->y, other[k].y = sn * p->x + cs * sign * p->y;
-                other[k].fx = cs * p->fx - sn * sign * p->fy, other[k].fy = sn * p->fx + cs * sign * p->fy;
-                other[k].edge_x = cs * p->edge_x - sn * sign * p->edge_y;
-                other[k].edge_y = sn * p->edge_x + cs * sign * p->edge_y;
-            }
+            const double turn = 6 * bt_rng_uniform(&r);
+            const floe g = turned(&f, turn, mirror, mirror ? f.n - 1 : 0);
+            for (int k = 0; k < n; k++) other[k] = turned_load(&load[k], turn, mirror);
             const bt_split_floe t = seen(&g, 1);
             assert_int_equal(bt_split_find(&t, other, n, &law, &again), split);
             if (!split) continue;
             assert_near(again.ratio, best.ratio, 1e-6);
             assert_int_equal(again.mode, best.mode);
-            double p[2], q[4];
-            bt_chord_place(g.n, g.v, again.chord.a, q);
-            bt_chord_place(g.n, g.v, again.chord.b, q + 2);
-            for (int k = 0; k < 2; k++) { // the same line; which of its ends is a may depend on rounding
-                bt_chord_place(f.n, f.v, k ? best.chord.b : best.chord.a, p);
-                const double x = p[0], y = mirror ? -p[1] : p[1], px = cs * x - sn * y, py = sn * x + cs * y;
-                assert_within(fmin(hypot(q[0] - px, q[1] - py), hypot(q[2] - px, q[3] - py)), 0, 1e-5 * best.length);
-            }
+            assert_same_chord(&f, &best.chord, &g, &again.chord, turn, mirror, 1e-5 * best.length);
         }
     }
     if (!(n_split > 200 && n_split < 900)) fail_msg("%d of 1000 split", n_split);
+}
+
+/// Blocks of a x 10 m and b x 10 m with a neck between them, w wide and 1 m long; *middle: x of the neck's middle.
+static floe necked(double a, double b, double w, double *middle)
+{
+    floe f = {12, {-a - 0.5, -5, -0.5, -5, -0.5, -w / 2, 0.5, -w / 2, 0.5, -5, b + 0.5, -5, b + 0.5, 5, 0.5, 5,
+                   0.5, w / 2, -0.5, w / 2, -0.5, 5, -a - 0.5, 5}, false};
+    bt_shape_centre(f.n, f.v);
+    *middle = f.v[2] + 0.5;
+    return f;
+}
+
+/// The floe splits from a factor of 1 on the loads on, along the section at x; so it does turned, mirrored, and
+/// numbered from any vertex.
+static void assert_breaks_at(const floe *f, const bt_floe_load *load, int n, const bt_split_law *law, double x,
+                             double length)
+{
+    const bt_split_floe s = seen(f, 1);
+    bt_split best, again;
+    bt_floe_load other[4];
+    assert_near(critical(&s, load, n, law, &best), 1, 1e-8);
+    assert_false(splits(&s, load, n, 0.999, law, &best));
+    assert_true(best.refused_ratio == 0);
+    assert_true(splits(&s, load, n, 1.001, law, &best));
+    assert_int_equal(best.mode, BT_SPLIT_BENT);
+    assert_near(best.length, length, 1e-9);
+    double a[2], b[2];
+    bt_chord_place(f->n, f->v, best.chord.a, a);
+    bt_chord_place(f->n, f->v, best.chord.b, b);
+    assert_within(a[0], x, 1e-9);
+    assert_within(b[0], x, 1e-9);
+    const bt_moments m = bt_shape_area_moments(f->n, f->v);
+    bt_piece piece[2];
+    assert_true(bt_split_cut(f->n, f->v, m.area, m.polar, &best.chord, piece));
+    assert_near(piece[0].area + piece[1].area, m.area, 1e-15);
+    for (int k = 0; k < 2; k++) assert_near(bt_shape_centroid(piece[k].n, piece[k].outline).area, piece[k].area, 1e-13);
+    for (int k = 0; k < 4 * f->n; k++) {
+        const double turn = 0.7 * k;
+        const floe g = turned(f, turn, k % 2, k / 2 % f->n);
+        const bt_split_floe t = seen(&g, 1);
+        for (int i = 0; i < n; i++) other[i] = turned_load(&load[i], turn, k % 2);
+        assert_true(splits(&t, other, n, 1.001, law, &again));
+        assert_near(again.ratio, best.ratio, 1e-9);
+        assert_same_chord(f, &best.chord, &g, &again.chord, turn, k % 2, 1e-9);
+    }
+}
+
+/// A floe breaks at its neck: between three points, where the moment on it is largest, M = σ_c h w²/6.
+TEST(test_neck)
+{
+    const double widths[] = {0.8, 1.5};
+    const bt_split_law law = law_of(2);
+    double at;
+    for (int i = 0; i < 2; i++) {
+        const double w = widths[i], most = bt_split_strength(&law, w, false) * w * w / 6;
+        const floe f = necked(10, 30, w, &at);
+        const double force = most / 8, arm = at + 2; // at 8 m from the end of the neck that is nearer to the support
+        const bt_floe_load bend[3] = {push(at - 7.5, -5, 0, force), push(arm, 5, 0, -force * 35 / 25.5),
+                                      push(arm + 25.5, -5, 0, force * 9.5 / 25.5)};
+        assert_breaks_at(&f, bend, 3, &law, at + 0.5, w);
+    }
+    // As wide as the blocks but for a notch: it breaks at the support, where the moment is larger.
+    floe f = necked(10, 30, 9.9, &at);
+    double force = bt_split_strength(&law, 10, false) * 100 / 6 / 9.5;
+    const bt_floe_load bend[3] = {push(at - 7.5, -5, 0, force), push(at + 2, 5, 0, -force * 35 / 25.5),
+                                  push(at + 27.5, -5, 0, force * 9.5 / 25.5)};
+    assert_breaks_at(&f, bend, 3, &law, at + 2, 10);
+    // Loads on one block alone break that block.
+    f = necked(10, 30, 0.8, &at);
+    force = bt_split_strength(&law, 10, false) * 100 / 6 / 10;
+    const bt_floe_load far[3] = {push(at + 15, -5, 0, 2 * force), push(at + 5, 5, 0, -force),
+                                 push(at + 25, 5, 0, -force)};
+    assert_breaks_at(&f, far, 3, &law, at + 15, 10);
+}
+
+/// Both ends of a neck bear the same. It breaks at the one that is nearer to the first load.
+TEST(test_neck_ties)
+{
+    const double w = 1.2;
+    const bt_split_law law = law_of(2);
+    double at;
+    const floe f = necked(20, 24, w, &at);
+    const double force = bt_split_strength(&law, w, false) * w * w / 6 / 10;
+    bt_floe_load bend[4] = {push(at - 15, -5, 0, force), push(at - 5, 5, 0, -force), push(at + 5, 5, 0, -force),
+                            push(at + 15, -5, 0, force)};
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < 4; i++) bend[i].other = k ? 4 - i : 1 + i;
+        assert_breaks_at(&f, bend, 4, &law, at + (k ? 0.5 : -0.5), w);
+    }
+}
+
+/// An arm that tapers towards its end, where a force bends it, breaks at its root, across which nothing is narrowest.
+TEST(test_root_of_an_arm)
+{
+    floe f = {8, {-20, -10, 0, -10, 0, -2, 18, -1.5, 18, 1.5, 0, 2, 0, 10, -20, 10}, false};
+    bt_shape_centre(f.n, f.v);
+    const double x = f.v[2], w = 4;
+    const bt_split_law law = law_of(1);
+    const double force = bt_split_strength(&law, w, false) * w * w / 6 / 18;
+    const bt_floe_load load[3] = {push(x + 18, -1.5, 0, force), push(x - 5, 10, 0, -force * 33 / 10),
+                                  push(x - 15, -10, 0, force * 23 / 10)};
+    const bt_split_floe s = seen(&f, 1);
+    bt_split best;
+    assert_near(critical(&s, load, 3, &law, &best), 1, 2e-3); // the section is not quite across the arm
+    double a[2], b[2];
+    bt_chord_place(f.n, f.v, best.chord.a, a);
+    bt_chord_place(f.n, f.v, best.chord.b, b);
+    assert_within(a[0], x, 0.2);
+    assert_within(b[0], x, 0.2);
+}
+
+static double from_edge(const double *p, const double *a, const double *b)
+{
+    const double x = b[0] - a[0], y = b[1] - a[1];
+    const double t = fmax(0, fmin(1, ((p[0] - a[0]) * x + (p[1] - a[1]) * y) / (x * x + y * y)));
+    return hypot(a[0] + t * x - p[0], a[1] + t * y - p[1]);
+}
+
+/// Between two random coasts, the narrowest section of all is one of those from a reflex vertex.
+TEST(test_narrowest_is_tried)
+{
+    enum { SIDE = 12 };
+    bt_rng r = bt_rng_start(8, BT_RNG_PLACE, 0);
+    for (int trial = 0; trial < 300; trial++) {
+        floe f = {.n = 2 * SIDE}; // the lower coast from left to right, the upper one back
+        for (int i = 0; i < f.n; i++) {
+            const int k = i < SIDE ? i : f.n - 1 - i;
+            const double wide = k == 0 || k == SIDE - 1 ? 8 : 0.5 + 5 * bt_rng_uniform(&r);
+            f.v[2 * i] = k + 0.6 * (bt_rng_uniform(&r) - 0.5);
+            f.v[2 * i + 1] = (i < SIDE ? -1 : 1) * wide;
+        }
+        double least = INFINITY, found = INFINITY;
+        for (int i = 0; i < f.n; i++)
+            for (int k = 0; k + 1 < SIDE; k++) {
+                const double *a = f.v + 2 * (i < SIDE ? SIDE + k : k);
+                least = fmin(least, from_edge(f.v + 2 * i, a, a + 2));
+            }
+        const floe g = turned(&f, 0.1 * trial, trial % 2, trial % f.n);
+        bt_chord c;
+        for (int i = 0; i < g.n; i++)
+            for (int k = 0; k < g.n; k++) {
+                if (!bt_chord_across(g.n, g.v, i, k, INFINITY, 1e-6, &c)) continue;
+                double a[2], b[2], x, y;
+                bt_chord_place(g.n, g.v, c.a, a);
+                bt_chord_place(g.n, g.v, c.b, b);
+                y = sin(-0.1 * trial) * a[0] + cos(0.1 * trial) * a[1];
+                x = sin(-0.1 * trial) * b[0] + cos(0.1 * trial) * b[1];
+                if (x * y < 0) found = fmin(found, hypot(b[0] - a[0], b[1] - a[1]));
+            }
+        assert_near(found, least, 1e-6);
+    }
 }
 
 /// A twin of s times the lengths, s^1.5 the toughness, s the strength and s^3 the forces splits alike.
