@@ -729,7 +729,8 @@ def test_a_new_plan_that_starts_beside_the_end_of_the_old(aside):
 
 def test_looks_across_a_current(tmp_path):
     """Red: a traceback, or a way-point that is no number."""
-    write_case(tmp_path, changed(LINE, water={"current_x": 0.05, "current_y": 0.08}))
+    write_case(tmp_path, changed(LINE, water={"current_x": 0.02, "current_y": -0.1}, tow=LINE["tow"] | {
+        "line_length": 120}))
     done = called("route", "case.yml", "--to", "400,0", "--routes", "1", "--replan", "150 s", "--members", "1", "-o",
                   "out", cwd=tmp_path)
     assert done.returncode == DONE, done.stderr
