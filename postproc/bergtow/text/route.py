@@ -35,7 +35,7 @@ def plan(found, markdown=False):
 
 def off_map(r):
     """[remark] of a route that leaves the map. A route.json of an earlier version does not say."""
-    beyond = r["predicted"].get("off_map")
+    beyond = r.get("predicted", {}).get("off_map")
     return [f"{amount(beyond, 'm')} of it off the map"] if beyond else []
 
 
