@@ -26,15 +26,19 @@ typedef struct bt_outline_counts {
     char crs[32];     ///< of the file: "OGC:CRS84" (degrees), "EPSG:32633", "local" (metres); "" without a map
     int64_t unnamed;  ///< features without `thickness` that have a similarly named property
     char nearly[96];  ///< the first few such names
+    char chart[96];   ///< the first few names of properties that are columns of an ice chart; "" = none
     int64_t bare;     ///< features without a thickness, whose floes get that of the case
     int64_t outside;  ///< floes whose centroid is outside the ice region
     double outside_area; ///< area of floes outside the ice region, not in the concentration, m²
     /// For a field file: the area to which its concentration refers, and that of the domain less the body, m²; else 0.
     double own_area, region_area;
-    double region[4]; ///< for a field file: its ice region, x_min, y_min, x_max, y_max, m; all 0 if unknown
+    /// Where the ice that was read ends, x_min, y_min, x_max, y_max, m; all 0 if unknown. Of outlines the ice region,
+    /// but on open sides, where they leave more than BT_ARCH_WATER mean sizes of it free, their bounding box: what lies
+    /// beyond a map is not known. Of a field file as the file gives it, which for made ice is its ice region.
+    double region[4];
 } bt_outline_counts;
 
-/// The ice region [4] of a field file, m; NULL if unknown.
+/// Where the ice that was read ends, [4] m; NULL if unknown.
 static inline const double *bt_outline_region(const bt_outline_counts *counts)
 {
     return counts->region[0] < counts->region[2] ? counts->region : NULL;
@@ -88,6 +92,10 @@ bt_status bt_field_read_outlines(const bt_case *input, bt_field *field, bt_error
 /// Is a property of outlines, not called `thickness`, likely to be one?
 bool bt_outline_near_thickness(const char *name);
 
+/// Is a property of outlines a column of an ice chart (SIGRID-3 and the national ice charts), whose polygons are
+/// regions of some concentration, water and land, not floes? Letters of either case.
+bool bt_outline_chart_column(const char *name);
+
 /// Write outlines at their places as GeoJSON that ice.outlines reads back: in longitude and latitude if the place of x
 /// = y = 0 on the earth is known (from outlines read in degrees, or ice.origin_lon and ice.origin_lat), in another crs
 /// if outlines were read in it, and otherwise in metres [east, north] from x = y = 0, with a local crs. A complete file
@@ -104,8 +112,8 @@ bool bt_field_fixed_ours(const char *path);
 /// Has bt_field_write_outlines written this file?
 bool bt_field_outlines_ours(const char *path);
 
-/// Add warnings about ice that was read: properties with names similar to thickness, floes outside the ice region,
-/// errors of a projection, a latitude other than the case's.
+/// Add warnings about ice that was read: properties with names similar to thickness or of an ice chart, floes outside
+/// the ice region, a map that ends within it, errors of a projection, a latitude other than the case's.
 void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings);
 
 /// Sizes of the floes of a field: diameters of circles of their areas.

@@ -132,6 +132,7 @@ _SIGNATURES = {
     "bt_catenary_pull": (c_double, c_double, c_double, c_double, c_double, POINTER(c_double)),
     "bt_estimate_ship": (Estimate, c_double, c_double, c_double, c_double, c_double),
     "bt_outline_near_thickness": (c_bool, c_char_p),
+    "bt_outline_chart_column": (c_bool, c_char_p),
     "bt_outline_middle": (None, c_int64, POINTER(c_double), POINTER(c_double)),
     "bt_outline_in_degrees": (c_bool, c_double, c_double, c_bool),
     "bt_outline_project": (None, c_double, c_double, c_double, c_double, POINTER(c_double), POINTER(c_double)),

@@ -96,6 +96,7 @@ bt_arch bt_arch_of(const bt_case *input, double concentration, double floe_size)
     }
     worst.rigid = !(input->ice.rafting_kappa > 0) && !(input->ice.crushing_pressure > 0);
     worst.splits = input->ice.splitting.toughness > 0;
+    worst.mapped = input->ice.outlines;
     worst.unbounded = worst.rigid && worst.beside && reaches(concentration, BT_BOUND_CONCENTRATION);
     return worst;
 }
@@ -113,14 +114,16 @@ void bt_arch_warn(const bt_arch *arch, bt_errors *warnings)
     if (arch->water > 0)
         bt_warn(warnings, BT_WARN_ICE_STRIP,
                       "%s: %.4g m of open water beside the tow, where the ice ends before the domain does: floes are "
-                      "pushed out into it, and the resistance is that of a strip of ice; leave both keys out to fill "
-                      "the domain, unless that is intended",
-                      arch->region, arch->water);
+                      "pushed out into it, and the resistance is that of a strip of ice; %s, unless that is intended",
+                      arch->region, arch->water,
+                      arch->mapped ? "use a map that reaches farther, or a smaller domain"
+                                   : "leave both keys out to fill the domain");
     if (arch->gap > 0)
         bt_warn(warnings, BT_WARN_ICE_GAP,
                       "ice.x_min, ice.x_max: the ice fills all but %.4g m of the moving window, and the window repeats "
-                      "that gap: the body meets open water again and again; leave both keys out",
-                      arch->gap);
+                      "that gap: the body meets open water again and again; %s",
+                      arch->gap, arch->mapped ? "use a map that fills the window, or a smaller domain"
+                                              : "leave both keys out");
     if (arch->unbounded)
         bt_warn(warnings, BT_WARN_LOAD_UNBOUNDED,
                       "ice.concentration: %.0f %% of %s: above about %.0f %% (assumed) they lock, and their load has "

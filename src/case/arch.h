@@ -50,6 +50,7 @@ typedef struct bt_arch {
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
     bool rigid;           ///< floes neither raft nor crush
     bool splits;          ///< floes split
+    bool mapped;          ///< the ice is of outlines, which a larger region does not extend
     bool unbounded;       ///< rigid and dense, around a towed body: no upper bound of its load
     const char *sides;    ///< "walls", "periodic images", "open sides" or "open ends"
 } bt_arch;

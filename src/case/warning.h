@@ -103,6 +103,8 @@
     ROW(SPREAD, "spread", "- spread asked", "floe sizes spread less than requested")                                   \
     ROW(SMALL_FLOES, "small_floes", "small floes share_percent least_m", "some floes are smaller than requested")      \
     ROW(ICE_OUTSIDE, "ice_outside", "floes of_floes area_m2", "floes lie outside the ice region")                      \
+    ROW(MAP_ENDS, "map_ends", "x_min_m x_max_m y_min_m y_max_m", "the map of the ice ends within the ice region")      \
+    ROW(ICE_CHART, "ice_chart", "columns", "the polygons are regions of an ice chart, not floes")                      \
     ROW(OTHER_REGION, "other_region", "file_m2 domain_m2", "the file's concentration refers to another ice region")    \
     ROW(LATITUDE_FIRST, "latitude_first", "latitude_deg longitude_deg", "coordinates may be in the wrong order")       \
     ROW(NO_LATITUDE, "no_latitude", "latitude_deg", "the map has a latitude, but the case has none")                   \

@@ -60,8 +60,9 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         bt_h5_attr_double(&h5, "/floes", "ice_area", field->ice_area);
         bt_h5_attr_double(&h5, "/floes", "concentration", field->concentration);
         bt_h5_attr_int(&h5, "/floes", "n_floes", field->n);
-        const double own[4] = {input->ice.x_min, input->ice.y_min, input->ice.x_max, input->ice.y_max},
-                     *region = input->ice.field ? field->outlines.region : own;
+        const double own[4] = {input->ice.x_min, input->ice.y_min, input->ice.x_max, input->ice.y_max};
+        const bool read = input->ice.field || input->ice.outlines;
+        const double *region = read ? field->outlines.region : own;
         for (int k = 0; k < 4; k++) bt_h5_attr_double(&h5, "/floes", region_names[k], region[k]);
         bt_h5_attr_word(&h5, "/floes", "frame", bt_field_frame(input));
         const bt_map_place place = bt_map_place_of(&field->outlines, input);

@@ -8,6 +8,7 @@
 #include "case/warning.h"
 #include "case/ice_bounds.h"
 #include "case/case_check.h"
+#include "case/case_derived.h"
 #include "field/field_admit.h"
 #include "field/field_make.h"
 #include "field/map_crs.h"
@@ -55,8 +56,37 @@ bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
 
 // --- messages --------------------------------------------------------------------------------------------------------
 
+/// Keys that cut the ice region of a case to where the ice that was read ends, "ice.x_max: 339 m, ..."; "" = none.
+static void keys_of_end(const bt_case *input, const double region[4], char out[160])
+{
+    static const char *const names[4] = {"x_min", "y_min", "x_max", "y_max"};
+    double own[4];
+    bt_case_ice_region(input, own, own + 2);
+    *out = 0;
+    for (int k = 0; k < 4; k++) {
+        const size_t n = strlen(out);
+        if (k < 2 ? region[k] > own[k] : region[k] < own[k])
+            snprintf(out + n, 160 - n, "%sice.%s: %.6g m", n ? ", " : "", names[k], region[k]);
+    }
+}
+
+/// A map that ends within the ice region to which its concentration refers. Rejected: the box as the region's default,
+/// which would change the concentration of recorded cases, and tell a typed default from one left out.
+static void warn_of_end(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
+{
+    const double *r = bt_outline_region(counts);
+    char keys[160];
+    if (!r || !(counts->read || counts->own_area > (r[2] - r[0]) * (r[3] - r[1]))) return;
+    keys_of_end(input, r, keys);
+    if (*keys)
+        bt_warn(warnings, BT_WARN_MAP_ENDS,
+                "the map of the ice reaches only from x = %.6g to %.6g m and y = %.6g to %.6g m: what lies beyond is "
+                "unknown, but counts as open water, in the concentration, too; %s %s, or use a smaller domain",
+                r[0], r[2], r[1], r[3], counts->read ? "set" : "make the field with", keys);
+}
+
 /// Ice that does not match the ice region.
-static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
+static void warn_of_region(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
 {
     if (counts->outside)
         bt_warn(warnings, BT_WARN_ICE_OUTSIDE,
@@ -68,6 +98,7 @@ static void warn_of_region(const bt_outline_counts *counts, bt_errors *warnings)
                 "ice.field: the concentration of the file refers to an ice region of %.6g m2, but the domain without "
                 "the body has %.6g m2: it is not that of the domain",
                 counts->own_area, counts->region_area);
+    else warn_of_end(counts, input, warnings);
 }
 
 /// Latitude of the place of the ice, rad; NaN if unknown.
@@ -139,7 +170,12 @@ void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_e
     if (counts->read && !counts->bare && input->n_floes == 0 && bt_case_changed(input, "ice.thickness"))
         bt_warn(warnings, BT_WARN_THICKNESS_IDLE,
                 "ice.thickness: no effect, because all outlines have their own thickness");
-    warn_of_region(counts, warnings);
+    if (*counts->chart)
+        bt_warn(warnings, BT_WARN_ICE_CHART,
+                "%s: as of an ice chart, whose polygons are regions, of water and land, too, not floes: each became a "
+                "floe of 100 %%; use outlines of single floes",
+                counts->chart);
+    warn_of_region(counts, input, warnings);
     if (!*counts->crs) return; // nothing of a map was read
     const bt_map_place place = bt_map_place_of(counts, input);
     warn_of_latitude(&place, input, warnings);

@@ -28,6 +28,8 @@
 #include "field/field_make.h"
 #include "base/elementary.h"
 #include "base/fileio.h"
+#include "case/arch.h"
+#include "case/case_derived.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 #include "field/map_crs.h"
@@ -68,7 +70,6 @@ typedef struct reader {
     bt_map_crs crs;
     double lon0, lat0;   ///< rad
     double east0, north0; ///< m
-    int names;         ///< number of names in outlines.nearly
 } reader;
 
 /// "feature 3" or "feature 3 (id 17)".
@@ -286,17 +287,53 @@ static void turn_round(int n, double *v)
         }
 }
 
+/// Is the name, in small letters, one of the words? lower: the name so, cut short beyond 63 letters.
+static bool is_one_of(const char *name, const char *const *words, char lower[64])
+{
+    size_t n = 0;
+    for (; name[n] && n < 63; n++)
+        lower[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
+    lower[n] = 0;
+    for (; *words; words++)
+        if (!strcmp(lower, *words)) return true;
+    return false;
+}
+
 bool bt_outline_near_thickness(const char *name)
 {
     static const char *const words[] = {"height", "h", "ice_height", "draft", "dicke", "tykkelse", "sit", NULL};
     char lower[64];
-    size_t n = 0;
-    for (; name[n] && n < sizeof lower - 1; n++)
-        lower[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
-    lower[n] = 0;
-    for (int i = 0; words[i]; i++)
-        if (!strcmp(lower, words[i])) return true;
-    return strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
+    return is_one_of(name, words, lower) || strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
+}
+
+bool bt_outline_chart_column(const char *name)
+{
+    // kind of region, total concentration, stage and form of the ice, egg code
+    static const char *const words[] = {"poly_type", "pgon_type", "ct",      "e_ct",      "n_ct",     "sa", "e_sa",
+                                        "fa",        "e_fa",      "icecode", "nis_class", "a_legend", NULL};
+    char lower[64];
+    return is_one_of(name, words, lower);
+}
+
+/// Add a name of a property to a list "`a`, `b`", once, and no more than fit.
+static void keep_name(char list[96], const char *name)
+{
+    char entry[48];
+    snprintf(entry, sizeof entry, "`%.40s`", name);
+    for (char *c = entry; *c; c++)
+        if ((unsigned char)*c < 0x20 || (unsigned char)*c >= 0x7F) *c = '?';
+    if (strstr(list, entry) || strlen(list) + strlen(entry) + 3 > 96) return;
+    if (*list) strcat(list, ", ");
+    strcat(list, entry);
+}
+
+/// Keep the first names of properties that are columns of an ice chart.
+static void look_for_chart(reader *in, const json_t *properties)
+{
+    const char *name;
+    json_t *value;
+    json_object_foreach((json_t *)properties, name, value)
+        if (bt_outline_chart_column(name)) keep_name(in->f->outlines.chart, name);
 }
 
 /// Count a feature without `thickness` that has a property with a similar name; keep the first such names.
@@ -309,14 +346,7 @@ static void look_for_thickness(reader *in, const json_t *properties)
     json_object_foreach((json_t *)properties, name, value) {
         if (!bt_outline_near_thickness(name) || json_is_null(value)) continue;
         any = true;
-        char entry[48];
-        snprintf(entry, sizeof entry, "`%.40s`", name);
-        for (char *c = entry; *c; c++)
-            if ((unsigned char)*c < 0x20 || (unsigned char)*c >= 0x7F) *c = '?';
-        if (strstr(counts->nearly, entry) || strlen(counts->nearly) + strlen(entry) + 3 > sizeof counts->nearly)
-            continue;
-        if (in->names++) strcat(counts->nearly, ", ");
-        strcat(counts->nearly, entry);
+        keep_name(counts->nearly, name);
     }
     counts->unnamed += any;
 }
@@ -340,6 +370,7 @@ static void take_feature(void *context, size_t index, const json_t *feature)
     out->id = json_incref(id ? id : json_object_get(properties, "id"));
     if (thickness && !json_is_null(thickness)) out->thickness = json_incref(thickness);
     else look_for_thickness(in, properties);
+    look_for_chart(in, properties);
     in->n_features = index + 1;
 }
 
@@ -479,6 +510,28 @@ static double area_in_region(reader *s, const bt_region *region, bt_idx i)
     return bt_region_area_of(region, s->c, n, v);
 }
 
+/// Note where the ice ends (region of bt_outline_counts). Walls hold the ice, so the water before them is known.
+static void note_region(reader *in)
+{
+    const bt_field *field = in->f;
+    const bt_bound kind[2] = {in->c->domain.ends, in->c->domain.sides};
+    const double most = BT_ARCH_WATER * bt_field_mean_size(field); // of open water
+    double low[2], high[2], *region = in->f->outlines.region;
+    bt_case_ice_region(in->c, low, high);
+    for (int k = 0; k < 2; k++) {
+        double from = INFINITY, to = -INFINITY;
+        for (bt_idx i = 0; i < field->n; i++)
+            for (int64_t v = field->offsets[i]; v < field->offsets[i + 1]; v++) { // outlines have no yaw
+                from = bt_min(from, field->pose[3 * i + k] + field->vertices[2 * v + k]);
+                to = bt_max(to, field->pose[3 * i + k] + field->vertices[2 * v + k]);
+            }
+        const bool open = kind[k] == BT_BOUND_OPEN;
+        region[k] = open && from - low[k] > most ? from : low[k];
+        region[2 + k] = open && high[k] - to > most ? to : high[k];
+        if (!(region[k] < region[2 + k])) region[k] = low[k], region[2 + k] = high[k]; // no floe is in it
+    }
+}
+
 /// Set the concentration in the ice region: ice outside is kept, but does not count.
 static void set_concentration(reader *in)
 {
@@ -494,6 +547,7 @@ static void set_concentration(reader *in)
     in->f->concentration = status == BT_OK ? sum / region.ice_area : 0;
     in->f->outlines.outside_area = whole - sum;
     bt_region_free(&region);
+    if (in->f->n > 0) note_region(in);
 }
 
 /// Refuse floes without a thickness if the case has none either.

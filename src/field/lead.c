@@ -359,7 +359,7 @@ bt_status bt_lead_open(const bt_case *input, bt_field *field, bt_lead_stats *sta
     bt_region region;
     status = bt_region_init(&region, &of, 0, err);
     if (status == BT_OK)
-        field->concentration = stats->concentration_after = area_in_region(&of, &region, field) / region.ice_area;
+        field->concentration = stats->concentration_after = area_in_region(&of, &region, field) / field->ice_area;
     bt_region_free(&region);
     return status;
 }

@@ -63,6 +63,7 @@ static const row rows[] = {
     {"field/area", "m2", "area of each floe", "floe"},
     {"field/crs", NULL, "coordinate reference system of the map", "one"},
     {"field/nearly", NULL, "property names close to `thickness`, the first few", "one"},
+    {"field/chart", NULL, "property names of an ice chart, the first few", "one"},
 };
 
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes)

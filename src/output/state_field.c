@@ -67,10 +67,10 @@ static const bt_state_row field_rows[] = {
     FIELD(F64, "own_area", outlines.own_area, "m2", ANY, "area that the concentration of a field file refers to"),
     FIELD(F64, "region_area", outlines.region_area, "m2", ANY, "area of the case's ice region"),
     FIELD(F64, "x_min", outlines.region[0], "m", ANY,
-        "ice region of a field file, low end of x; 0 without a field file"),
-    FIELD(F64, "y_min", outlines.region[1], "m", ANY, "ice region of a field file, low end of y"),
-    FIELD(F64, "x_max", outlines.region[2], "m", ANY, "ice region of a field file, high end of x"),
-    FIELD(F64, "y_max", outlines.region[3], "m", ANY, "ice region of a field file, high end of y"),
+        "where the ice that was read ends, low end of x; 0 if unknown"),
+    FIELD(F64, "y_min", outlines.region[1], "m", ANY, "where the ice that was read ends, low end of y"),
+    FIELD(F64, "x_max", outlines.region[2], "m", ANY, "where the ice that was read ends, high end of x"),
+    FIELD(F64, "y_max", outlines.region[3], "m", ANY, "where the ice that was read ends, high end of y"),
 };
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
@@ -159,6 +159,7 @@ bt_status bt_state_save_field(const bt_field *field, const bt_world *world, cons
         bt_snapshot_add_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
         bt_snapshot_add_text(snap, "field/crs", field->outlines.crs);
         bt_snapshot_add_text(snap, "field/nearly", field->outlines.nearly);
+        bt_snapshot_add_text(snap, "field/chart", field->outlines.chart);
         bt_snapshot_add(snap, "field/offsets", BT_ITEM_I64, field->n + 1, 1, field->offsets);
     }
     const bt_status status = save_outlines(world, comm, (bt_gid)n, field->offsets, snap, err);
@@ -177,6 +178,8 @@ void bt_state_load_field(bt_field *field, bt_snapshot *snap)
     bt_snapshot_take_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
     snprintf(field->outlines.crs, sizeof field->outlines.crs, "%s", bt_snapshot_text(snap, "field/crs"));
     snprintf(field->outlines.nearly, sizeof field->outlines.nearly, "%s", bt_snapshot_text(snap, "field/nearly"));
+    if (bt_snapshot_find(snap, "field/chart")) // not in checkpoints of earlier versions
+        snprintf(field->outlines.chart, sizeof field->outlines.chart, "%s", bt_snapshot_text(snap, "field/chart"));
     free(field->offsets);
     field->offsets = bt_snapshot_copy(snap, "field/offsets", BT_ITEM_I64, 1, &n);
     field->vertices = bt_snapshot_copy(snap, "field/vertices", BT_ITEM_F64, 2, &n_vertices);

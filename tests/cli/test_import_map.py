@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from osgeo import gdal, ogr, osr
-from pyproj import Geod
+from pyproj import CRS, Geod, Transformer
 from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
@@ -23,6 +23,7 @@ from test_map import FRAMES
 from test_outlines import LONLAT, field, same_ring
 
 from bergtow import cli  # noqa: E402
+from bergtow.maps import plane as map_plane  # noqa: E402
 from bergtow.maps import read as map_read  # noqa: E402
 from bergtow.maps import stairs as map_stairs  # noqa: E402
 from bergtow.errors import BergtowError, RunError  # noqa: E402
@@ -816,6 +817,60 @@ def test_packed_numbers_are_no_labels(tmp_path):
     assert "not labels" in outlines(map_, "--crs", "local", code=IO)
 
 
+@pytest.mark.parametrize("key", ["crs_wkt", "spatial_ref", None])
+@pytest.mark.parametrize("unit, scale", [("km", 1e-3), ("kilometre", 1e-3), ("m", 1.0)])
+def test_a_grid_in_kilometres(tmp_path, key, unit, scale):
+    """Its coordinates have a unit of their own beside that of the system. Red: with crs_wkt or spatial_ref a grid in km
+    was a thousand times too small, and at the pole."""
+    with netCDF4.Dataset(tmp_path / "map.nc", "w") as f:
+        for name, n, first, step in ("y", 60, -800e3, -500.0), ("x", 80, 400e3, 500.0):
+            f.createDimension(name, n)
+            f.createVariable(name, "f8", (name,))[:] = (first + np.arange(n) * step) * scale
+            f[name].setncatts({"standard_name": f"projection_{name}_coordinate", "units": unit})
+        about = CRS(3413).to_cf()
+        wkt = about.pop("crs_wkt")
+        f.createVariable("crs", "i4").setncatts(about | ({key: wkt} if key else {}))
+        f.createVariable("labels", GRID.dtype, ("y", "x"))[:] = GRID
+        f["labels"].grid_mapping = "crs"
+        f.Conventions = "CF-1.8"
+    _, record = outlines(tmp_path / "map.nc")
+    lon, lat = Transformer.from_crs(3413, "OGC:CRS84", always_xy=True).transform(420e3, -815e3)
+    assert record["plane"]["centre"] == pytest.approx([lon, lat], abs=0.3)
+    grid = np.count_nonzero(GRID) * 500.0 ** 2
+    assert record["floes"]["area_m2"] == pytest.approx(grid * 1.026 ** 2, rel=0.01)
+
+
+@pytest.mark.parametrize("name, authority", [
+    ("WGS84", "EPSG:4326"), ("wgs 84", "EPSG:4326"), ("CRS84", "OGC:CRS84"), ("epsg:3413", "EPSG:3413"),
+    ("urn:ogc:def:crs:EPSG::3413", "EPSG:3413"), ("ETRS89 / UTM zone 33N", "EPSG:25833"), ("3413", "EPSG:3413"),
+    ("WGS_84_/_UTM_zone_33N", "EPSG:32633")])
+def test_names_of_systems(name, authority):
+    assert ":".join(map_plane.known("map", name, "its crs").to_authority()) == authority
+
+
+@pytest.mark.parametrize("name", ["foo", "Arctic", "WGS", "UTM zone 33N"])
+def test_names_of_systems_are_not_guessed(name):
+    """Red: foo is Amersfoort, and Arctic lies in Australia."""
+    with pytest.raises(RunError):
+        map_plane.known("map", name, "its crs")
+
+
+@pytest.mark.parametrize("first, second, kept, unequal", [
+    (0.3, 3.0, 3.0, 1), (3.0, 0.3, 3.0, 1), (None, 2.0, 2.0, 0), (2.0, None, 2.0, 0), (2.0, 2.0, 2.0, 0),
+    (None, None, None, 0)])
+def test_the_same_floe_traced_twice(tmp_path, first, second, kept, unequal):
+    """Red: the first in the file decided its thickness, also where it had none."""
+    map_ = write(tmp_path / "map.geojson", [places(RINGS[0])] * 2 + [places(RINGS[1])])
+    root = json.loads(map_.read_text())
+    for feature, thickness in zip(root["features"], (first, second, 1.0)):
+        feature["properties"]["thickness"] = thickness
+    map_.write_text(json.dumps(root))
+    _, record = outlines(map_)
+    assert counted(record)["twice"] == 1 and counted(record).get("unequal", 0) == unequal
+    out = json.loads((tmp_path / "out.geojson").read_text())["features"]
+    assert sorted(str(f["properties"].get("thickness")) for f in out) == sorted(map(str, (kept, 1.0)))
+
+
 def test_a_grid_with_a_time(tmp_path):
     """Red: the time is taken for the map, and with --layer and --band the messages lead in a circle."""
     with netCDF4.Dataset(tmp_path / "map.nc", "w") as f:
@@ -1026,6 +1081,8 @@ BAD = {
     "latitude first": (lambda p: write(p / "map.geojson", [places(r, 140.0)[:, ::-1] for r in RINGS]), (),
                        "latitude seems to come first"),
     "the equator": (lambda p: write(p / "map.geojson", [places(r, 80.0, 14.0) for r in RINGS]), (), "no sea ice"),
+    "guessed crs": (lambda p: write(p / "map.geojson", UTM, "foo"), (), "is not the name of a system"),
+    "said badly": (lambda p: write(p / "map.geojson", UTM), ("--crs", "WGS"), "is not the name of a system"),
     "unknown crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:99999"), (), "unknown to PROJ"),
     "two crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:32633"), ("--crs", "EPSG:3413"), "but --crs says"),
     "far": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--centre", "20,80"), "100 km"),

@@ -430,6 +430,88 @@ def test_the_concentration_is_that_of_the_ice_region(tmp_path):
     assert any("refers to an ice region of 96.8" in w and "the domain without the body has 196.8" in w for w in warned)
 
 
+#: 36 floes over 7 m in a domain of 30 m whose sides are open; a planned tow leaves them after half a minute
+SMALL_MAP = changed(BASE, domain={"length": 30, "width": 20, "ends": "open", "sides": "open"},
+                    run={"dt": 0.1, "duration": 60}, tow={"speed": 0.3, "ramp": 1})
+BOX = [5, -3.5, 12, 3.5]
+
+
+def small_map(folder):
+    write(folder, *(feature(at(SQUARE, 5 + 1.2 * i, -3.5 + 1.2 * j)) for i in range(6) for j in range(6)))
+
+
+def coded(warnings):
+    return {w["code"]: w["values"] for w in warnings}
+
+
+def checked(folder, case):
+    r = call("check", write_case(folder, case), "--json")
+    assert r.returncode == DONE, r.stderr
+    return coded(json.loads(r.stdout)["warnings"])
+
+
+def test_a_map_that_ends_within_the_ice_region(tmp_path):
+    """It is told with the box; the verdict is the same with keys that cut the region to it, with the default typed out,
+    and without keys; so is the ice. Red: nothing was told, and the tow was steady off the map."""
+    small_map(tmp_path)
+    cut = dict(zip(("ice__x_min", "ice__y_min", "ice__x_max", "ice__y_max"), BOX))
+    typed = dict(zip(cut, (0, -10, 30, 10)))
+    left, hashes = [], set()
+    for keys in {}, typed, cut:
+        case = changed(SMALL_MAP, **keys)
+        told = checked(tmp_path, case)
+        assert ("map_ends" in told) == (keys is not cut)
+        if keys is not cut:
+            assert [told["map_ends"][k] for k in ("x_min_m", "y_min_m", "x_max_m", "y_max_m")] == pytest.approx(BOX)
+        left.append(told["leaves_ice"]["time_s"])
+        r = run(tmp_path, case, "--quiet", name=f"out-{len(left)}")
+        hashes.add(r.hash)
+        assert ("map_ends" in coded(r.summary["warnings"])) == (keys is not cut)
+        assert "leaves_ice" in coded(r.summary["window"]["reasons"])
+    assert left == [left[0]] * 3 and left[0] == pytest.approx((BOX[2] - 2) / 0.3 + 0.5, abs=1) and len(hashes) == 1
+    field(tmp_path, SMALL_MAP)  # which tells as much
+    told = checked(tmp_path, changed(SMALL_MAP, ice={"field": "out.h5"}))
+    assert told["map_ends"]["x_max_m"] == pytest.approx(12) and told["leaves_ice"]["time_s"] == left[0]
+    field(tmp_path, changed(SMALL_MAP, **cut))
+    assert "map_ends" not in checked(tmp_path, changed(SMALL_MAP, ice={"field": "out.h5"}))
+
+
+def test_a_map_that_ends_less_than_two_floes_from_the_side(tmp_path):
+    """That is told of no one; nor is water between the ice and a wall, which is known."""
+    small_map(tmp_path)
+    near = changed(SMALL_MAP, domain={"x0": 3, "y0": -5.5, "length": 11, "width": 11, "ends": "open", "sides": "open"},
+                   body={"x": 3.92, "length": 1.8})
+    walls = changed(SMALL_MAP, domain__ends="wall", domain__sides="wall")
+    assert not {"map_ends", "leaves_ice"} & checked(tmp_path, changed(near, run__duration=10)).keys()
+    assert "map_ends" not in checked(tmp_path, walls)
+
+
+def test_a_lead_in_ice_of_a_map_that_ends(tmp_path):
+    """The concentration stays that of the ice region in a field of it, too."""
+    small_map(tmp_path)
+    write_case(tmp_path, SMALL_MAP)
+    lead = {"mode": "channel", "width": 2.4}
+    told = [json.loads(call("check", write_case(tmp_path, changed(SMALL_MAP, lead=lead)), "--json").stdout)]
+    field(tmp_path, SMALL_MAP)
+    told.append(json.loads(call("check", write_case(tmp_path, changed(SMALL_MAP, lead=lead, ice={"field": "out.h5"})),
+                                "--json").stdout))
+    assert told[0]["ice"]["concentration"] == pytest.approx(told[1]["ice"]["concentration"], rel=1e-9)
+
+
+def test_an_ice_chart_is_not_a_map_of_floes(tmp_path):
+    """Its columns are told of, in a resumed run, too. Red: regions of the chart were towed through without a word."""
+    names = {"poly_TYPE": "I", "CT": "91", "note": "x", "thickness": 0.2}
+    write(tmp_path, feature(at(SQUARE, 5, 3), properties=names), feature(at(SQUARE, 9, 0), properties=names))
+    assert checked(tmp_path, BASE)["ice_chart"] == {"columns": "`poly_TYPE`, `CT`"}
+    done = call("run", write_case(tmp_path, BASE), "-o", tmp_path / "out", "--steps", 3, "--quiet")
+    assert done.returncode == DONE, done.stderr
+    done = call("resume", tmp_path / "out", "--quiet")
+    assert done.returncode == DONE, done.stderr
+    assert "ice_chart" in coded(json.loads((tmp_path / "out/summary.json").read_text())["warnings"])
+    write(tmp_path, feature(at(SQUARE, 5, 3), properties={"note": "x"}))
+    assert "ice_chart" not in checked(tmp_path, BASE)
+
+
 def test_more_ice_outside_the_region_than_would_fit_into_it(tmp_path):
     """The run is resumed, and a field file of it is read, with bays or their hulls."""
     write(tmp_path, feature(at(C_SHAPE, 5, 2)), *(feature(at(SQUARE, 8 + 1.5 * (k % 7), -4.8 + 1.2 * (k // 7)))

@@ -397,6 +397,8 @@ def test_what_the_library_says_of_units_files_and_limits(tmp_path):
     near = [name for name in (b"Thickness_m", b"thicknes", b"Tykkelse", b"id", b"hi") if
             lib.bt_outline_near_thickness(name)]
     assert near == [b"Thickness_m", b"thicknes", b"Tykkelse"]
+    assert [name for name in (b"CT", b"poly_type", b"CTX", b"") if lib.bt_outline_chart_column(name)] == [
+        b"CT", b"poly_type"]
 
 
 def test_modules_use_those_below_them():

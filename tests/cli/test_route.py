@@ -711,6 +711,33 @@ def test_a_look_at_drifting_ice(tmp_path):
     assert all(t["arrived"] for t in found["horizon"]["tows"].values())
 
 
+@pytest.mark.parametrize("aside", [0.0, 12.0, 60.0])
+def test_a_new_plan_that_starts_beside_the_end_of_the_old(aside):
+    """As that of a line which leads inwards: the way to it has no jump in speed. Red: from a tenth of a width on, two
+    points of the programme at one time, and a speed that is no number."""
+    x = np.linspace(0, 600, 61)
+    plan = SimpleNamespace(x=x, y=np.full(61, aside), time=x / 0.5)
+    s = SimpleNamespace(mode="speed", drift=(0.0, 0.02), hull=SimpleNamespace(width=100.0), ramp=60.0,
+                        values={"run.dt": 4.0})
+    old = horizon.Way(np.array([[-300.0, 0], [0, 0]]), [(0.0, 0.0), (600.0, 0.5)])
+    way = horizon.way_of(plan, s, old)
+    times, speeds = np.transpose(way.pace)
+    assert np.isfinite(way.points).all() and np.all(np.diff(times) > 0) and speeds[2:].max() < 0.6
+    short = SimpleNamespace(x=x[[0, 1]], y=plan.y[[0, 1]], time=plan.time[[0, 1]])
+    assert np.isfinite(horizon.way_of(short, s, old).pace).all()
+
+
+def test_looks_across_a_current(tmp_path):
+    """Red: a traceback, or a way-point that is no number."""
+    write_case(tmp_path, changed(LINE, water={"current_x": 0.02, "current_y": -0.1}, tow=LINE["tow"] | {
+        "line_length": 120}))
+    done = called("route", "case.yml", "--to", "400,0", "--routes", "1", "--replan", "150 s", "--members", "1", "-o",
+                  "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    assert len(found["rounds"]) >= 3 and {*found["horizon"]["tows"]} == {"horizon", "once", "straight"}
+
+
 def test_looks_from_a_line(tmp_path):
     """Round a shoal, with a map of some age and errors; killed between looks, the same call ends as if it had not been.
     Red: what is decided is the way of the body; looks are drawn anew; the tow through the shoal counts as one."""
@@ -855,6 +882,7 @@ def local(geometry):
     ({}, ["--to", "8.5,0", "--routes", "17"], USAGE, "not a whole number from 1 to 16"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--speeds", "0.1,0.2"], USAGE, "one speed"),
     ({}, ["--to", "8.5,0", "--replan", "10 s", "--map-age", "11 s"], USAGE, "--map-age"),
+    ({}, ["--to", "8.5,0", "--width", "1e-3"], USAGE, r"\(--width\)"),
     ({}, ["--to", "8.5,0", "--force-limit", "1e-3"], CASE, "takes more than --force-limit"),
     ({}, ["--to", "8.5,0", "--map", "map.shp"], USAGE, "bergtow outlines"),
     ({}, ["--to", "8.5,0", "--speeds", "0"], USAGE, "is not above zero"),
@@ -989,6 +1017,30 @@ def test_routes_through_outlines_in_metres(tmp_path, crs, key):
     case = Case(tmp_path / "case.yml", situation.reading(s.values, s.field))
     with bergtow.Simulation(case, threads=1) as sim:
         assert sim.n_bodies == 2
+
+
+def test_a_route_off_the_map_is_told(tmp_path):
+    """Around a map of three by three floes in the middle of the domain. Red: what lies beside the map was taken for
+    open water, and the way through it was recommended without a word."""
+    corners = np.array([[x, y] for x in (4, 5.2, 6.4) for y in (-1.7, -0.5, 0.7)])[:, None]
+    rings = corners + [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
+    (tmp_path / "map.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [r.tolist()]}}
+        for r in rings]}))
+    case = changed(BASIN, domain__sides="open", domain__width=12, domain__length=20, ice={
+        "outlines": "map.geojson", "outlines_crs": "plane", "thickness": 0.05})
+    write_case(tmp_path, case)
+    done = called("route", "case.yml", "--to", "13,0", "--routes", "1", "--members", "1", "-o", "out", cwd=tmp_path)
+    assert done.returncode == DONE, done.stderr
+    found = json.loads((tmp_path / "out/route.json").read_text())
+    straight, around = found["routes"]
+    assert straight["predicted"]["off_map"] == pytest.approx(10.5 - 3.4, abs=0.2)  # the map is 3.4 m long
+    assert around["predicted"]["off_map"] > 0.9 * around["predicted"]["length"]
+    assert "map_ends" in {w["code"] for w in found["warnings"]}
+    for remark in (text_route.off_map(r)[0] for r in found["routes"]):
+        assert remark in text_route.plan(found) and remark in text_route.verified(found)
+    assert text_route.answer(found) != text_route.decision(found)
+    assert read_situation(tmp_path, BASIN).known is None  # ice that is made has no end of which nothing is known
 
 
 def test_land_beside_the_line_is_passed(tmp_path):

@@ -132,6 +132,13 @@ TEST(water_beside_the_ice_is_told)
     bt_arch_warn(&a, &said);
     assert_int_equal(said.n, 1);
     assert_non_null(strstr(said.text[0], "ice.y_min, ice.y_max: 5 m of open water"));
+    assert_non_null(strstr(said.text[0], "leave both keys out"));
+    bt_errors_free(&said);
+    said = (bt_errors){0};
+    bt_arch mapped = a; // without the keys there would be no more ice on the map
+    mapped.mapped = true;
+    bt_arch_warn(&mapped, &said);
+    assert_null(strstr(said.text[0], "leave both keys out"));
     bt_errors_free(&said);
     said = (bt_errors){0};
     c.tow.direction = c.body.yaw = BT_PI / 2;

@@ -18,6 +18,7 @@ Missing information about coordinates is not guessed. A file is rejected if it h
 the earth, or contains numbers that contradict its crs; the message gives the remedy.
 """
 import ctypes
+import re
 import warnings
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ from bergtow.errors import RunError
 from bergtow.maps.read import local_crs, need
 
 WGS84 = "OGC:CRS84"   # degrees, longitude first
+STRUCTURED = re.compile(r"^\s*\w+:|[\[{]|\+(proj|init)=")  # a code, urn, address, WKT, JSON or PROJ string, not a name
 ROUNDING = 1e-3       # degrees outside the valid range, beyond which coordinates cannot be degrees
 SAY = "say what its coordinates are with --crs, for example EPSG:4326, EPSG:32633, EPSG:3413, or local for metres " \
       "east and north without a place on the earth"
@@ -77,6 +79,10 @@ def known(path, text, whose):
     except CRSError:
         raise RunError(path, f"{whose} is unknown to PROJ: {' '.join(text.split())[:80]}",
                        "correct it; EPSG:4326, EPSG:32633 and the like are known") from None
+    _, code = crs.to_authority() or ("", crs.name)
+    if not STRUCTURED.search(text) and plain(text) not in (plain(crs.name), plain(code)):
+        raise RunError(path, f"{whose}, {text}, is not the name of a system; the nearest of PROJ is {name_of(crs)}",
+                       "give a code, as EPSG:3413, or the full name")
     if crs.is_compound:
         crs = crs.sub_crs_list[0]
     if crs.is_geographic or crs.is_projected:
@@ -84,6 +90,11 @@ def known(path, text, whose):
     if whose == "--crs":
         raise RunError(path, f"--crs {text} is {crs.type_name}, neither in degrees nor a projection", SAY)
     return None
+
+
+def plain(name):
+    """A name by its letters and digits: PROJ finds "foo" in Amersfoort, so what it finds must be what was named."""
+    return re.sub(r"[\W_]", "", name).lower()
 
 
 def unbound(crs):

@@ -28,8 +28,8 @@ from bergtow.result.hdf5 import first_line
 INSTALL = "apt-get install python3-gdal python3-pyproj python3-shapely"
 MAX_PIXELS = 400_000_000
 IMPLIED = ("OGC:1.3:CRS84", "OGC:CRS84", "EPSG:4326")  # crs of GeoJSON if nothing else is given [RFC 7946]
-#: columns of SIGRID-3 and of the national ice charts: kind of region, total concentration, stage and form, egg code
-CHART = {"POLY_TYPE", "PGON_TYPE", "CT", "E_CT", "N_CT", "SA", "E_SA", "FA", "E_FA", "ICECODE", "NIS_CLASS", "A_LEGEND"}
+METRES = {"m": 1.0, "km": 1e3} | {f"{prefix}met{ending}": 1e3 if prefix else 1.0  #: units of lengths in NetCDF
+                                  for prefix in ("", "kilo") for ending in ("re", "res", "er", "ers")}
 LISTED = 20  # number of grids of a file that a message lists
 TELLS_ITSELF = ("TIFFTAG_IMAGEDESCRIPTION", "DESCRIPTION", "Description", "Comment")
 
@@ -153,8 +153,9 @@ def from_layer(path, source, how):
         raise RunError(path, f"has no column {how.thickness}",
                        f"name one of {', '.join(columns) or 'those of another layer'}")
     crs, implied = crs_of_layer(path, source, layer)
+    in_chart = _library.library().bt_outline_chart_column
     found = Map(path, crs, [], implied, about=about_of(path, source, layer),
-                chart=[name for name in columns if name.upper() in CHART])
+                chart=[name for name in columns if in_chart(name.encode(errors="replace"))])
     try:
         if how.where:
             layer.SetAttributeFilter(how.where)
@@ -377,7 +378,7 @@ def place_of(path, source, name):
         raise RunError(path, f"holds {full} as ({x}, {y}), whose rows lie along {y}",
                        f"give it rows along {x}: ncpdq -a {y},{x} (NCO)")
     if place is not None:
-        return place
+        return in_unit_of(source.GetSpatialRef(), place, (columns, rows))
     try:
         axes = [d.GetIndexingVariable().ReadAsArray().astype(float) for d in (columns, rows)]
     except (RuntimeError, AttributeError, TypeError, ValueError):
@@ -387,6 +388,25 @@ def place_of(path, source, name):
         if not step or np.abs(np.diff(axis) / step - 1).max(initial=0) > 1e-3:
             return None
     return axes[0][0] - steps[0] / 2, steps[0], 0, axes[1][0] - steps[1] / 2, 0, steps[1]
+
+
+def in_unit_of(reference, place, dimensions):
+    """A geotransform in the unit of its reference system. GDAL takes the numbers of the coordinate variables as they
+    are, and the system of crs_wkt or spatial_ref, whose unit may be another: x and y in km, the system in metres. The
+    steps are compared, so that a version of GDAL that converts them is right, too."""
+    if reference is None or not reference.IsProjected():
+        return place
+    out = list(place)
+    for k, dimension in enumerate(dimensions):
+        variable = dimension.GetIndexingVariable()
+        unit = METRES.get(variable.GetUnit().strip().lower()) if variable is not None else None
+        if unit is None or len(axis := variable.ReadAsArray().astype(float)) < 2 or not place[1 + 4 * k]:
+            continue
+        step = (axis[-1] - axis[0]) / (len(axis) - 1)
+        factor = abs(unit * step / (reference.GetLinearUnits() * place[1 + 4 * k]))
+        if step and abs(factor - 1) > 1e-2:
+            out[3 * k:3 * k + 3] = [factor * x for x in place[3 * k:3 * k + 3]]
+    return tuple(out)
 
 
 def in_memory():

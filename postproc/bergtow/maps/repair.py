@@ -10,8 +10,9 @@ staircases and other detail below the tolerance; slivers and small pieces; floes
 are to be left out; overlaps, and the pieces that cutting them leaves.
 
 An overlap is cut from the larger of two floes, which changes it least. If the overlap is nearly all of both, they are
-the same floe traced twice; if it is nearly all of the smaller floe, that floe lies inside the other. Rejected: a middle
-line through the overlap, which changes both floes, and for three floes depends on the order.
+the same floe traced twice, and one is left out (second_of); if it is nearly all of the smaller floe, that floe lies
+inside the other. Rejected: a middle line through the overlap, which changes both floes, and for three floes depends on
+the order.
 
 Floes that touch are separated by a gap of GAP. Neighbours in a label image share an edge to the last bit; without a gap
 no direction separates them, and the reader takes corners of their convex parts for overlaps.
@@ -63,6 +64,7 @@ KINDS = {
     "cut": "floes cut by the edge of the image, left out",
     "cut kept": "floes cut by the edge of the image, kept unchanged",
     "twice": "floes traced twice, left out once",
+    "unequal": "floes traced twice with different thicknesses, the thicker kept",
     "within": "floes within another, left out",
     "overlaps": "overlaps of two floes, taken from the larger",
     "touching": "floes that touched another, drawn back from it",
@@ -326,11 +328,22 @@ def parted(a, b, rules, book):
         return None
     if shared >= SAME * small.polygon.area:
         twice = shared >= SAME * large.polygon.area
-        gone = b if twice else small
+        gone = second_of(a, b, book) if twice else small
         book.note("twice" if twice else "within", f"{gone.name} ({(a if gone is b else b).name})", gone.polygon.area)
         return ([a], []) if gone is b else ([], [b])
     pieces = without(large, small, "overlaps" if overlap else "touching", rules, book)
     return (pieces, [b]) if large is a else ([a], pieces)
+
+
+def second_of(a, b, book):
+    """Which of two tracings of a floe is left out: the one without a thickness, or the thinner one, whatever their
+    order in the file. A thinner floe resists less, so the thicker is on the safe side of a tow."""
+    if a.thickness is not None and b.thickness is not None and a.thickness != b.thickness:
+        thick, thin = sorted((a, b), key=lambda f: -f.thickness)
+        book.note("unequal", f"{thin.name}, {thin.thickness:g} m ({thick.name}, {thick.thickness:g} m)",
+                  thin.polygon.area, thick.polygon.area)
+        return thin
+    return a if a.thickness is None and b.thickness is not None else b
 
 
 def without(large, small, kind, rules, book):

@@ -56,7 +56,10 @@ def way_of(route, s, decided=None):
     """The Way of a plan, from the start or after a decided one."""
     track, time = tows.led(route, s)
     old = decided or Way(track[:1], [(0.0, 0.0)])
-    far = np.argmax(np.hypot(*(track - old.points[-1]).T) > 0.1 * s.hull.width)
+    # A new plan may start beside the end of the decided way: the line of a tow that turns leads inwards. It is joined
+    # where it is so much farther that the way there is hardly longer, and so no faster, than that of the plan.
+    away = np.hypot(*(track - old.points[-1]).T)
+    far = np.append(np.flatnonzero(away > 2 * away[0] + 0.1 * s.hull.width), len(track) - 1)[0]
     track, time = np.vstack([old.points[-1:], track[far:]]), np.append(0.0, time[far:])
     pace = tows.programme(tows.legs_of(route, track, time, s), max(s.ramp, s.values["run.dt"]), old.pace[-1])
     return Way(np.vstack([old.points, tows.polyline(track, s)[1:]]), old.pace + pace[1:])

@@ -211,6 +211,8 @@ class _Task:
         t.drift[:], t.water[:] = _place("drift", drift), _place("water", water)
         t.start_heading = math.nan if start_heading is None else _number("start heading", start_heading, -math.inf)
         t.goal_heading = math.nan if goal_heading is None else _number("goal heading", goal_heading, -math.inf)
+        # the lattice keeps sums of slices, four to a width (src/route/lattice.c): what bounds cells bounds the width
+        _number("width of the hull (--width)", t.width, 4 * math.sqrt((x1 - x0) * (y1 - y0) * len(v) / MAX_CELLS))
         for name, value, most in ("spacing", spacing, MAX_STATES / headings), ("cell", cell, MAX_CELLS):
             least = math.sqrt((x1 - x0) * (y1 - y0) / most)
             setattr(t, name, 0 if value is None else _number(name, value, least))

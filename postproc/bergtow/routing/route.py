@@ -290,14 +290,23 @@ def tow(runs, name, some, keys, line=None):
 # ---- results
 
 
-def described(c):
-    """A candidate as a dict for JSON."""
+def off_map(route, known):
+    """Length of a route through the ice, m, that lies beyond the map of it. known: of the Situation."""
+    if known is None:
+        return 0.0
+    xy = np.column_stack([route.x, route.y])
+    middle, length = (xy[1:] + xy[:-1]) / 2, np.hypot(*np.diff(xy, axis=0).T)
+    return float(length[np.any((middle < known[:2]) | (middle > known[2:]), axis=1)].sum())
+
+
+def described(c, known):
+    """A candidate as a dict for JSON. known: of the Situation."""
     r = c.route
     return {"name": c.name, "label": c.label, "kind": r.kind, "speed": c.speed, "case": f"{c.name}.yml",
             "faults": list(r.faults), "waypoints": c.points, "predicted": {
                 "length": r.length, "time": r.duration, "work": r.work, "mean_force": r.force, "peak_of_legs": r.peak,
                 "ice_area": r.ice_area, "ice_mass": r.ice_mass, "clearance": r.clearance, "cost": r.cost,
-                "features": r.features}}
+                "off_map": off_map(r, known), "features": r.features}}
 
 
 def means(some):
@@ -439,7 +448,7 @@ def perform(a):
         options = priced(a, w, s, weights, factor)
         some, unreached = tows.candidates(plan.routes, w["speeds"], s,
                                           lambda route, speed: at_speed(route, speed, s, plan.cell, options))
-        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c) for c in some],
+        found |= {"status": plan.status, "status_data": plan.data, "routes": [described(c, s.known) for c in some],
                   "unreached": unreached}
         files = Files(folder, plan, some, s, goal, a.force)
         files.write_plan()

@@ -315,6 +315,7 @@ class Situation:
     water: tuple          #: of the water, m/s
     ramp: float           #: tow.ramp, s
     moving: np.ndarray    #: indices of the floes that are not fixed
+    known: tuple = None   #: (x0, y0, x1, y1) where the map of the ice ends, m; None: it has no end
 
     @property
     def mode(self):
@@ -427,7 +428,16 @@ def of(program, case, folder, ramp=None, no_go=(), width=None):
                      for file, some in areas.items()],
         drift=tuple(map(float, drift)), water=water,
         ramp=Case(case, {"tow.ramp": ramp})["tow.ramp"] if ramp is not None else values["tow.ramp"],
-        moving=floes)
+        moving=floes, known=end_of_map(values, field_file))
+
+
+def end_of_map(values, file):
+    """Where the ice that a case reads ends, (x0, y0, x1, y1), m, as its field file says; None if the ice is made."""
+    if not (values["ice.outlines"] or values["ice.field"]):
+        return None
+    with h5py.File(file) as f:
+        found = [f["floes"].attrs.get(name, 0.0) for name in ("x_min", "y_min", "x_max", "y_max")]
+    return tuple(map(float, found)) if found[0] < found[2] and found[1] < found[3] else None
 
 
 def _water(values, sim):

@@ -29,8 +29,14 @@ def plan(found, markdown=False):
         p = r["predicted"]
         rows.append([r["label"], amount(p["length"], "m"), amount(p["time"], "s"), f"{number(p['ice_area'])} m2",
                      amount(p["mean_force"], "N"), amount(p["work"], "J"),
-                     "; ".join(PLANNED[f] for f in r["faults"]) or "–"])
+                     "; ".join([PLANNED[f] for f in r["faults"]] + off_map(r)) or "–"])
     return "\n\n".join([table(head, rows, markdown), *unreached(found)])
+
+
+def off_map(r):
+    """[remark] of a route that leaves the map. A route.json of an earlier version does not say."""
+    beyond = r.get("predicted", {}).get("off_map")
+    return [f"{amount(beyond, 'm')} of it off the map"] if beyond else []
 
 
 def unreached(found):
@@ -69,7 +75,7 @@ def verified(found, markdown=False):
         elif c and c["relative"] is not None:
             low, high = c["relative_95"]
             against = change(c["relative"]) + ("" if low is None else f" ({change(low)} to {change(high)})")
-        said = [f"{FAULTS[f]} in {n} of {verdict['members']}" for f, n in r["counts"].items() if n]
+        said = [f"{FAULTS[f]} in {n} of {verdict['members']}" for f, n in r["counts"].items() if n] + off_map(r)
         rows.append([r["label"], amount(s[found["objective"]], unit), against, amount(s["mean_force"], "N"),
                      amount(s["peak"], "N"), *[amount(largest(r), "N")] * limited, amount(s["time"], "s"),
                      "; ".join(said) or "–"])
@@ -82,6 +88,18 @@ def largest(r):
 
 
 def answer(found):
+    """The verdict, and what it does not know."""
+    some = found["routes"]
+    if not any(map(off_map, some)):
+        return decision(found)
+    chosen = (found.get("verdict") or {}).get("recommended")
+    of = [f"{r['label']} {amount(r['predicted']['off_map'], 'm')} of {amount(r['predicted']['length'], 'm')}"
+          for r in some if off_map(r) and chosen in (None, r["name"])]
+    return " ".join([decision(found)] + [f"Off the map, where nothing is known of the ice and open water is assumed: "
+                                        f"{', '.join(of)}."] * bool(of))
+
+
+def decision(found):
     """The sentence with the verdict."""
     v, by_name = found.get("verdict"), {r["name"]: r for r in found["routes"]}
     if v is None:
