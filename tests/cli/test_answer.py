@@ -718,7 +718,7 @@ def test_a_body_that_the_current_carries_faster_is_not_towed():
         assert "must be held back" in words.sentence(found) and part["rows"] == ["steady.1"]
         assert "held back" in words.written(words.speeds(found))
     assert held_back_answer(2.8e5, 3e5, [2.9e5, 3.1e5])["feasible"]["verdict"] == "yes"
-    row = {"mean": {"n": 0.0}, "speed_m_s": 0.0}
+    row = {"mean": {"n": 0.0}, "speed_m_s": 0.0, "value": {}}
     assert not answer.held_back(row) and answer.held_back(row | {"speed_m_s": 0.5})  # at rest; on a slack line
     assert np.isnan(load_cases.taut_stop(tow(water=-5e5)))
 

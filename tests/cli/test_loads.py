@@ -13,6 +13,7 @@ import made_up_ensemble as made_up
 from harness import script
 from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 
+from bergtow.plot import design_value as plot_design
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import loads as plot_loads
 from bergtow.reporting import ensemble as report_ensemble
@@ -28,6 +29,7 @@ from bergtow.stats import design_value as statement_module
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.study import answer
+from bergtow.table import quantity
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
 
@@ -680,12 +682,71 @@ def test_a_constant_tow_force_is_its_own_design_value_in_open_water(tmp_path, fl
     s, text = of_all(sparse(tmp_path / "a", fields=3, changes={k: change for k in range(3)}))
     c, = s["conditions"]
     row = report_ensemble.design_row(c)
-    assert [row[1], row[2], *row[5:7]] == cells and row[7] == "5.00 kN"
+    assert [row[1], row[2], *row[5:7]] == cells and row[8] == "5.00 kN"
     assert c["loads"]["tow_force"]["start_up"]["largest"] == pytest.approx(5000)
     assert ("No value (constant, 1230 N, in 3 fields)." in text) == bool(floes)
     assert report_ensemble.without_value(s, 0.0).startswith("No value") == bool(floes)
     value = answer.conditions(Members(tmp_path / "a"))[0]["value"]
     assert value == {"kind": "constant", "n": pytest.approx(1234.567)}
+
+
+def held_back(folder, means, fields=8):
+    """Ensemble with a condition of each mean tow force, N; its scatter is in the sense of the load, beyond the mean.
+    There is tension whichever way the line pulls, the ice pushes, and the start pulls by 10 N."""
+    rng, members = np.random.default_rng(3), []
+    for c, mean in enumerate(means):
+        for _ in range(fields):
+            x = mean + np.sign(mean) * np.maximum(made_up.ar1(0.8, 4000, rng, 0.0, 5.0), -0.5 * abs(mean))
+            x[:40] = 10.0
+            series = {"tow_force": x, "ice_resistance": x - 5, "line_tension_1": np.abs(x)}
+            members.append(made_up.member(series["ice_resistance"], {"tow.speed": 0.1 * (c + 1)}, c, start=81.0,
+                                          more=series, attributes=SERIES))
+    return made_up.write(folder, members)
+
+
+def test_a_tow_that_holds_the_body_back_has_no_design_value(tmp_path):
+    """Red: the smallest load in magnitude as the design tow force, with a narrow interval and without a word."""
+    folder = held_back(tmp_path / "a", (-20.0, 20.0))
+    s, text = of_all(folder)
+    back, pulled = s["conditions"]
+    tow = back["loads"]["tow_force"]
+    least = min(stat_load.moving_mean(x[80:], 30).min() for x in (Members(folder).series(m, "tow_force")[1]
+                                                                   for m in range(8)))
+    assert tow["smallest"] == pytest.approx(least) == back["design"]["tow"]["smallest"] < -25 < tow["largest"] < 0
+    for name in ("tow_force", "ice_resistance", "line_tension_1"):
+        assert "value" not in back["loads"][name]["design"] and "value" in pulled["loads"][name]["design"]
+    assert back["design"]["tension"] is None and pulled["design"]["tow"]["value"] > 20
+    first, *others = back["design"]["warnings"]
+    assert "holds the body back" in first["what"] and quantity(least, "N") in first["detail"]
+    assert not any("holds the body back" in w["what"] for w in pulled["design"]["warnings"])
+    assert any("the start" in w["what"] for w in others)  # it pulls, while the window holds back
+    row = {**dict(zip(*(part for table in loads_text.design(s)[:1] for part in (table.head, table.rows[0]))))}
+    assert row["design tow force, N"] == "–" and float(row["smallest, N"]) == pytest.approx(least, rel=0.01)
+    rows = [statistics.csv_row(c, {"tow_force": "N"}) for c in s["conditions"]]
+    assert rows[0]["tow_force_smallest_n"] == tow["smallest"] and rows[0]["tow_force_design_n"] == ""
+    e = Members(folder)
+    table = next(b for b in report_ensemble.answer(e, s, [], {}) if b["kind"] == "table")
+    cells = dict(zip(table["head"], table["rows"][0]))
+    assert cells["design tow force"] == "–" and cells["smallest"] == report_ensemble.report_run.force(least)
+    found = answer.conditions(e)[0]
+    assert answer.held_back(found) and found["value"]["reason"] == "below_zero"
+
+
+@pytest.mark.parametrize("means", [(-20.0, 20.0), (-20.0, -10.0)])
+def test_the_picture_shows_what_holds_a_body_back(tmp_path, means):
+    """Red: an axis from 0 to below 0, upside down, without the largest loads."""
+    s, _ = of_all(held_back(tmp_path / "a", means, fields=4))
+    axes = plot_design.draw(s["conditions"], {"tow.speed"}, str, lambda key: 1).axes[0]
+    low, high = axes.get_ylim()
+    tows = [c["design"]["tow"] for c in s["conditions"]]
+    assert low < min(d["smallest"] for d in tows) < 0 < high and high > max(d["largest"] for d in tows)
+
+
+def test_a_constant_force_that_holds_back_is_no_design_value(tmp_path):
+    change = {"more": {"tow_force": np.full(SPARSE, -1234.567)}, "summary": {"n_floes": 0}}
+    s, _ = of_all(sparse(tmp_path / "a", fields=3, changes={k: change for k in range(3)}))
+    d = s["conditions"][0]["design"]
+    assert "value" not in d["tow"] and "holds the body back" in d["warnings"][0]["what"]
 
 
 def test_one_field_is_no_fields(tmp_path):

@@ -171,7 +171,7 @@ def exceedance(fields, gap):
 
 
 def summary(fields):
-    """Mean, standard deviation, quantiles and largest value, with intervals over fields."""
+    """Mean, standard deviation, quantiles, largest and smallest value, with intervals over fields."""
     samples = [f["peak"] for f in fields]
     means, least = np.array([x.mean() for x in samples]), least_of(samples)
     return {
@@ -180,7 +180,8 @@ def summary(fields):
         "sd": over_fields(lambda x: float(np.std(x, ddof=1)) if np.ptp(x) > stat_extreme.tie(x) else 0.0,
                           samples, 0.0, LOG),
         "quantiles": {str(q): over_fields(lambda x, q=q: float(np.percentile(x, q)), samples, least)
-                      for q in QUANTILES}, "largest": max(x.max() for x in samples)
+                      for q in QUANTILES}, "largest": max(x.max() for x in samples),
+        "smallest": min(x.min() for x in samples)
     }
 
 
