@@ -290,7 +290,7 @@ static void clear_resistance_if_untowed(bt_summary *summary, const bt_case *inpu
             input->tow.direction * 180 / BT_PI);
 }
 
-/// A line cannot push, and the largest of negative forces is the smallest load: neither peak nor mean is that of a pull.
+/// A line cannot push, and the largest of negative forces is the smallest load: neither mean nor peak is a pull.
 static void warn_if_held_back(bt_summary *summary, const bt_history *history)
 {
     if (!(summary->tow.mean < 0)) return;

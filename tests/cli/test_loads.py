@@ -29,7 +29,7 @@ from bergtow.stats import design_value as statement_module
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.study import answer
-from bergtow.table import quantity
+from bergtow.table import number, quantity
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
 
@@ -114,6 +114,46 @@ def test_intervals_over_fields_are_the_jackknife():
     assert found["value"] == 2 and found["interval_95"] == pytest.approx(2 * np.exp(
         np.array([-1, 1]) * stats.t.ppf(0.975, 4) * np.sqrt(4 / 5 * np.sum((logs - logs.mean()) ** 2))))
     assert np.isnan(stat_load.over_fields(np.mean, samples[:1])["interval_95"]).all()
+
+
+def test_fields_weigh_alike_whatever_their_length():
+    """As in the mean. Red: a median of 30 N of four fields about 10 N and one about 30 N that is 20 times as long."""
+    rng = np.random.default_rng(6)
+    lengths, levels = (300, 300, 300, 300, 6000), (10.0, 10.0, 10.0, 10.0, 30.0)
+    fields = [{"time": np.arange(1.0, n + 1), "peak": rng.normal(a, 1, n), "hours": n / 3600} for n, a in zip(
+        lengths, levels)]
+    alike = [{"peak": np.repeat(f["peak"], 6000 // len(f["peak"]))} for f in fields]  # the same distributions
+    found, same = stat_load.summary(fields), stat_load.summary(alike)
+    assert found["mean"]["value"] == pytest.approx(same["mean"]["value"])
+    assert found["sd"]["value"] == pytest.approx(same["sd"]["value"], rel=1e-3)
+    for q, x in found["quantiles"].items():
+        assert x["value"] == pytest.approx(same["quantiles"][q]["value"], abs=0.05), q
+    assert found["quantiles"]["50"]["value"] < 11 and found["sd"]["value"] == pytest.approx(8.06, abs=0.1)
+    middle = stat_load.exceedance(fields, 1.0)[0]
+    assert middle["share_of_time"]["value"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_fields_of_one_length_have_the_quantiles_of_numpy(monkeypatch):
+    """To the bit, and to rounding by the weighted rule, of which they are a case."""
+    rng = np.random.default_rng(7)
+    some = [rng.normal(0, 1, 50) for _ in range(3)]
+    every = np.concatenate(some)
+    def found():
+        return [*(stat_load.percentile(some, q) for q in stat_load.QUANTILES), stat_load.deviation(some)]
+    numpys = [*(np.percentile(every, q) for q in stat_load.QUANTILES), np.std(every, ddof=1)]
+    assert found() == numpys
+    monkeypatch.setattr(stat_load, "weights", lambda samples: np.full(150, 1 / 150))
+    assert found() == pytest.approx(numpys, rel=1e-12)
+
+
+def test_quantiles_and_shares_of_a_condition_weigh_fields_alike(tmp_path):
+    """Red: 83 % of the time at or below zero, of a long tow without ice beside four short ones that met some."""
+    x = [np.r_[np.zeros(30), np.full(300, 10.0)]] * 4 + [np.zeros(6000)]
+    folder = made_up.write(tmp_path / "a", [made_up.member(v + 1e-3 * k * (v > 0), {"ice.concentration": 0.5}, 0,
+                                                           start=31.0) for k, v in enumerate(x)])
+    c, = of_all(folder)[0]["conditions"]
+    assert c["samples"]["not_above_zero"] == pytest.approx(0.2)
+    assert c["samples"]["percentiles"]["50"] == pytest.approx(10, abs=0.01)
 
 
 def test_equal_counts_are_no_certainty():
@@ -747,6 +787,20 @@ def test_a_constant_force_that_holds_back_is_no_design_value(tmp_path):
     s, _ = of_all(sparse(tmp_path / "a", fields=3, changes={k: change for k in range(3)}))
     d = s["conditions"][0]["design"]
     assert "value" not in d["tow"] and "holds the body back" in d["warnings"][0]["what"]
+
+
+def test_a_column_has_the_number_of_its_name(tmp_path):
+    """In the table as in statistics.csv and .json. Red: "sd of fields" of 3.93 beside `sd_of_fields` of 0."""
+    rng = np.random.default_rng(2)
+    s, _ = of_all(made_up.write(tmp_path / "a", [made_up.member(made_up.ar1(0.9, 300, rng, 100.0, 20.0), {
+        "ice.concentration": 0.5}, 0) for _ in range(4)]))
+    c, = s["conditions"]
+    r, table = c["resistance"], ensemble_text.means(s)[0]
+    keys = {name: name.replace(" ", "_") for name in table.head if name.replace(" ", "_") in r}
+    assert {"median", "sd between"} <= keys.keys() and r["sd_of_fields"] != pytest.approx(r["sd_between"], rel=0.01)
+    for name, key in keys.items():
+        assert dict(zip(table.head, table.rows[0]))[name] == number(r[key])
+    assert r["sd_of_fields"] == pytest.approx(np.sqrt(max(r["sd_between"] ** 2 - r["se_within"] ** 2, 0)))
 
 
 def test_one_field_is_no_fields(tmp_path):

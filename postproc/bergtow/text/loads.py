@@ -54,7 +54,8 @@ def design(s):
     factor, unit = scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
     lines, held = any(c["design"]["tension"] for c in some), any(d.get("below_zero") for d in found)
     head = ["condition", f"design tow force, {unit}", "95 %", *([f"line tension, {unit}", "95 %"] if lines else []),
-            f"mean, {unit}", f"largest simulated, {unit}", *[f"smallest, {unit}"] * held, "hours simulated", "return time, h", "fields", "tail"]
+            f"mean, {unit}", f"largest simulated, {unit}", *[f"smallest, {unit}"] * held,
+            "hours simulated", "return time, h", "fields", "tail"]
     rows = []
     for c in s["conditions"]:
         d, t = c["design"]["tow"], c["design"]["tension"]
