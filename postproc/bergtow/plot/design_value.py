@@ -94,8 +94,8 @@ def draw(conditions, numeric, axis_label, times):
                   markeredgewidth=2, zorder=3, label="smallest simulated, held back")
     bounds = [k for k in there if isinstance(tows[k]["mean"], AtLeast)]
     if bounds:
-        axes.plot(x[bounds], [tows[k]["largest"] / factor for k in bounds], "^", color=style.JAM, markersize=7, zorder=5,
-                  label="largest, at least")
+        axes.plot(x[bounds], [tows[k]["largest"] / factor for k in bounds], "^", color=style.JAM, markersize=7,
+                  zorder=5, label="largest, at least")
     starts = [(k, tows[k]["start_up"]["largest"]) for k in there if design_value.start_exceeds(tows[k])]
     if starts:
         axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,

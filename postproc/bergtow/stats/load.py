@@ -18,8 +18,8 @@ applied to the logarithm of standard deviations and rates and to the logit of sh
 intervals extend to impossible values. If a load is never negative, the intervals of its mean and quantiles end at 0.
 All fields weigh alike, however long: a sample weighs 1 / the length of its field. Windows differ where lines part, and
 a long one would outvote the others in a quantile but not in the mean. Rates and return levels are numbers of events in
-all hours. Extremes: stats/extreme.py, from all samples, where clusters are separated by two correlation times of the filtered
-signal, or at least S.
+all hours. Extremes: stats/extreme.py, from all samples, where clusters are separated by two correlation times of the
+filtered signal, or at least S.
 """
 import numpy as np
 import scipy
