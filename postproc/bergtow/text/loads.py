@@ -122,8 +122,11 @@ def _governs(c):
 
 
 def warnings(s):
-    """"Problem: condition (amount); condition", each problem once."""
-    found, every = {}, len(s["conditions"])
+    """"Problem: condition (amount); condition", each problem once; that a tow holds the body back, the first problem of
+    its condition, before those of conditions with larger loads."""
+    every = len(s["conditions"])
+    found = {c["design"]["warnings"][0]["what"]: [] for c in s["conditions"]
+             if (c["design"]["tow"] or {}).get("below_zero")}
     for c in sorted(s["conditions"], key=_governs):
         for w in c["design"]["warnings"]:
             found.setdefault(w["what"], []).append((c["label"], w["detail"]))
