@@ -65,7 +65,7 @@ def one(out, concentration, ratio, field, end, members=1):
         return None
     with contextlib.redirect_stdout(io.StringIO()):
         return bergtow.route(case(out), folder, to=((2 + WAY) * WIDTH, 0), members=members, routes=2, no_page=True,
-                             set=settings(concentration, ratio, field), force=True)
+                             set=settings(concentration, ratio, field), replace=True)
 
 
 def row(concentration, ratio, some):

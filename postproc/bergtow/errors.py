@@ -2,6 +2,7 @@
 """Exit codes and exceptions: one table and one hierarchy for the library, the functions and the commands."""
 from __future__ import annotations
 
+import copyreg
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,10 @@ class BergtowError(Exception):
     def __init__(self, text: str, status: int = USAGE) -> None:
         super().__init__(text)
         self.status = status
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # not by the constructors, whose arguments are not kept: a Pool hangs on an exception that it cannot load
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
 class CaseError(BergtowError, ValueError):

@@ -35,14 +35,23 @@ def _folder(of: Of) -> str:
 
 #: options that a command line repeats, instead of giving several values to one
 _REPEATED = ("exclude", "also", "of", "no_go")
+#: options of the commands that the functions set themselves, and what to use instead. A second value would win: over
+#: the place where a function looks for its result, and with --force over any file
+_OWN = {"output": "the place is an argument, and that of a picture one of save()",
+        "force": "use replace=True, of save() too",
+        "record": "use .record of the result", "picture": "use .picture() of the result",
+        "format": "use save() of a picture, whose file name has it", "help": "see the command's --help"}
 
 
 def _words(options: Mapping[str, Any]) -> list[str]:
     """Options as command-line words: {"time_scale": 10, "linear": True, "times": [1, 2]} -> --time-scale=10 --linear
-    ..., and {"set": {"run.dt": "0.1 s"}} -> --set=run.dt=0.1 s"""
+    ..., and {"set": {"run.dt": "0.1 s"}} -> --set=run.dt=0.1 s. Raises BergtowError for those of _OWN."""
     words = []
     for name, value in options.items():
-        flag = "--" + name.rstrip("_").replace("_", "-")
+        name = name.rstrip("_")
+        if name in _OWN:
+            raise BergtowError(f"{name}: no option of this function; {_OWN[name]}")
+        flag = "--" + name.replace("_", "-")
         if value is None or value is False:
             continue
         if value is True:
@@ -56,15 +65,20 @@ def _words(options: Mapping[str, Any]) -> list[str]:
     return words
 
 
+def _forced(replace: bool) -> list[str]:
+    return ["--force"] * replace
+
+
 def _perform(command: str, *words: str | os.PathLike[str]) -> None:
     from . import cli  # imported here because cli needs the functions of this module
     from .cli import missing_packages
+    from .cli.command import of_system
     try:
         cli.perform(command, *words)
     except ModuleNotFoundError as error:
         raise BergtowError(missing_packages.message(error), IO) from None
     except OSError as error:
-        raise BergtowError(str(error), IO) from None
+        raise BergtowError(of_system(error), IO) from None
 
 
 def _call(command: str, *words: str | os.PathLike[str]) -> str:
@@ -171,7 +185,7 @@ def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool 
     .pdf; by default report.html in the folder. replace: overwrite a file even if it is not a report of bergtow.
     options: those of bergtow report, such as client="...", size=20."""
     path = Path(file) if file is not None else Path(_folder(of)) / "report.html"
-    _call("report", _folder(of), "-o", path, *(["--force"] if replace else []), *_words(options))
+    _call("report", _folder(of), "-o", path, *_forced(replace), *_words(options))
     return path
 
 
@@ -219,7 +233,7 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
     words = _words(known)
     with tempfile.TemporaryDirectory() as there:
         record = Path(there) / "record.json"
-        text = _call("outlines", map, "-o", file, "--record", record, *(["--force"] if replace else []), *words)
+        text = _call("outlines", map, "-o", file, "--record", record, *_forced(replace), *words)
         text = text.replace(f"{record}\n", "")
         return Outlines(map, file, json.loads(record.read_text(encoding="utf-8")), text, words)
 
@@ -228,31 +242,34 @@ def export(run: Of, file: str | os.PathLike[str], *, replace: bool = False, **op
     """Write floes, tracks and loads of a run for use on a map, and return the file's path. run: a folder or Result.
     file: .gpkg, .geojson or .shp (all but .geojson need GDAL), or .csv or .nc for trajectories. options: those of
     `bergtow export`, such as time=600, layer="tracks", start="2027-03-01"."""
-    _call("export", _folder(run), "-o", file, *(["--force"] if replace else []), *_words(options))
+    _call("export", _folder(run), "-o", file, *_forced(replace), *_words(options))
     return Path(file)
 
 
-def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[str],
-           options: Mapping[str, Any]) -> dict[str, Any]:
-    _perform(command, file, "-o", out, *_words(options))
-    return json.loads((Path(out) / f"{command}.json").read_text(encoding="utf-8"))
+def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[str], replace: bool,
+           options: Mapping[str, Any], name: str | None = None) -> dict[str, Any]:
+    _perform(command, file, "-o", out, *_forced(replace), *_words(options))
+    return json.loads((Path(out) / f"{name or command}.json").read_text(encoding="utf-8"))
 
 
-def converge(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+def converge(case: str | os.PathLike[str], out: str | os.PathLike[str], *, replace: bool = False,
+             **options: Any) -> dict[str, Any]:
     """How a result depends on the numerical settings, as the dictionary in OUT/converge.json. options: those of
     `bergtow converge`, such as budget=10, vary="width,dt", set={"tow.speed": 0.5}."""
-    return _found("converge", case, out, options)
+    return _found("converge", case, out, replace, options)
 
 
-def budget(study: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+def budget(study: str | os.PathLike[str], out: str | os.PathLike[str], *, replace: bool = False,
+           **options: Any) -> dict[str, Any]:
     """The uncertainty budget of a study, as the dictionary in OUT/budget.json. options: those of `bergtow budget`."""
-    return _found("budget", study, out, options)
+    return _found("budget", study, out, replace, options)
 
 
-def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+def capability(case: str | os.PathLike[str], out: str | os.PathLike[str], *, replace: bool = False,
+               **options: Any) -> dict[str, Any]:
     """How fast a vessel can tow in which ice, and which ice stops it, as the dictionary in OUT/capability.json.
     options: those of `bergtow capability`; `from_` and `to` give its range."""
-    return _found("capability", case, out, options)
+    return _found("capability", case, out, replace, options)
 
 
 def _place(value: Any) -> str:
@@ -263,7 +280,8 @@ def _place(value: Any) -> str:
                                                                for v in value)
 
 
-def route(case: str | os.PathLike[str], out: str | os.PathLike[str], *, to: Any, **options: Any) -> dict[str, Any]:
+def route(case: str | os.PathLike[str], out: str | os.PathLike[str], *, to: Any, replace: bool = False,
+          **options: Any) -> dict[str, Any]:
     """The route and speed of a tow through known ice, as the dictionary in OUT/route.json. to: the goal, as (x, y) in
     m, as the two end points of a line, or as text for `bergtow route`, "20.1E,76.5N". options: those of `bergtow
     route`, such as from_=(0, 0), no_go=["land.geojson"], members=1, plan_only=True."""
@@ -271,12 +289,12 @@ def route(case: str | os.PathLike[str], out: str | os.PathLike[str], *, to: Any,
     speeds = options.get("speeds")
     if isinstance(speeds, (list, tuple)):
         options["speeds"] = ",".join(map(str, speeds))
-    return _found("route", case, out, places | options)
+    return _found("route", case, out, replace, places | options)
 
 
-def design(case: str | os.PathLike[str], out: str | os.PathLike[str], **options: Any) -> dict[str, Any]:
+def design(case: str | os.PathLike[str], out: str | os.PathLike[str], *, replace: bool = False,
+           **options: Any) -> dict[str, Any]:
     """The requirements of a tow: tow force with interval or a named fall-back, load cases, ramp, vessel, line, speeds,
     as the dictionary in OUT/answer.json; OUT/report.html presents it. options: those of `bergtow design`, such as
     budget=14, vessel="110 t", speeds="0.8 kn,1.3 kn", no_pdf=True."""
-    _perform("design", case, "-o", out, *_words(options))
-    return json.loads((Path(out) / "answer.json").read_text(encoding="utf-8"))
+    return _found("design", case, out, replace, options, "answer")

@@ -17,6 +17,7 @@
     ROW(NOT_STEADY, "not_steady", "", "the tow is not steady over the window")                                         \
     ROW(TOO_SHORT, "too_short", "", "the window is too short for its means")                                           \
     ROW(NO_TOW, "no_tow", "direction_deg", "nothing tows the body")                                                    \
+    ROW(HELD_BACK, "held_back", "mean_n least_n", "the tow holds the body back, which is carried along faster")        \
     ROW(BODY_BALANCE, "body_balance", "- relative", "the momentum balance of the body does not close")                 \
     ROW(ICE_BALANCE, "ice_balance", "relative", "the momentum balance of ice and walls does not close")                \
     ROW(MOMENTUM, "momentum", "relative", "a step does not conserve momentum")                                         \

@@ -290,6 +290,20 @@ static void clear_resistance_if_untowed(bt_summary *summary, const bt_case *inpu
             input->tow.direction * 180 / BT_PI);
 }
 
+/// A line cannot push, and the largest of negative forces is the smallest load: neither mean nor peak is a pull.
+static void warn_if_held_back(bt_summary *summary, const bt_history *history)
+{
+    if (!(summary->tow.mean < 0)) return;
+    const double *tow = history->column[BT_COL_TOW] + summary->window.first;
+    double least = summary->tow.mean;
+    for (int64_t i = 0; i < summary->window.n; i++) least = tow[i] < least ? tow[i] : least; // of no NaN
+    bt_warn(&summary->warnings, BT_WARN_HELD_BACK,
+            "the mean tow force is %.3g N, and down to %.3g N in a step: current, wind or inertia carries the body "
+            "faster than the tow, which holds it back; the peak of the tow force is the moment of least load, and no "
+            "pull of a vessel follows from it",
+            summary->tow.mean, least);
+}
+
 /// Conditions of the estimates over the window as ordered by the case: mean speed and course of the programme there.
 /// The estimate reports a turn within the window, also of the body. tow: velocity ordered over ground, m/s.
 static void order_window(bt_summary *summary, const bt_history *history, const bt_case *input, double tow[2])
@@ -377,6 +391,7 @@ void bt_summary_make(bt_summary *summary, const bt_history *history, const bt_ca
     if (body) {
         reduce_window(summary, history);
         clear_resistance_if_untowed(summary, input);
+        warn_if_held_back(summary, history);
         warn_of_window(summary, input, totals);
         summary->reference_ratio = summary->ice.mean / input->reference.mean_force;
         double tow[2];

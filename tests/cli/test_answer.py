@@ -602,17 +602,16 @@ def test_a_tail_that_nothing_bounds_is_no_value(tmp_path):
 
 
 @pytest.mark.parametrize("kind, add, mean", [("normal", -33.0, 0.0), ("exponential", -80.0, 10.0)])
-def test_a_level_close_to_zero_has_the_marks_of_the_same_load_without_mean(tmp_path, kind, add, mean):
+def test_a_level_close_to_zero_has_the_bounds_of_the_same_load_without_mean(tmp_path, kind, add, mean):
     """Red: no bound, since the interval reaches to many times a level that happens to be close to zero."""
     def found(add):
         e = ensemble(tmp_path / f"{add}", lambda rng: add + 10 * getattr(rng, kind)(size=600), n=6)
         [c] = e.conditions()
         o = answer.options(time_scale=1.0)
         s = stat_conditions.condition(e, c, {m: stat_conditions.member(e, m) for m in c.finished}, o)
-        ends = [np.isfinite(level["level_95"]).tolist() for kind in stat_loads.TAILS
+        # no design value, with marks and warnings, is that of a mean below zero
+        return [np.isfinite(level["level_95"]).tolist() for kind in stat_loads.TAILS
                 for level in s["loads"]["tow_force"][kind]["levels"]]
-        tow = s["design"]["tow"]
-        return ends, "value" in tow and report_ensemble.marks(tow), [w["what"] for w in s["design"]["warnings"]]
     assert found(add) == found(-mean)
 
 
@@ -718,7 +717,7 @@ def test_a_body_that_the_current_carries_faster_is_not_towed():
         assert "must be held back" in words.sentence(found) and part["rows"] == ["steady.1"]
         assert "held back" in words.written(words.speeds(found))
     assert held_back_answer(2.8e5, 3e5, [2.9e5, 3.1e5])["feasible"]["verdict"] == "yes"
-    row = {"mean": {"n": 0.0}, "speed_m_s": 0.0}
+    row = {"mean": {"n": 0.0}, "speed_m_s": 0.0, "value": {}}
     assert not answer.held_back(row) and answer.held_back(row | {"speed_m_s": 0.5})  # at rest; on a slack line
     assert np.isnan(load_cases.taut_stop(tow(water=-5e5)))
 

@@ -156,7 +156,7 @@ def test_layers_of_the_series_need_no_frames(tmp_path):
     for layer, features in ("tracks", 2), ("loads", 60):
         texts = []
         for there in whole, bare:
-            bergtow.export(there, tmp_path / "map.geojson", layer=layer, force=True)
+            bergtow.export(there, tmp_path / "map.geojson", layer=layer, replace=True)
             texts.append((tmp_path / "map.geojson").read_text())
         assert texts[0] == texts[1] and len(json.loads(texts[1])["features"]) == features
     for words in ("--layer", "floes"), ("--layer", "loads", "--time", "10"):
@@ -178,7 +178,7 @@ def test_time_zero_is_the_first_frame(tmp_path):
     """Red: the last one."""
     there, placed = towed(tmp_path), []
     for time in (0, 30):
-        bergtow.export(there, tmp_path / "map.geojson", layer="bodies", time=time, force=True)
+        bergtow.export(there, tmp_path / "map.geojson", layer="bodies", time=time, replace=True)
         placed.append(json.loads((tmp_path / "map.geojson").read_text())["features"][0]["geometry"])
     assert placed[0] != placed[1]
 
@@ -280,7 +280,7 @@ def test_fixed_floes_are_told_and_do_not_come_back_adrift(tmp_path):
     with Run(there) as r:
         still = [i for i in range(r.n_floes) if np.array_equal(r.pose(0)[i, :2], (40, 40))]
         assert np.flatnonzero(r.fixed).tolist() == still and len(still) == 1
-    bergtow.export(there, tmp_path / "map.geojson", force=True)
+    bergtow.export(there, tmp_path / "map.geojson", replace=True)
     bergtow.export(there, tmp_path / "after.gpkg")
     found = {f["properties"]["id"]: f["properties"]["fixed"] for f in
              json.loads((tmp_path / "map.geojson").read_text())["features"]}
@@ -316,7 +316,7 @@ def test_the_towing_end_is_that_of_the_frames(tmp_path, mode, name):
         f["frames/line_points"][:, 1] = f["frames/line_points"][:, 0]
         same = sorted(set(f["frames/time"][:]) & set(f["series/time"][:]))
         f["series/time"][0] = f["frames/time"][3]
-    bergtow.export(there, tmp_path / "drift.csv", force=True)
+    bergtow.export(there, tmp_path / "drift.csv", replace=True)
     assert same == [30] and list(way()) == [7.5, 30]
 
 

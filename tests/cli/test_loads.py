@@ -13,6 +13,7 @@ import made_up_ensemble as made_up
 from harness import script
 from signals_known import AR1, EAR1, POISSON, UNLIKE, coverage, fields_of
 
+from bergtow.plot import design_value as plot_design
 from bergtow.plot import ensemble as plot_ensemble
 from bergtow.plot import loads as plot_loads
 from bergtow.reporting import ensemble as report_ensemble
@@ -28,6 +29,7 @@ from bergtow.stats import design_value as statement_module
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.study import answer
+from bergtow.table import number, quantity
 from bergtow.text import ensemble as ensemble_text
 from bergtow.text import loads as loads_text
 
@@ -112,6 +114,46 @@ def test_intervals_over_fields_are_the_jackknife():
     assert found["value"] == 2 and found["interval_95"] == pytest.approx(2 * np.exp(
         np.array([-1, 1]) * stats.t.ppf(0.975, 4) * np.sqrt(4 / 5 * np.sum((logs - logs.mean()) ** 2))))
     assert np.isnan(stat_load.over_fields(np.mean, samples[:1])["interval_95"]).all()
+
+
+def test_fields_weigh_alike_whatever_their_length():
+    """As in the mean. Red: a median of 30 N of four fields about 10 N and one about 30 N that is 20 times as long."""
+    rng = np.random.default_rng(6)
+    lengths, levels = (300, 300, 300, 300, 6000), (10.0, 10.0, 10.0, 10.0, 30.0)
+    fields = [{"time": np.arange(1.0, n + 1), "peak": rng.normal(a, 1, n), "hours": n / 3600} for n, a in zip(
+        lengths, levels)]
+    alike = [{"peak": np.repeat(f["peak"], 6000 // len(f["peak"]))} for f in fields]  # the same distributions
+    found, same = stat_load.summary(fields), stat_load.summary(alike)
+    assert found["mean"]["value"] == pytest.approx(same["mean"]["value"])
+    assert found["sd"]["value"] == pytest.approx(same["sd"]["value"], rel=1e-3)
+    for q, x in found["quantiles"].items():
+        assert x["value"] == pytest.approx(same["quantiles"][q]["value"], abs=0.05), q
+    assert found["quantiles"]["50"]["value"] < 11 and found["sd"]["value"] == pytest.approx(8.06, abs=0.1)
+    middle = stat_load.exceedance(fields, 1.0)[0]
+    assert middle["share_of_time"]["value"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_fields_of_one_length_have_the_quantiles_of_numpy(monkeypatch):
+    """To the bit, and to rounding by the weighted rule, of which they are a case."""
+    rng = np.random.default_rng(7)
+    some = [rng.normal(0, 1, 50) for _ in range(3)]
+    every = np.concatenate(some)
+    def found():
+        return [*(stat_load.percentile(some, q) for q in stat_load.QUANTILES), stat_load.deviation(some)]
+    numpys = [*(np.percentile(every, q) for q in stat_load.QUANTILES), np.std(every, ddof=1)]
+    assert found() == numpys
+    monkeypatch.setattr(stat_load, "weights", lambda samples: np.full(150, 1 / 150))
+    assert found() == pytest.approx(numpys, rel=1e-12)
+
+
+def test_quantiles_and_shares_of_a_condition_weigh_fields_alike(tmp_path):
+    """Red: 83 % of the time at or below zero, of a long tow without ice beside four short ones that met some."""
+    x = [np.r_[np.zeros(30), np.full(300, 10.0)]] * 4 + [np.zeros(6000)]
+    folder = made_up.write(tmp_path / "a", [made_up.member(v + 1e-3 * k * (v > 0), {"ice.concentration": 0.5}, 0,
+                                                           start=31.0) for k, v in enumerate(x)])
+    c, = of_all(folder)[0]["conditions"]
+    assert c["samples"]["not_above_zero"] == pytest.approx(0.2)
+    assert c["samples"]["percentiles"]["50"] == pytest.approx(10, abs=0.01)
 
 
 def test_equal_counts_are_no_certainty():
@@ -680,12 +722,87 @@ def test_a_constant_tow_force_is_its_own_design_value_in_open_water(tmp_path, fl
     s, text = of_all(sparse(tmp_path / "a", fields=3, changes={k: change for k in range(3)}))
     c, = s["conditions"]
     row = report_ensemble.design_row(c)
-    assert [row[1], row[2], *row[5:7]] == cells and row[7] == "5.00 kN"
+    assert [row[1], row[2], *row[5:7]] == cells and row[8] == "5.00 kN"
     assert c["loads"]["tow_force"]["start_up"]["largest"] == pytest.approx(5000)
     assert ("No value (constant, 1230 N, in 3 fields)." in text) == bool(floes)
     assert report_ensemble.without_value(s, 0.0).startswith("No value") == bool(floes)
     value = answer.conditions(Members(tmp_path / "a"))[0]["value"]
     assert value == {"kind": "constant", "n": pytest.approx(1234.567)}
+
+
+def held_back(folder, means, fields=8):
+    """Ensemble with a condition of each mean tow force, N; its scatter is in the sense of the load, beyond the mean.
+    There is tension whichever way the line pulls, the ice pushes, and the start pulls by 10 N."""
+    rng, members = np.random.default_rng(3), []
+    for c, mean in enumerate(means):
+        for _ in range(fields):
+            x = mean + np.sign(mean) * np.maximum(made_up.ar1(0.8, 4000, rng, 0.0, 5.0), -0.5 * abs(mean))
+            x[:40] = 10.0
+            series = {"tow_force": x, "ice_resistance": x - 5, "line_tension_1": np.abs(x)}
+            members.append(made_up.member(series["ice_resistance"], {"tow.speed": 0.1 * (c + 1)}, c, start=81.0,
+                                          more=series, attributes=SERIES))
+    return made_up.write(folder, members)
+
+
+def test_a_tow_that_holds_the_body_back_has_no_design_value(tmp_path):
+    """Red: the smallest load in magnitude as the design tow force, with a narrow interval and without a word."""
+    folder = held_back(tmp_path / "a", (-20.0, 20.0))
+    s, text = of_all(folder)
+    back, pulled = s["conditions"]
+    tow = back["loads"]["tow_force"]
+    least = min(stat_load.moving_mean(x[80:], 30).min() for x in (Members(folder).series(m, "tow_force")[1]
+                                                                   for m in range(8)))
+    assert tow["smallest"] == pytest.approx(least) == back["design"]["tow"]["smallest"] < -25 < tow["largest"] < 0
+    for name in ("tow_force", "ice_resistance", "line_tension_1"):
+        assert "value" not in back["loads"][name]["design"] and "value" in pulled["loads"][name]["design"]
+    assert back["design"]["tension"] is None and pulled["design"]["tow"]["value"] > 20
+    first, *others = back["design"]["warnings"]
+    assert "holds the body back" in first["what"] and quantity(least, "N") in first["detail"]
+    assert not any("holds the body back" in w["what"] for w in pulled["design"]["warnings"])
+    assert any("the start" in w["what"] for w in others)  # it pulls, while the window holds back
+    assert "holds the body back" in loads_text.warnings(s)[0]  # before the warnings of the larger load
+    table = loads_text.design(s)[0]
+    row = dict(zip(table.head, table.rows[0]))
+    assert row["design tow force, N"] == "–" and float(row["smallest, N"]) == pytest.approx(least, rel=0.01)
+    rows = [statistics.csv_row(c, {"tow_force": "N"}) for c in s["conditions"]]
+    assert rows[0]["tow_force_smallest_n"] == tow["smallest"] and rows[0]["tow_force_design_n"] == ""
+    e = Members(folder)
+    table = next(b for b in report_ensemble.answer(e, s, [], {}) if b["kind"] == "table")
+    cells = dict(zip(table["head"], table["rows"][0]))
+    assert cells["design tow force"] == "–" and cells["smallest"] == report_ensemble.report_run.force(least)
+    found = answer.conditions(e)[0]
+    assert answer.held_back(found) and found["value"]["reason"] == "below_zero"
+
+
+@pytest.mark.parametrize("means", [(-20.0, 20.0), (-20.0, -10.0)])
+def test_the_picture_shows_what_holds_a_body_back(tmp_path, means):
+    """Red: an axis from 0 to below 0, upside down, without the largest loads."""
+    s, _ = of_all(held_back(tmp_path / "a", means, fields=4))
+    axes = plot_design.draw(s["conditions"], {"tow.speed"}, str, lambda key: 1).axes[0]
+    low, high = axes.get_ylim()
+    tows = [c["design"]["tow"] for c in s["conditions"]]
+    assert low < min(d["smallest"] for d in tows) < 0 < high and high > max(d["largest"] for d in tows)
+
+
+def test_a_constant_force_that_holds_back_is_no_design_value(tmp_path):
+    change = {"more": {"tow_force": np.full(SPARSE, -1234.567)}, "summary": {"n_floes": 0}}
+    s, _ = of_all(sparse(tmp_path / "a", fields=3, changes={k: change for k in range(3)}))
+    d = s["conditions"][0]["design"]
+    assert "value" not in d["tow"] and "holds the body back" in d["warnings"][0]["what"]
+
+
+def test_a_column_has_the_number_of_its_name(tmp_path):
+    """In the table as in statistics.csv and .json. Red: "sd of fields" of 3.93 beside `sd_of_fields` of 0."""
+    rng = np.random.default_rng(2)
+    s, _ = of_all(made_up.write(tmp_path / "a", [made_up.member(made_up.ar1(0.9, 300, rng, 100.0, 20.0), {
+        "ice.concentration": 0.5}, 0) for _ in range(4)]))
+    c, = s["conditions"]
+    r, table = c["resistance"], ensemble_text.means(s)[0]
+    keys = {name: name.replace(" ", "_") for name in table.head if name.replace(" ", "_") in r}
+    assert {"median", "sd between"} <= keys.keys() and r["sd_of_fields"] != pytest.approx(r["sd_between"], rel=0.01)
+    for name, key in keys.items():
+        assert dict(zip(table.head, table.rows[0]))[name] == number(r[key])
+    assert r["sd_of_fields"] == pytest.approx(np.sqrt(max(r["sd_between"] ** 2 - r["se_within"] ** 2, 0)))
 
 
 def test_one_field_is_no_fields(tmp_path):

@@ -6,6 +6,7 @@ import copy
 import inspect
 import json
 import math
+import multiprocessing
 import os
 import pickle
 import re
@@ -20,7 +21,7 @@ import h5py
 import numpy as np
 import pytest
 from harness import BERGTOW, IO, ROOT, call, changed, differing, heard, run, write_case
-from bergtow import cli
+from bergtow import cli, errors
 from bergtow.said import say
 from python_package import LINE, SHORT, WINDOW, bergtow, installed_by_pip, python
 
@@ -356,6 +357,39 @@ lib.bt_alloc(2**60, 8)
 
 
 # --- installation ----------------------------------------------------------------------------------------------------
+
+def _fail(kind):
+    raise {"run": lambda: errors.RunError("a folder", "is empty", "fill it", 4),
+           "refused": lambda: errors.Refused("a.yml", [errors.Message("ice.size: is -1 m", "range")], 3, ""),
+           "case": lambda: bergtow.CaseError("ice.size: is -1 m", 3),
+           "plain": lambda: bergtow.BergtowError("a text", 6)}[kind]()
+
+
+@pytest.mark.parametrize("kind", ["run", "refused", "case", "plain"])
+def test_an_exception_arrives_from_another_process(kind):
+    """Red: a Pool that waits for ever, since RunError and Refused could not be loaded."""
+    with pytest.raises(bergtow.BergtowError) as here:
+        _fail(kind)
+    with multiprocessing.get_context("fork").Pool(1) as pool, pytest.raises(bergtow.BergtowError) as there:
+        pool.apply_async(_fail, [kind]).get(timeout=20)
+    a, b = here.value, there.value
+    assert type(a) is type(b) and (str(a), vars(a)) == (str(b), vars(b))
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        again = pickle.loads(pickle.dumps(a, protocol))
+        assert type(again) is type(a) and (again.args, vars(again)) == (a.args, vars(a))
+    assert str(copy.copy(a)) == str(a)
+
+
+def test_a_folder_that_cannot_be_made_is_a_message_with_a_remedy(tmp_path):
+    """The same as of the command. Red: "[Errno 20] Not a directory: ..."."""
+    (tmp_path / "file").write_text("")
+    case = write_case(tmp_path, SHORT)
+    out = tmp_path / "file/out"
+    said = call("converge", case, "-o", out, "--budget", "0.1")
+    with pytest.raises(bergtow.BergtowError) as refused:
+        bergtow.converge(case, out, budget=0.1)
+    assert refused.value.status == said.returncode == IO and f"bergtow converge: {refused.value}\n" in said.stderr
+
 
 def test_a_missing_library_is_a_message():
     said = python("import bergtow; bergtow.Case('x.yml')", BERGTOW_LIB="/nowhere/lib.so").stderr

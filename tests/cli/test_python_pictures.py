@@ -104,6 +104,33 @@ def test_what_cannot_be_drawn_is_said(towed, tmp_path):
         bergtow.plot_force(towed).save(tmp_path / "x.gif")
 
 
+@pytest.mark.parametrize("function, place", [
+    ("plot_force", []), ("plot_ensemble", []), ("statistics", []), ("report", []), ("outlines", ["x.geojson"]),
+    ("export", ["x.gpkg"]), ("converge", ["place"])])
+def test_no_option_says_where_a_result_goes(function, place, tmp_path, monkeypatch):
+    """Refused as wrong usage before the input is looked at. Red: another's file replaced without leave, the answer of
+    an earlier call returned, or a FileNotFoundError."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.png").write_text("my own picture")
+    for name in {"output", "output_", "o", "out", "force", "help", "h", "record", "format"} - {
+            "out" if function == "converge" else ""}:
+        with pytest.raises(bergtow.BergtowError) as refused:
+            getattr(bergtow, function)("none", *place, **{name: "mine.png"})
+        assert refused.value.status == 2 and os.listdir(tmp_path) == ["mine.png"], name
+    assert (tmp_path / "mine.png").read_text() == "my own picture"
+
+
+def test_an_earlier_answer_is_kept_unless_it_is_to_be_replaced(tmp_path):
+    (tmp_path / "case.yml").write_text("ice: {}\n")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/converge.json").write_text("{}")
+    with pytest.raises(bergtow.BergtowError, match="already exists"):
+        bergtow.converge(tmp_path / "case.yml", tmp_path / "out")
+    with pytest.raises(bergtow.BergtowError) as error:  # the case is looked at then
+        bergtow.converge(tmp_path / "case.yml", tmp_path / "out", replace=True)
+    assert error.value.status == 3
+
+
 def test_the_callers_matplotlib_is_left_alone(towed):
     """Neither its backend and settings nor a module of the caller with the name of one of ours is touched, and what it
     has set is not in the picture."""

@@ -354,8 +354,8 @@ def test_each_speed_has_its_own_prediction(tmp_path):
     """That of a plan at that speed alone. Red: every speed has the force, work and faults of the best one."""
     case = write_case(tmp_path, BASIN)
     def told(speeds, **more):
-        found = bergtow.route(case, tmp_path / "out", to=(8.5, 0), plan_only=True, routes=1, speeds=speeds, force=True,
-                              **more)
+        found = bergtow.route(case, tmp_path / "out", to=(8.5, 0), plan_only=True, routes=1, speeds=speeds,
+                              replace=True, **more)
         return {r["speed"]: r for r in found["routes"] if r["kind"] == "straight"}
     both, slow, fast = told([0.1, 0.2]), told([0.1])[0.1], told([0.2])[0.2]
     for one in (slow, fast):

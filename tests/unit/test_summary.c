@@ -202,6 +202,33 @@ static void rising_ice(bt_sample *s, int i)
 static void one_wild_step(bt_sample *s, int i) { sound_tow(s, i), s->residual = i == 500 ? 0.2 : s->residual; }
 static void few_unconverged(bt_sample *s, int i) { sound_tow(s, i), s->unconverged = i > 300 && i % 50 == 0; }
 
+static void carried_along(bt_sample *s, int i)
+{
+    slow_wave(s, i);
+    s->tow_force -= 2000;
+    s->drag_force -= 2000;
+}
+
+TEST(a_body_that_the_tow_holds_back_is_reported)
+{
+    bt_case c = made_up_case();
+    bt_run_totals t = totals(600);
+    c.output.window_start = 20;
+    char *json = summary_of(&c, 600, &t, FLOES, slow_wave);
+    assert_null(strstr(json, "\"held_back\""));
+    free(json);
+    json = summary_of(&c, 600, &t, FLOES, carried_along);
+    assert_non_null(strstr(json, "\"code\": \"held_back\""));
+    assert_null(strstr(json, "\"code\": \"body_balance\""));
+    const double mean = atof(json_value(json, "mean_tow_force_n"));
+    assert_true(mean < -900 && fabs(atof(json_value(json, "peak_tow_force_n")) + 879) < 0.1);
+    double said[2];
+    const char *values = strstr(strstr(json, "\"held_back\""), "\"values\"");
+    assert_int_equal(sscanf(values, "\"values\": {\"mean_n\": %lf, \"least_n\": %lf}", said, said + 1), 2);
+    assert_true(fabs(said[0] - mean) < 1e-9 && fabs(said[1] + 1079) < 0.1);
+    free(json);
+}
+
 TEST(the_window_serves_every_series)
 {
     bt_case c = made_up_case();

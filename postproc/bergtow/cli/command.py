@@ -14,7 +14,11 @@ from bergtow.errors import IO, SIGNAL, USAGE, BergtowError
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that raises BergtowError where argparse would print a message and exit."""
+    """A parser that raises BergtowError where argparse would print a message and exit. An option has one name: by its
+    abbreviations a function would take what it refuses by name (functions.py), and a new option would change theirs."""
+
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options | {"allow_abbrev": False})
 
     def error(self, message):
         raise BergtowError(f"{message}; see {self.prog} --help", USAGE)
@@ -73,7 +77,7 @@ def guarded(name, main):
     except ModuleNotFoundError as error:
         code = _say(name, missing_packages.message(error), IO)
     except OSError as error:
-        code = _say(name, _of_system(error), IO)
+        code = _say(name, of_system(error), IO)
     except KeyboardInterrupt:
         code = _say(name, "stopped", SIGNAL)
     except SystemExit as end:
@@ -86,10 +90,10 @@ def guarded(name, main):
         sys.exit(code)
 
 
-def _of_system(error):
+def of_system(error):
     """Describe an operating-system error by its path and a remedy instead of its number."""
     if error.filename is None:
-        return error.strerror or error
+        return error.strerror or str(error)
     path = Path(os.fsdecode(error.filename))
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = next((part for part in (*reversed(path.parents), path) if part.is_file()), path)

@@ -74,11 +74,13 @@ def draw(conditions, numeric, axis_label, times):
     x, aside = _places(conditions, key)
     tensions = [c["design"]["tension"] for c in conditions]
     largest = max(d.get("value", d["largest"]) for d in tows if d)
-    factor, unit = style.scale([largest], next(d for d in tows if d)["units"])
+    held = [k for k, d in enumerate(tows) if d and d.get("below_zero")]  # their largest load is the smallest force
+    least = min([0.0, *(tows[k]["smallest"] for k in held)])
+    factor, unit = style.scale([largest, least], next(d for d in tows if d)["units"])
     figure, axes = style.subplots(figsize=(8.4, 3.9))
     figure.subplots_adjust(left=0.1, right=0.98, top=0.83, bottom=0.15 if key else 0.3)
     lines = any(t and "value" in t for t in tensions)
-    top = LIMIT * largest
+    top = LIMIT * max(largest, -least)
     _draw(axes, x - lines * aside, tows, factor, top, style.TOW, "design tow force, 95 % interval")
     if lines:
         _draw(axes, x + aside, tensions, factor, top, style.INERTIA, "design line tension, 95 % interval")
@@ -87,17 +89,21 @@ def draw(conditions, numeric, axis_label, times):
               markeredgewidth=2, zorder=3, label="largest simulated")
     axes.plot(x[there], [tows[k]["mean"] / factor for k in there], "o", color=style.ICE, markersize=5, zorder=3,
               label="mean tow force")
-    least = [k for k in there if isinstance(tows[k]["mean"], AtLeast)]
-    if least:
-        axes.plot(x[least], [tows[k]["largest"] / factor for k in least], "^", color=style.JAM, markersize=7, zorder=5,
-                  label="largest, at least")
+    if held:
+        axes.plot(x[held], [tows[k]["smallest"] / factor for k in held], "_", color=style.JAM, markersize=22,
+                  markeredgewidth=2, zorder=3, label="smallest simulated, held back")
+    bounds = [k for k in there if isinstance(tows[k]["mean"], AtLeast)]
+    if bounds:
+        axes.plot(x[bounds], [tows[k]["largest"] / factor for k in bounds], "^", color=style.JAM, markersize=7,
+                  zorder=5, label="largest, at least")
     starts = [(k, tows[k]["start_up"]["largest"]) for k in there if design_value.start_exceeds(tows[k])]
     if starts:
         axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,
                   markerfacecolor="none", zorder=3, label="in the start, in no other number")
     ends = [v for _, v in starts] + [v for d in [*tows, *tensions] if d for v in d.get("interval_95", ())
                                      if np.isfinite(v)]
-    axes.set_ylim(0, 1.08 * min(top, max([largest, *(d["largest"] for d in tows if d), *ends])) / factor)
+    high = min(top, max([largest, -0.05 * least, *(d["largest"] for d in tows if d), *ends]))
+    axes.set_ylim(1.08 * least / factor, 1.08 * high / factor)
     axes.set_ylabel(f"force ({unit})")
     axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [_label(c["label"]) for c in conditions],
                     **({} if key else {"rotation": 20 if len(x) <= FEW else 45, "ha": "right"}))

@@ -85,14 +85,15 @@ def design_row(c):
     """Cells of a condition in the answer's table."""
     tow, tension = c["design"]["tow"], c["design"]["tension"]
     if tow is None:
-        return [unbroken(c["label"]), "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
+        return [unbroken(c["label"]), "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 8]
     def cells(d):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
         value, interval = text_table.stated(d["value"], *d["interval_95"], "N", d["largest"])
         return [value + marks(d), CONSTANT if d["model"] == CONSTANT else interval]
     return [unbroken(c["label"]), *cells(tow), *cells(tension), text_table.stated(tow["mean"], *tow["mean_95"], "N")[0],
-            report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
+            report_run.force(tow["largest"]), report_run.force(tow.get("smallest")),
+            report_run.force((tow["start_up"] or {}).get("largest")),
             str(tow["fields"]), text_table.number(tow["hours"])]
 
 
@@ -102,15 +103,19 @@ def answer(e, s, cases, results, told=None):
     answer.json of bergtow design, which has vessel, line and ranges."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
-            "largest simulated", "in the start", "fields", "hours"]
+            "largest simulated", "smallest", "in the start", "fields", "hours"]
     notes = ["Largest simulated: of the same moving mean."]
-    if all(row[3] == "–" for row in rows):  # no line
-        head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
+    left_out = [3, 4] if all(row[3] == "–" for row in rows) else []  # no line
+    if any(c["design"]["tow"] and c["design"]["tow"].get("below_zero") for c in s["conditions"]):
+        notes.append("Smallest: of the same, the least force. Where the mean is below zero it is the load to bear.")
+    else:
+        left_out.append(head.index("smallest"))
     if any(c["design"]["tow"] and design_value.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
         notes.append("In the start: of the same moving mean, the largest that begins before the window, which no "
                      "other column includes.")
     else:
-        head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
+        left_out.append(head.index("in the start"))
+    head, *rows = ([cell for k, cell in enumerate(row) if k not in left_out] for row in (head, *rows))
     asked, held = loads_text.asked(s), loads_text.holds_for(s)
     figure = None if len(s["conditions"]) < 2 else report_run.picture(
         "design", "Design tow force of each condition", lambda: plot_design.draw(

@@ -31,6 +31,7 @@ def load_columns(c, names):
         column("sd", x and x["sd"]["value"])
         column("p99", x and x["quantiles"]["99"]["value"])
         column("largest", x and x["largest"])
+        column("smallest", x and x["smallest"])
         column("start_up", x and x["start_up"] and x["start_up"]["largest"])
         column("design", x and x["design"].get("value"))
         for k, end in enumerate(("low", "high")):

@@ -93,7 +93,7 @@ def _load(x, share):
     start = x["start_up"] and x["start_up"] | {"largest": _number(x["start_up"]["largest"], share)}
     return x | {"mean": known(x["mean"]), "sd": {"value": np.nan, "interval_95": NONE},
                 "quantiles": {q: known(v) for q, v in x["quantiles"].items()},
-                "largest": _number(x["largest"], share), "start_up": start,
+                "largest": _number(x["largest"], share), "smallest": _number(x["smallest"], share), "start_up": start,
                 "exceedance": [row | {k: known(row[k]) for k in ("share_of_time", "per_hour")}
                                for row in x["exceedance"]]}
 

@@ -46,8 +46,9 @@ DOUBTS = {
 }
 
 #: codes of warnings already covered by these, or that say nothing against the numbers (keys without effect, which other
-#: conditions of a study need); the grounds of a verdict are reasons, not separate warnings
-TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped", "idle"}
+#: conditions of a study need; and a body held back: without such tows the mean of the others is too large); the grounds
+#: of a verdict are reasons, not separate warnings
+TOLD = {"unconverged", "locked", "stalled", "not_steady", "too_short", "stopped", "idle", "held_back"}
 
 #: doubts that may be used to exclude members: not "met little ice", which would exclude the small means
 EXCLUDABLE = sorted(set(DOUBTS) - {"few"})

@@ -11,6 +11,7 @@ from bergtow.stats import design_value
 from bergtow.stats import drift as stat_drift
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import fit as stat_fit
+from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.stats import sensitivity as stat_sensitivity
 from bergtow.table import scale, short
@@ -40,8 +41,8 @@ def member(e, m):
 
 
 def samples(e, rows, members):
-    """Samples of the steady windows of a condition: (all of them; number of independent ones; every 2 tau-th above
-    zero, at most MAX_SAMPLES).
+    """Samples of the steady windows of a condition: (those of each field; number of independent ones; every 2 tau-th
+    above zero, at most MAX_SAMPLES).
 
     All fields are thinned equally, by the median of their tau. Thinning each field by its own tau would give it the
     weight 1/tau, and almost all weight to a field without contact, whose tau is that of a constant.
@@ -53,7 +54,7 @@ def samples(e, rows, members):
     thinned = np.concatenate([x[::stride] for x in every]) if every else np.zeros(0)
     above = thinned[thinned > 0]
     step = max(1, int(np.ceil(len(above) / MAX_SAMPLES)))
-    return np.concatenate(every) if every else np.zeros(0), len(thinned), above[::step]
+    return every, len(thinned), above[::step]
 
 
 def estimates(e, rows, mean):
@@ -123,9 +124,9 @@ def condition(e, c, members, options):
     rows = c.finished
     means, errors = (np.array([members[m][key] for m in rows]) for key in ("mean", "se_within"))
     fields = stat_mean.between_fields(means, errors, options.error)
-    pooled, independent, values = samples(e, rows, members)
-    none = np.mean(pooled <= 0) if len(pooled) else np.nan
-    quantiles = {str(p): np.percentile(pooled, p) for p in (5, 25, 50, 75, 95, 99)} if len(pooled) else {}
+    every, independent, values = samples(e, rows, members)
+    none = np.mean([np.mean(x <= 0) for x in every]) if every else np.nan
+    quantiles = {str(p): stat_load.percentile(every, p) for p in stat_load.QUANTILES} if every else {}
     gathered, left_out = loads.gather(e, rows, options)
     out = {
         "index": c.index, "label": c.label, "values": c.values, "units": c.units, "members": {

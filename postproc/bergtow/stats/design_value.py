@@ -6,7 +6,8 @@ tow of stated length, its interval over fields, where it holds, and warnings.
 
 Warnings are facts about the model or the sample that an interval does not cover: rigid floes without a largest force, a
 domain that is too narrow, windows that are not steady, a tail extrapolated far, a line that parted, a start-up (not
-included in any number) with a load above the value, fields that are not alike.
+included in any number) with a load above the value, fields that are not alike. First of all stands that the tow holds
+the body back.
 """
 from dataclasses import dataclass
 
@@ -173,8 +174,8 @@ def _of_the_sample(e, rows, c, load):
     if load["step_mean"]:
         out.append(("the time scale is not above the time step: a step mean is not a peak",
                     f"{load['time_scale_s']:g} s"))
-    if "refused" in d:
-        return out + [("no value", d["refused"])]
+    if "refused" in d:  # that the tow holds the body back has a warning of its own, the first
+        return out + [("no value", d["refused"])] * (not d.get("below_zero"))
     out += _of_unlike_fields(load)
     hours, simulated = d["tow_hours"], np.nanmax(_numbers(e, "sim_time_s", rows), initial=0.0) / 3600
     needed = np.nanmax(_numbers(e, "domain_body_widths_needed", rows), initial=0.0)
@@ -207,9 +208,10 @@ def _of_unlike_fields(load):
 
 
 def start_exceeds(d):
-    """Does the start-up exceed the design value or, without one, the largest value of the window?"""
+    """Does the start-up exceed the design value or, without one, the largest value of the window? Below zero neither is
+    the more to bear."""
     return d["start_up"] is not None and bool(
-        stat_extreme.exceeds(d["start_up"]["largest"], d.get("value", d["largest"])))
+        stat_extreme.exceeds(d["start_up"]["largest"], max(d.get("value", d["largest"]), 0.0)))
 
 
 def _of_the_start(case, load):
@@ -334,11 +336,15 @@ def statement(e, rows, c):
         warned = [("means, peaks and quantiles are at least those given, and there is no design value, since nothing "
                    "bounds some loads: let ice give way (ice.rafting.kappa, ice.crushing.pressure)",
                    c["without_bound"]["words"])] + warned
+    if tow and loads.held_back(tow["mean"]["value"]):
+        warned = [("the tow holds the body back: current, wind or inertia carries it faster than the tow, so there is "
+                   "no design value of tow, line or vessel, and the load to hold it is the smallest tow force",
+                   f"down to {quantity(tow['smallest'], tow['units'])}")] + warned
     return {
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
                         "mean_95": tow["mean"]["interval_95"],
-                        "largest": tow["largest"], "start_up": tow["start_up"]},
+                        "largest": tow["largest"], "smallest": tow["smallest"], "start_up": tow["start_up"]},
         "speed": speed_made_good(e, rows),
         "tension": worst and {**worst[0], "label": worst[1]["label"], "largest": worst[1]["largest"],
                               "mean": worst[1]["mean"]["value"]},

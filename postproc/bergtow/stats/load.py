@@ -12,12 +12,14 @@ the window, so it contains nothing of the start-up. All earlier moving means cou
 extend from before the window into it: a peak across the start of the window is in one of the two.
 
 Fields are independent, samples within a field are not. Means: Student's t over the means of fields. Standard deviation,
-quantiles and rates of all samples together: the jackknife over fields, value +- t se with
+quantiles and shares of time of all samples, and rates: the jackknife over fields, value +- t se with
     se^2 = (n - 1)/n sum (v_i - v)^2,      v_i the number without field i      [Efron & Tibshirani 1993, ch. 11]
 applied to the logarithm of standard deviations and rates and to the logit of shares, because with few fields symmetric
 intervals extend to impossible values. If a load is never negative, the intervals of its mean and quantiles end at 0.
-Extremes: stats/extreme.py, from all samples, where clusters are separated by two correlation times of the filtered
-signal, or at least S.
+All fields weigh alike, however long: a sample weighs 1 / the length of its field. Windows differ where lines part, and
+a long one would outvote the others in a quantile but not in the mean. Rates and return levels are numbers of events in
+all hours. Extremes: stats/extreme.py, from all samples, where clusters are separated by two correlation times of the
+filtered signal, or at least S.
 """
 import numpy as np
 import scipy
@@ -108,11 +110,40 @@ def jackknife(value, without, low=-np.inf, high=np.inf, scale=None, level=stat_m
     return tuple(float(np.clip(back(there(value) + k * half), low, high)) for k in (-1, 1))
 
 
+def weights(samples):
+    """The weight of each sample of all fields together, 1 in all; None if fields are equally long. samples: [fields] of
+    arrays, as below."""
+    lengths = np.array([len(x) for x in samples])
+    return None if np.ptp(lengths) == 0 else np.repeat(1 / (len(samples) * lengths), lengths)
+
+
+def percentile(samples, q):
+    """The quantile q, %, of all fields together. Linear between samples, each in the middle of its weight, from the
+    first to the last: with equal weights numpy's percentile, which is faster."""
+    x, w = np.concatenate(samples), weights(samples)
+    if w is None:
+        return float(np.percentile(x, q))
+    order = np.argsort(x)
+    x, w = x[order], w[order]
+    middle = np.cumsum(w) - w / 2
+    return float(np.interp(q / 100, (middle - middle[0]) / (middle[-1] - middle[0]), x))
+
+
+def deviation(samples):
+    """Standard deviation of all fields together, unbiased for independent samples."""
+    x, w = np.concatenate(samples), weights(samples)
+    if np.ptp(x) <= stat_extreme.tie(x):  # rounding is no scatter
+        return 0.0
+    if w is None:
+        return float(np.std(x, ddof=1))
+    return float(np.sqrt(w @ (x - w @ x) ** 2 / (1 - w @ w)))
+
+
 def over_fields(statistic, samples, low=-np.inf, scale=None):
-    """A statistic of the samples of all fields together, with its interval. samples: [fields] of arrays."""
-    without = [statistic(np.concatenate(samples[:i] + samples[i + 1:])) for i in range(len(samples))
+    """A statistic of the samples of all fields together, with its interval."""
+    without = [statistic(samples[:i] + samples[i + 1:]) for i in range(len(samples))
                ] if len(samples) > 1 else [np.nan]
-    value = statistic(np.concatenate(samples))
+    value = statistic(samples)
     return {"value": value, "interval_95": jackknife(value, without, low, np.inf, scale)}
 
 
@@ -158,29 +189,28 @@ def exceedance(fields, gap):
     constant signal."""
     if constant(fields):
         return []
-    every, out = np.concatenate([f["peak"] for f in fields]), []
-    for level in np.linspace(np.median(every), every.max(), LEVELS + 1)[:-1]:
-        above = [np.sum(stat_extreme.exceeds(f["peak"], level)) for f in fields]
+    samples, out = [f["peak"] for f in fields], []
+    for level in np.linspace(percentile(samples, 50), max(x.max() for x in samples), LEVELS + 1)[:-1]:
+        above = [np.mean(stat_extreme.exceeds(x, level)) for x in samples]
         clusters = [len(stat_extreme.clusters(f["time"], f["peak"], level, gap)) for f in fields]
         out.append({
             "level": level,
-            "share_of_time": ratio_over_fields(above, [len(f["peak"]) for f in fields], 1.0, LOGIT, sum(clusters)),
+            "share_of_time": ratio_over_fields(above, np.ones(len(fields)), 1.0, LOGIT, sum(clusters)),
             "per_hour": ratio_over_fields(clusters, [f["hours"] for f in fields])
         })
     return out
 
 
 def summary(fields):
-    """Mean, standard deviation, quantiles and largest value, with intervals over fields."""
+    """Mean, standard deviation, quantiles, largest and smallest value, with intervals over fields."""
     samples = [f["peak"] for f in fields]
     means, least = np.array([x.mean() for x in samples]), least_of(samples)
     return {
         "mean": {"value": means.mean(), "interval_95": mean_over_fields(means, least)},
-        # rounding is no scatter
-        "sd": over_fields(lambda x: float(np.std(x, ddof=1)) if np.ptp(x) > stat_extreme.tie(x) else 0.0,
-                          samples, 0.0, LOG),
-        "quantiles": {str(q): over_fields(lambda x, q=q: float(np.percentile(x, q)), samples, least)
-                      for q in QUANTILES}, "largest": max(x.max() for x in samples)
+        "sd": over_fields(deviation, samples, 0.0, LOG),
+        "quantiles": {str(q): over_fields(lambda some, q=q: percentile(some, q), samples, least) for q in QUANTILES},
+        "largest": max(x.max() for x in samples),
+        "smallest": min(x.min() for x in samples)
     }
 
 

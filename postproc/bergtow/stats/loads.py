@@ -13,6 +13,11 @@ there is no tow, and its zeros would enter every number. Neither tow force nor t
 branches, and every load ends at its largest. So if a line parted in any tow there is no tail, and no design value.
 Rejected: a lower bound, which would take the place of a design value but be below the breaking load.
 
+A body that is held back, since current, wind or inertia carries it faster than the tow. The level that a force below
+zero seldom exceeds is its smallest magnitude, the moment of least load: no design value. Nor is there one of line and
+vessel, which cannot push. Rejected: the level of the force with its sign turned, since a tow that holds by a line from
+behind is another tow than the simulated one.
+
 Time scale. 30 s by default: a bollard pull trial averages its readings over this time for the largest static pull,
 while the continuous pull, used to choose a towing vessel, is a mean over 10 min [IMO 1998, MSC/Circ.884, Guidelines for
 safe ocean towing]. So the vessel must hold a tow force of 30 s by thrust and not by its inertia. Shorter loads reach
@@ -181,6 +186,19 @@ def gather(e, rows, options):
     return found, why
 
 
+def held_back(mean):
+    """Does the tow hold the body back, by its mean force?"""
+    return mean < 0
+
+
+def _below_zero(load, mean, tow):
+    """Why a load has no design value, "" if the signs of the mean load and the mean tow force, NaN if unknown, allow
+    one."""
+    if held_back(tow) and (load.needs or load.name == ALWAYS[0]):
+        return "the tow holds the body back"
+    return "its mean is below zero, so the level that it seldom exceeds is its least" if mean < 0 else ""
+
+
 def _of_a_constant(value, hours, total):
     """The design value of a load that nothing makes vary: itself, and there is no tail to extrapolate."""
     return {"value": value, "interval_95": (value, value), "model": CONSTANT, "return_hours": hours,
@@ -210,6 +228,7 @@ def statistics(e, rows, options, gathered=None):
     gathered = gather(e, rows, options)[0] if gathered is None else gathered
     tow_hours = options.tow_hours or TOW_HOURS / scaling(e, rows)
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
+    means = {name: np.mean([f["peak"].mean() for f in fields]) for name, (_, fields, _) in gathered.items()}
     for name, (load, fields, start) in gathered.items():
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
         start_up = start and {what: start[what] for what in ("largest", "time_s")}
@@ -222,6 +241,7 @@ def statistics(e, rows, options, gathered=None):
             why = f"constant, {quantity(fields[0]['peak'][0], load.units)}, in {counted(len(fields), 'field')}"
         found = {kind: {"refused": why} for kind in TAILS} if why else stat_load.extremes(
             fields, gap, [*options.hours, design_hours], options.resamples)
+        below = _below_zero(load, means[name], means.get(ALWAYS[0], np.nan))
         out[name] = {
             "label": load.label, "units": load.units, "description": load.description, "needs": load.needs,
             "conversion": load.conversion,
@@ -233,7 +253,8 @@ def statistics(e, rows, options, gathered=None):
             "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
                 "probability": options.probability, "tow_hours": tow_hours,
-                **(_of_a_constant(fields[0]["peak"][0], design_hours, total) if itself else
+                **({"refused": below, "below_zero": True, "return_hours": design_hours} if below else
+                   _of_a_constant(fields[0]["peak"][0], design_hours, total) if itself else
                    _design(found, design_hours, total))
             }
         }

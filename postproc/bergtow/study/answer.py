@@ -133,7 +133,8 @@ def value_of(e, c, found, fields, slow=False):
                 "interval_95": list(d["interval_95"]), "model": d["model"],
                 "irregular": d["irregular"], "times_the_hours": d["times_the_hours_simulated"]}
     largest = stat_largest.largest_of([f["peak"].max() for f in fields], [f["hours"] for f in fields])
-    return {"kind": "largest_of_n", **largest, "reason": "unbounded_tail" if d.get("unbounded") else "no_tail"}
+    return {"kind": "largest_of_n", **largest, "reason": "below_zero" if d.get("below_zero") else
+            "unbounded_tail" if d.get("unbounded") else "no_tail"}
 
 
 def windy(case):
@@ -236,10 +237,11 @@ def tow_of(e, row, line, vessel):
 
 
 def held_back(row):
-    """Do current and wind carry the body faster than the tow? A line cannot push, so nothing follows for vessel and
-    line. A body at rest that nothing moves also has a mean of zero."""
+    """Do current and wind carry the body faster than the tow, or as fast? A line cannot push, so nothing follows for
+    vessel and line. A body at rest that nothing moves also has a mean of zero. The mean of the statistics, which is
+    without the window's first time scale, may be below zero alone."""
     mean, speed = row["mean"]["n"], row["speed_m_s"]
-    return mean < 0 or mean == 0 and speed > 0
+    return stat_loads.held_back(mean) or row["value"].get("reason") == "below_zero" or mean == 0 and speed > 0
 
 
 def own_start(row, ramp):

@@ -23,6 +23,7 @@ KINDS = {"return_level": "fitted tail", "largest_of_n": "largest simulated", "at
 #: words for the code of a reason
 REASONS = {
     "no_tail": "too few peaks for a tail", "unbounded_tail": "nothing bounds the tail from above",
+    "below_zero": "the tow holds the body back",
     "no_window": "no window that is long enough", "no_member": "no run",
     "speed_not_reached": "the vessel of the case did not reach the speed",
     "line_parted": "the line parted", "no_solution": "nothing bounds the load in some steps",

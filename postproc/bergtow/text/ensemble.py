@@ -32,7 +32,7 @@ def unit_of(s):
 
 def means(s):
     factor, unit = unit_of(s)
-    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
+    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd between",
             "standard error in a run", "largest field's share", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
     rows = []
     for c in s["conditions"]:
@@ -53,7 +53,7 @@ def means(s):
                      f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
                      doubts(c)])
     note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an "
-            "eighth of the fields at each end (from 8 fields on). Sd of fields: standard deviation between the means "
+            "eighth of the fields at each end (from 8 fields on). Sd between: standard deviation between the means "
             "of runs; standard error in a run: of one run's mean, by its slowest cosine waves. Largest: share of the "
             "field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps without a solution, "
             "so that its mean and peaks are at least these, J body stood still, N window not steady, S short window, F "

@@ -52,9 +52,10 @@ def design(s):
         return [[f"No design tow force. {first}", *more]]
     found = [c["design"]["tow"] for c in some]
     factor, unit = scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
-    lines = any(c["design"]["tension"] for c in some)
+    lines, held = any(c["design"]["tension"] for c in some), any(d.get("below_zero") for d in found)
     head = ["condition", f"design tow force, {unit}", "95 %", *([f"line tension, {unit}", "95 %"] if lines else []),
-            f"mean, {unit}", f"largest simulated, {unit}", "hours simulated", "return time, h", "fields", "tail"]
+            f"mean, {unit}", f"largest simulated, {unit}", *[f"smallest, {unit}"] * held,
+            "hours simulated", "return time, h", "fields", "tail"]
     rows = []
     for c in s["conditions"]:
         d, t = c["design"]["tow"], c["design"]["tension"]
@@ -63,7 +64,8 @@ def design(s):
             continue
         tension = ([value(t, factor), ends(t, factor)] if t else ["–", "–"]) if lines else []
         rows.append([c["label"], value(d, factor), ends(d, factor), *tension, number(d["mean"] / factor),
-                     number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
+                     number(d["largest"] / factor), *[number(d["smallest"] / factor)] * held,
+                     number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
                      d.get("model", "–")])
     notes = [f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without the effects "
              f"that the warnings name. * beyond the hours simulated: extrapolated with the tail."]
@@ -120,8 +122,11 @@ def _governs(c):
 
 
 def warnings(s):
-    """"Problem: condition (amount); condition", each problem once."""
-    found, every = {}, len(s["conditions"])
+    """"Problem: condition (amount); condition", each problem once; that a tow holds the body back, the first problem of
+    its condition, before those of conditions with larger loads."""
+    every = len(s["conditions"])
+    found = {c["design"]["warnings"][0]["what"]: [] for c in s["conditions"]
+             if (c["design"]["tow"] or {}).get("below_zero")}
     for c in sorted(s["conditions"], key=_governs):
         for w in c["design"]["warnings"]:
             found.setdefault(w["what"], []).append((c["label"], w["detail"]))
@@ -166,16 +171,17 @@ def _unit(s, name):
 
 
 def signals(s):
-    """Mean, standard deviation and largest value of every load."""
-    head = ["condition", "load", "mean", "95 %", "sd", "95 %", "largest", "in the start", "unit", "over", "hours"]
+    """Mean, standard deviation, largest and smallest value of every load."""
+    head = ["condition", "load", "mean", "95 %", "sd", "95 %", "largest", "smallest", "in the start",
+            "unit", "over", "hours"]
     rows = []
     for name in names(s):
         factor, unit, first = _unit(s, name)
         def cells(x, factor=factor, unit=unit, first=first):
             start = x["start_up"]
             return [first["label"], *estimate(x["mean"], factor), *estimate(x["sd"], factor),
-                    number(x["largest"] / factor), number(start and start["largest"] / factor), unit,
-                    f"{x['time_scale_s']:.3g} s", number(x["hours"])]
+                    number(x["largest"] / factor), number(x["smallest"] / factor),
+                    number(start and start["largest"] / factor), unit, f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
     if not rows:
         return [[nothing(s), *left_out(s)]]
