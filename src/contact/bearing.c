@@ -59,7 +59,8 @@ static double outside(const bt_world *world, bt_idx i, int part, const double x[
     const double *v = bt_overlap_polygon(world, i, part, &n);
     double most = 0;
     for (int k = 0; k < n; k++) {
-        const double *from = v + 2 * k, *to = v + 2 * (k + 1 < n ? k + 1 : 0), ex = to[0] - from[0], ey = to[1] - from[1];
+        const double *from = v + 2 * k, *to = v + 2 * (k + 1 < n ? k + 1 : 0);
+        const double ex = to[0] - from[0], ey = to[1] - from[1];
         most = bt_max(most, (ey * (x[0] - from[0]) - ex * (x[1] - from[1])) / bt_hypot(ex, ey));
     }
     return most;
