@@ -52,7 +52,7 @@ static void arm_of(const bt_contact *contact, int i, double arm[2])
     arm[1] = contact->rat * contact->ny - contact->ran[i] * contact->nx;
 }
 
-/// How far x, from the centroid of body i, lies outside its polygon `part`: beyond the edge that it is farthest from, m.
+/// How far x lies outside a part of body i, beyond the edge that it is farthest from; x from the centroid of i, m.
 static double outside(const bt_world *world, bt_idx i, int part, const double x[2])
 {
     int n;
@@ -66,8 +66,8 @@ static double outside(const bt_world *world, bt_idx i, int part, const double x[
     return most;
 }
 
-/// Let the nearest point of the contacts of the same outlines bear for point k. Without points found, all there is to go
-/// by are the polygons themselves.
+/// Let the nearest point of the contacts of the same outlines bear for point k. If it was not found, only the polygons
+/// themselves tell what is near.
 static void find_bearer(const bt_world *world, const bt_cell *cell, shared *overlap, int k, bool found)
 {
     const bt_pair *pairs = cell->search.pairs, *own = &pairs[overlap->pair];
