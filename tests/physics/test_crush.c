@@ -893,4 +893,38 @@ TEST(a_dent_goes_with_the_corner_from_piece_to_piece)
     }
 }
 
+/// A round floe with a deep notch at its far side has several parts, some of which only overlap the wall deeper in.
+/// It is crushed as deep as a floe without a notch that has the same mass.
+TEST(parts_that_touch_deeper_in_bear_too)
+{
+    enum { N = 16 };
+    for (int long_step = 0; long_step < 2; long_step++) {
+        double depth[2], area = 0;
+        for (int notch = 0; notch < 2; notch++) {
+            bt_params p = params(long_step ? 0.1 : 2e-3);
+            p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+            bt_world *w = bt_world_create(&p);
+            double v[2 * N];
+            for (int i = 0; i < N; i++) v[2 * i] = cos(2 * BT_PI * i / N), v[2 * i + 1] = sin(2 * BT_PI * i / N);
+            if (notch) v[N] = 0.2, v[N + 1] = 0;
+            const double own = bt_shape_moments(N, v).area;
+            if (!notch) area = own;
+            bt_body_def d = scene_prism(N, v, sheet * area / own);
+            bt_parts parts;
+            if (notch) {
+                assert_true(bt_outline_split(N, v, &parts));
+                d.parts = &parts;
+            }
+            d.vx = 0.5, d.thickness = 0.1;
+            bt_world_add(w, &d);
+            scene_wall(w, v[0], -50, 5, 50, 0);
+            for (int s = 0; s < (long_step ? 10 : 400); s++) bt_world_step(w);
+            depth[notch] = pose(w, 0)->x;
+            bt_world_free(w);
+        }
+        assert_true(depth[0] > 0.03);
+        CHECK_CLOSE(depth[1], depth[0], 0.01 * depth[0]);
+    }
+}
+
 TEST_MAIN(NULL, NULL)
