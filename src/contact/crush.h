@@ -36,8 +36,8 @@
 // Depth and work, of a floe by itself or in a row, by face, corner or disc, are within 0.1 % for Δt from 2 ms to 5 s.
 // Remaining error: in the step of a hit, a point cannot tell load passed on from others from the load that stops it. If
 // others press with a share s of the limit, it crushes up to s/(2 − s) v1 Δt more than in small steps.
-// And where a rounded outline comes in so fast that a step takes it past its next corners, these take shares before they
-// touch: at Δt √(k/m) = 3 a regular 16-gon goes 7 % less deep, one in parts 20 % deeper.
+// And where a rounded outline comes in so fast that a step takes it past its next corners, these take shares before
+// they touch: at Δt √(k/m) = 3 a regular 16-gon goes 7 % less deep, one in parts 20 % deeper.
 // Rejected: the line through (0, 0) and the solution of the lone collision, which sweeps like any line: depths of a
 // heavy body that hits floes held by others are off by −28 % (face) and +66 % (corner at 5 s). An implicit length at a
 // share of the way (this law's predecessor): right where the first step stops a corner, −30 % in between, nothing where
