@@ -495,6 +495,8 @@ MUTANTS = {
         ("to[i] = bt_max(from[i], low);", ";", "a stretch is borne twice"),
         ("*area -= common_area(world, cell, overlap, o, depth);", ";", "pieces that overlap bear twice"),
         ("if (!(away < least)) continue;", "if (least < INFINITY) continue;", "any point bears, not the nearest"),
+        ("if (!(sign * (o->manifold.nx * m->nx", "if (!(fabs(o->manifold.nx * m->nx", "opposite faces are one"),
+        ("if (from == to || body < 0 || from == body || to == body) {", "if (true) {", "the seam of another image"),
     ]),
     "src/contact/law_pair.c": (
         ["physics/test_crush", "physics/test_rafting", "unit/test_restitution"], [
@@ -527,10 +529,12 @@ MUTANTS = {
         ("ha > 0 && hb > 0 ? bt_min(ha, hb) : bt_max(ha, hb)", "bt_max(ha, hb)", "the thicker floe is crushed"),
         ("limit->rise->depth[i] = bt_min(deepest, bt_max(0, -manifold->p[i].gap));", ";",
          "a new point forgets what is crushed"),
-        ("own->value[UNSEEN + k] > 0 ? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];",
+        ("several || own->value[UNSEEN + k] > 0\n" + 44 * " " +
+         "? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];",
          "limit->rise->depth[i];", "points lose their depth"),
-        ("own->value[UNSEEN + k] > 0 ? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];",
-         "own->value[k];", "sliding back brings overlap back"),
+        ("several || own->value[UNSEEN + k] > 0\n" + 44 * " " +
+         "? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];", "own->value[k];", "sliding back brings overlap back"),
+        ("several || own->value[UNSEEN + k]", "own->value[UNSEEN + k]", "an old depth of one piece is the dent of all"),
         ("gaps->gap[i] += limit->rise->depth[i];", ";", "crushed ice still bears"),
         ("own[BT_CRUSH_LEAST] * h / closing.n", "own[BT_CRUSH_LEAST] * h", "twice the least length"),
         ("hit->touch = dt * ice->touch,", "hit->touch = ice->touch,", "a force for an impulse"),

@@ -37,6 +37,21 @@ static bt_idx beside_shore(const bt_world *world, const bt_pair *p)
     return bt_shore_holds(world, p->a) ? p->b : bt_shore_holds(world, p->b) ? p->a : -1;
 }
 
+/// From the centroid of one body to that of another, m, of the outlines of a pair: pieces of a shore at the images that
+/// are nearest to the body beside it, since in a period two pieces can meet at either end.
+static void offset_of(const bt_world *world, const bt_pair *pair, bt_idx from, bt_idx to, double off[2])
+{
+    const bt_idx body = beside_shore(world, pair);
+    if (from == to || body < 0 || from == body || to == body) {
+        bt_bodies_offset(world, from, to, off);
+        return;
+    }
+    double back[2];
+    bt_bodies_offset(world, from, body, off);
+    bt_bodies_offset(world, body, to, back);
+    off[0] += back[0], off[1] += back[1];
+}
+
 /// Do both pairs belong to the same two outlines?
 static bool same_outlines(const bt_world *world, const bt_pair *p, const bt_pair *q)
 {
@@ -77,8 +92,8 @@ static void find_bearer(const bt_world *world, const bt_cell *cell, shared *over
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];
         if (contact->n == 0 || !same_outlines(world, own, &pairs[contact->pair])) continue;
-        double to_a[2] = {0, 0};
-        if (contact->a != own->a) bt_bodies_offset(world, own->a, contact->a, to_a);
+        double to_a[2];
+        offset_of(world, own, own->a, contact->a, to_a);
         for (int i = 0; i < contact->n; i++) {
             double x[2];
             arm_of(contact, i, x);
@@ -117,17 +132,12 @@ static void take_normal(const bt_world *world, const bt_cell *cell, shared *over
                                       .ny = same_a ? contact->ny : -contact->ny};
 }
 
+BT_ASCENDING_BY(by_pair, shared, pair, pair)
+
+/// Is the pair among the first n overlaps of the cell?
 static bool is_noted(const bt_law_state *laws, bt_idx n, bt_idx pair)
 {
-    for (bt_idx i = 0; i < n; i++)
-        if (laws->overlaps[i].pair == pair) return true;
-    return false;
-}
-
-static int by_pair(const void *p, const void *q)
-{
-    const shared *a = p, *b = q;
-    return (a->pair > b->pair) - (a->pair < b->pair);
+    return n > 0 && bsearch(&(shared){.pair = pair}, laws->overlaps, (size_t)n, sizeof *laws->overlaps, by_pair);
 }
 
 void bt_bearing_assign(const bt_world *world, bt_cell *cell)
@@ -165,10 +175,27 @@ static double common_area(const bt_world *world, const bt_cell *cell, const shar
     double place[2], centroid[2];
     bt_overlap both;
     bt_overlap_clip(world, own->a, own->b, own->part, move[0], move[1], &both);
-    bt_bodies_offset(world, own->a, piece, place);
+    offset_of(world, own, own->a, piece, place);
     if (of_b) place[0] += move[0], place[1] += move[1];
     bt_overlap_cut(world, piece, pair->part[other_b], place, &both);
     return bt_overlap_area(&both, centroid);
+}
+
+/// Does the piece of the shore in a pair reach the patch of another pair, along the tangent of m?
+static bool piece_meets(const bt_world *world, const bt_pair *own, const bt_pair *pair, const bt_manifold *m,
+                        const bt_patch *patch)
+{
+    const bool of_b = bt_shore_holds(world, pair->b);
+    const bt_idx piece = of_b ? pair->b : pair->a;
+    double off[2], low = INFINITY, high = -INFINITY;
+    int n;
+    const double *v = bt_overlap_polygon(world, piece, pair->part[of_b], &n);
+    offset_of(world, own, own->a, piece, off);
+    for (int i = 0; i < n; i++) {
+        const double t = m->nx * (v[2 * i + 1] + off[1]) - m->ny * (v[2 * i] + off[0]);
+        low = bt_min(low, t), high = bt_max(high, t);
+    }
+    return low < patch->middle + 0.5 * patch->length && high > patch->middle - 0.5 * patch->length;
 }
 
 /// The patch of an overlap, less the stretches that those before it bear on the same face.
@@ -177,18 +204,22 @@ static bt_patch patch_of(const bt_world *world, const bt_cell *cell, const share
     const bt_pair *pairs = cell->search.pairs, *own = &pairs[overlap->pair];
     const bt_manifold *m = &overlap->manifold;
     const bt_patch patch = bt_law_patch(world, own->part, m, depth, area);
+    const bool shore = beside_shore(world, own) >= 0;
     if (!(patch.length > 0)) return patch;
     double from[MAX_STRETCHES] = {patch.middle - 0.5 * patch.length},
            to[MAX_STRETCHES] = {patch.middle + 0.5 * patch.length};
     int n = 1;
     for (const shared *o = cell->laws->overlaps; o < overlap; o++) {
-        const double side = o->manifold.nx * m->nx + o->manifold.ny * m->ny;
-        if (!(fabs(side) > ALIKE) || !same_outlines(world, own, &pairs[o->pair])) continue;
-        double other_area, off[2] = {0, 0};
-        const bt_patch other = bt_law_patch(world, pairs[o->pair].part, &o->manifold, depth, &other_area);
+        const bt_pair *pair = &pairs[o->pair];
+        const double sign = shore && bt_shore_holds(world, own->a) != bt_shore_holds(world, pair->a) ? -1 : 1;
+        if (!(sign * (o->manifold.nx * m->nx + o->manifold.ny * m->ny) > ALIKE) || !same_outlines(world, own, pair) ||
+            (shore && !piece_meets(world, own, pair, m, &patch)))
+            continue;
+        double other_area, off[2];
+        const bt_patch other = bt_law_patch(world, pair->part, &o->manifold, depth, &other_area);
         if (!(other.length > 0)) continue;
-        if (o->manifold.a != m->a) bt_bodies_offset(world, m->a, o->manifold.a, off);
-        const double middle = (side > 0 ? other.middle : -other.middle) + m->nx * off[1] - m->ny * off[0],
+        offset_of(world, own, own->a, pair->a, off);
+        const double middle = sign * other.middle + m->nx * off[1] - m->ny * off[0],
                      low = middle - 0.5 * other.length, high = middle + 0.5 * other.length;
         bool meet = false;
         for (int i = n - 1; i >= 0; i--) { // what is left on either side
@@ -198,7 +229,7 @@ static bt_patch patch_of(const bt_world *world, const bt_cell *cell, const share
             to[i] = bt_max(from[i], low);
             if (high < end && n < MAX_STRETCHES) from[n] = high, to[n++] = end;
         }
-        if (meet && beside_shore(world, own) >= 0) *area -= common_area(world, cell, overlap, o, depth);
+        if (meet && shore) *area -= common_area(world, cell, overlap, o, depth);
     }
     double length = 0, moment = 0;
     for (int i = 0; i < n; i++) length += to[i] - from[i], moment += 0.5 * (to[i] - from[i]) * (to[i] + from[i]);
@@ -249,9 +280,7 @@ static bool bears_some(const shared *overlap, bt_idx j)
 /// Is contact j one of outlines in several polygons?
 static bool is_shared(const bt_cell *cell, bt_idx j)
 {
-    for (bt_idx i = 0; i < cell->laws->n_overlaps; i++)
-        if (cell->laws->overlaps[i].pair == cell->contacts[j].pair) return true;
-    return false;
+    return is_noted(cell->laws, cell->laws->n_overlaps, cell->contacts[j].pair);
 }
 
 void bt_bearing_of(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold,

@@ -130,6 +130,7 @@ static void recall(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
     bt_limit *limit = &cell->laws->limits[j];
     const bt_memory names = bt_law_names(world, pair, BT_LAW_CRUSHING);
     const bool shore_a = bt_shore_holds(world, pair->a), shore = shore_a || bt_shore_holds(world, pair->b);
+    const bool several = shore || pair->part[0] || pair->part[1]; // the contact may have been with another polygon
     const bt_gid body = shore_a ? names.b : names.a;
     const bt_memory *end, *own = NULL;
     double deepest = 0;
@@ -146,8 +147,8 @@ static void recall(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
         limit->rise->depth[i] = bt_min(deepest, bt_max(0, -manifold->p[i].gap));
         for (int k = 0; own && k < own->n_points; k++)
             if (own->feature[k] == manifold->p[i].feature)
-                limit->rise->depth[i] =
-                    own->value[UNSEEN + k] > 0 ? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];
+                limit->rise->depth[i] = several || own->value[UNSEEN + k] > 0
+                                            ? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];
     }
 }
 

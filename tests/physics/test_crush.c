@@ -927,4 +927,86 @@ TEST(parts_that_touch_deeper_in_bear_too)
     }
 }
 
+/// Between two quays in pieces, one in front and one behind, a floe crushes the one that it runs into as if the other
+/// were not there, whichever is first in the list.
+TEST(a_quay_behind_changes_nothing)
+{
+    const double h = 0.1, speed = 0.5, depth = sheet * speed * speed / (2 * pressure * h);
+    for (int behind_first = 0; behind_first < 2; behind_first++) {
+        bt_params p = params(0.02);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        bt_world *w = bt_world_create(&p);
+        for (int i = 0; i < 4; i++) {
+            const bool behind = i / 2 != behind_first;
+            double v[] = {-2, -4, 2, -4, 2, 4, -2, 4};
+            const bt_body_def d = {.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = behind ? -3.001 : 2,
+                                   .y = i % 2 ? 4.1 : -3.9};
+            bt_world_add(w, &d);
+        }
+        bt_shore_create(w);
+        const bt_gid floe = 4;
+        double v[8];
+        scene_square(1, v);
+        add_floe(w, 4, v, -0.5, 0, 0, speed, h);
+        for (int s = 0; s < 50; s++) bt_world_step(w);
+        CHECK_CLOSE(pose(w, floe)->x, -0.5 + depth, 5e-3 * depth);
+        CHECK_CLOSE(pose(w, floe)->yaw, 0, 1e-3);
+        bt_world_free(w);
+    }
+}
+
+/// Two pieces that fill a period meet at two seams. A floe is crushed alike at both.
+TEST(both_seams_of_a_period_bear_alike)
+{
+    const double h = 0.1, speed = 0.5, depth = sheet * speed * speed / (2 * pressure * h);
+    for (int seam = 0; seam < 2; seam++) {
+        bt_params p = params(0.02);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        p.period_y = 16;
+        bt_world *w = bt_world_create(&p);
+        add_quay(w, 2, (const double[2][2]){{-8, 0}, {0, 8}});
+        double v[8];
+        scene_square(1, v);
+        add_floe(w, 4, v, -0.5, 8 * seam, 0, speed, h);
+        for (int s = 0; s < 50; s++) bt_world_step(w);
+        CHECK_CLOSE(pose(w, 2)->x, -0.5 + depth, 5e-3 * depth);
+        CHECK_CLOSE(pose(w, 2)->yaw, 0, 1e-3);
+        bt_world_free(w);
+    }
+}
+
+/// The corner of a floe runs into a bay of two faces so shallow that their contacts are one. The dent is as deep as the
+/// work says, p h times its area, and the corner is not thrown out of it.
+TEST(a_corner_in_a_shallow_bay_stays)
+{
+    const double h = 0.1, tilt = tan(BT_PI / 60);
+    bt_params p = params(0.02);
+    p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+    bt_world *w = bt_world_create(&p);
+    for (int side = -1; side <= 1; side += 2) {
+        double v[] = {0, 0, 4, 0, 4, 4, -4 * tilt, 4};
+        if (side < 0) {
+            const double lower[] = {0, 0, -4 * tilt, -4, 4, -4, 4, 0};
+            memcpy(v, lower, sizeof v);
+        }
+        const bt_moments m = bt_shape_centre(4, v);
+        const bt_body_def d = {.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = m.cx, .y = m.cy};
+        bt_world_add(w, &d);
+    }
+    bt_shore_create(w);
+    double v[8];
+    scene_square(1, v);
+    add_floe(w, 4, v, -sqrt(0.5), 0, 0.25 * BT_PI, 0.8, h);
+    double before = -sqrt(0.5);
+    for (int s = 0; s < 50; s++) {
+        bt_world_step(w);
+        CHECK_CLOSE(pose(w, 2)->x, before + p.dt * vel(w, 2)->x, 1e-3);
+        before = pose(w, 2)->x;
+    }
+    // a right angle between faces at 90° − 3°: k = 2 p h / (1 − tan 3°) on the depth from the bottom of the bay
+    const double depth = 0.8 * sqrt(sheet * (1 - tilt) / (2 * pressure * h));
+    CHECK_CLOSE(before + sqrt(0.5), depth, 0.05 * depth);
+    bt_world_free(w);
+}
+
 TEST_MAIN(NULL, NULL)
