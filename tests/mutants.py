@@ -533,7 +533,8 @@ MUTANTS = {
          "? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];",
          "limit->rise->depth[i];", "points lose their depth"),
         ("several || own->value[UNSEEN + k] > 0\n" + 44 * " " +
-         "? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];", "own->value[k];", "sliding back brings overlap back"),
+         "? bt_max(own->value[k], limit->rise->depth[i]) : own->value[k];",
+         "own->value[k];", "sliding back brings overlap back"),
         ("several || own->value[UNSEEN + k]", "own->value[UNSEEN + k]", "an old depth of one piece is the dent of all"),
         ("gaps->gap[i] += limit->rise->depth[i];", ";", "crushed ice still bears"),
         ("own[BT_CRUSH_LEAST] * h / closing.n", "own[BT_CRUSH_LEAST] * h", "twice the least length"),
