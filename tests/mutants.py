@@ -495,7 +495,8 @@ MUTANTS = {
         ("to[i] = bt_max(from[i], low);", ";", "a stretch is borne twice"),
         ("*area -= common_area(world, cell, overlap, o, depth);", ";", "pieces that overlap bear twice"),
         ("if (!(away < least)) continue;", "if (least < INFINITY) continue;", "any point bears, not the nearest"),
-        ("if (!(sign * (o->manifold.nx * m->nx", "if (!(fabs(o->manifold.nx * m->nx", "opposite faces are one"),
+        ("shore && bt_shore_holds(world, own->a) != bt_shore_holds(world, pair->a) ? -1 : 1;",
+         "o->manifold.nx * m->nx + o->manifold.ny * m->ny < 0 ? -1 : 1;", "opposite faces are one"),
         ("if (from == to || body < 0 || from == body || to == body) {", "if (true) {", "the seam of another image"),
     ]),
     "src/contact/law_pair.c": (
