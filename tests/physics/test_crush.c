@@ -939,7 +939,7 @@ TEST(a_quay_behind_changes_nothing)
         for (int i = 0; i < 4; i++) {
             const bool behind = i / 2 != behind_first;
             double v[] = {-2, -4, 2, -4, 2, 4, -2, 4};
-            const bt_body_def d = {.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = behind ? -3.001 : 2,
+            const bt_body_def d = {.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = behind ? -3 : 2,
                                    .y = i % 2 ? 4.1 : -3.9};
             bt_world_add(w, &d);
         }
