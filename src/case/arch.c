@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Is the domain wide enough for body, floes and arches, and what bounds their load? The rules are in arch.h.
 #include "case/arch.h"
+#include "case/case_derived.h"
 #include "case/warning.h"
 
 #include <math.h>
@@ -96,7 +97,7 @@ bt_arch bt_arch_of(const bt_case *input, double concentration, double floe_size)
     }
     worst.rigid = !(input->ice.rafting_kappa > 0) && !(input->ice.crushing_pressure > 0);
     worst.splits = input->ice.splitting.toughness > 0;
-    worst.mapped = input->ice.outlines;
+    worst.mapped = bt_case_reads_field(input);
     worst.unbounded = worst.rigid && worst.beside && reaches(concentration, BT_BOUND_CONCENTRATION);
     return worst;
 }

@@ -136,7 +136,7 @@ void bt_track_warn(const bt_case *input, const bt_track *track, bt_errors *warni
                       "the body leaves the ice at %.4g s, and %s: %s, or end the run earlier", track->time[last],
                       gap ? "enters open water, because the ice does not fill the domain"
                           : "is in open water from then on",
-                      input->ice.outlines ? "use a map that reaches farther"
+                      bt_case_reads_field(input) ? "use a map that reaches farther"
                       : gap ? "leave ice.x_min, ice.x_max, ice.y_min and ice.y_max out"
                             : "use a longer domain, set domain.ends: moving");
 }

@@ -308,9 +308,10 @@ bool bt_outline_near_thickness(const char *name)
 
 bool bt_outline_chart_column(const char *name)
 {
-    // kind of region, total concentration, stage and form of the ice, egg code
-    static const char *const words[] = {"poly_type", "pgon_type", "ct",      "e_ct",      "n_ct",     "sa", "e_sa",
-                                        "fa",        "e_fa",      "icecode", "nis_class", "a_legend", NULL};
+    // kind of region, total concentration, stage and form of the ice, egg code; without `sa` and `fa`, stage and form,
+    // which are also short for surface and floe area, and stand beside `ct`
+    static const char *const words[] = {"poly_type", "pgon_type", "ct",      "e_ct",      "n_ct", "e_sa",
+                                        "e_fa",      "icecode",   "nis_class", "a_legend", NULL};
     char lower[64];
     return is_one_of(name, words, lower);
 }

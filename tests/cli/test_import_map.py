@@ -843,7 +843,10 @@ def test_a_grid_in_kilometres(tmp_path, key, unit, scale):
 @pytest.mark.parametrize("name, authority", [
     ("WGS84", "EPSG:4326"), ("wgs 84", "EPSG:4326"), ("CRS84", "OGC:CRS84"), ("epsg:3413", "EPSG:3413"),
     ("urn:ogc:def:crs:EPSG::3413", "EPSG:3413"), ("ETRS89 / UTM zone 33N", "EPSG:25833"), ("3413", "EPSG:3413"),
-    ("WGS_84_/_UTM_zone_33N", "EPSG:32633")])
+    ("WGS_84_/_UTM_zone_33N", "EPSG:32633"),
+    # those of ArcGIS
+    ("WGS_1984_UTM_Zone_33N", "EPSG:32633"), ("GCS_WGS_1984", "EPSG:4326"),
+    ("WGS_1984_NSIDC_Sea_Ice_Polar_Stereographic_North", "EPSG:3413")])
 def test_names_of_systems(name, authority):
     assert ":".join(map_plane.known("map", name, "its crs").to_authority()) == authority
 

@@ -358,3 +358,15 @@ def test_the_step_is_held_against_the_speed_of_the_ice(tmp_path):
     assert "solver.reference_speed: 0.02 m/s, but the ice approaches at up to 0.494 m/s" in checked, checked
     still = call("check", write_case(tmp_path, ROUND)).stdout
     assert "move 0." not in still and "solver.reference_speed" not in still, still
+
+
+@pytest.mark.parametrize("dt, sample_every", [(1, 1), (5, 1), (1, 7), (0.8, 1)])
+def test_the_window_holds_no_step_of_the_ramp(tmp_path, dt, sample_every):
+    """In open water at a prescribed speed the tow force is the drag, without scatter. Red: the step that ends with the
+    ramp, whose force is the inertia of the body, was in the window."""
+    case = changed(BERG, ice={"concentration": 0}, run={"dt": dt, "duration": 600},
+                   tow={"mode": "speed", "speed": 0.5, "ramp": 30}, output__sample_every=sample_every)
+    s = run(tmp_path, case, "--quiet").summary
+    assert s["window"]["verdict"] == "steady" and 30 < s["window"]["start_s"] <= 30 + 2 * dt * sample_every
+    force = s["window"]["series"]["tow_force"]
+    assert force["mean_low_n"] == pytest.approx(force["mean_n"]) and force["peak_n"] == pytest.approx(force["mean_n"])

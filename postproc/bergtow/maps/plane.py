@@ -80,7 +80,7 @@ def known(path, text, whose):
         raise RunError(path, f"{whose} is unknown to PROJ: {' '.join(text.split())[:80]}",
                        "correct it; EPSG:4326, EPSG:32633 and the like are known") from None
     _, code = crs.to_authority() or ("", crs.name)
-    if not STRUCTURED.search(text) and plain(text) not in (plain(crs.name), plain(code)):
+    if not STRUCTURED.search(text) and plain(text) not in map(plain, (crs.name, code, esri_name(crs))):
         raise RunError(path, f"{whose}, {text}, is not the name of a system; the nearest of PROJ is {name_of(crs)}",
                        "give a code, as EPSG:3413, or the full name")
     if crs.is_compound:
@@ -90,6 +90,14 @@ def known(path, text, whose):
     if whose == "--crs":
         raise RunError(path, f"--crs {text} is {crs.type_name}, neither in degrees nor a projection", SAY)
     return None
+
+
+def esri_name(crs):
+    """The name that ArcGIS gives to a system, as WGS_1984_UTM_Zone_33N; "" where it has none."""
+    try:
+        return crs.to_wkt("WKT1_ESRI").split('"')[1]
+    except (CRSError, IndexError):
+        return ""
 
 
 def plain(name):

@@ -29,6 +29,7 @@ UNREACHED = {"goal_drifts_away": "the goal drifts away from the ice faster than 
              "outside": "the way leaves the domain, which moves with the ice; raise the speed"}
 FAULTS = {1: "no_go", 2: "outside", 4: "force_limit", 8: "turns"}
 MAX_STATES, MAX_CELLS = 20e6, 20e6  # about 1 GB
+MAX_SLICES = 80e6  # of all speeds, about 7 GB
 Points = Union[np.ndarray, Sequence[Sequence[float]]]
 
 
@@ -211,8 +212,9 @@ class _Task:
         t.drift[:], t.water[:] = _place("drift", drift), _place("water", water)
         t.start_heading = math.nan if start_heading is None else _number("start heading", start_heading, -math.inf)
         t.goal_heading = math.nan if goal_heading is None else _number("goal heading", goal_heading, -math.inf)
-        # the lattice keeps sums of slices, four to a width (src/route/lattice.c): what bounds cells bounds the width
-        _number("width of the hull (--width)", t.width, 4 * math.sqrt((x1 - x0) * (y1 - y0) * len(v) / MAX_CELLS))
+        # the lattice keeps sums of slices, four to a width, for each speed (src/route/lattice.c)
+        _number("width of the hull (--width) for this domain and number of speeds", t.width,
+                4 * math.sqrt((x1 - x0) * (y1 - y0) * len(v) / MAX_SLICES))
         for name, value, most in ("spacing", spacing, MAX_STATES / headings), ("cell", cell, MAX_CELLS):
             least = math.sqrt((x1 - x0) * (y1 - y0) / most)
             setattr(t, name, 0 if value is None else _number(name, value, least))
