@@ -60,6 +60,16 @@ static bool same_outlines(const bt_world *world, const bt_pair *p, const bt_pair
     return body >= 0 && body == beside_shore(world, q);
 }
 
+/// Are both overlaps on the same face of the same two outlines? 1; −1 if so and a and b are exchanged; 0 = no.
+static int same_face(const bt_world *world, const bt_cell *cell, const shared *overlap, const shared *other)
+{
+    const bt_pair *own = &cell->search.pairs[overlap->pair], *pair = &cell->search.pairs[other->pair];
+    const bt_manifold *m = &overlap->manifold, *o = &other->manifold;
+    const bool shore = beside_shore(world, own) >= 0;
+    const int sign = shore && bt_shore_holds(world, own->a) != bt_shore_holds(world, pair->a) ? -1 : 1;
+    return sign * (o->nx * m->nx + o->ny * m->ny) > ALIKE && same_outlines(world, own, pair) ? sign : 0;
+}
+
 /// Arm of point i of a contact from the centroid of its a, m.
 static void arm_of(const bt_contact *contact, int i, double arm[2])
 {
@@ -211,10 +221,8 @@ static bt_patch patch_of(const bt_world *world, const bt_cell *cell, const share
     int n = 1;
     for (const shared *o = cell->laws->overlaps; o < overlap; o++) {
         const bt_pair *pair = &pairs[o->pair];
-        const double sign = shore && bt_shore_holds(world, own->a) != bt_shore_holds(world, pair->a) ? -1 : 1;
-        if (!(sign * (o->manifold.nx * m->nx + o->manifold.ny * m->ny) > ALIKE) || !same_outlines(world, own, pair) ||
-            (shore && !piece_meets(world, own, pair, m, &patch)))
-            continue;
+        const int sign = same_face(world, cell, overlap, o);
+        if (sign == 0 || (shore && !piece_meets(world, own, pair, m, &patch))) continue;
         double other_area, off[2];
         const bt_patch other = bt_law_patch(world, pair->part, &o->manifold, depth, &other_area);
         if (!(other.length > 0)) continue;
@@ -301,6 +309,27 @@ void bt_bearing_of(const bt_world *world, const bt_cell *cell, bt_idx j, const b
                                : bt_law_patch(world, cell->search.pairs[alone.pair].part, manifold, depth[k], &area[k]);
         bear(overlap, j, &here, patch, area, of);
     }
+}
+
+double bt_bearing_share(const bt_world *world, const bt_cell *cell, bt_idx j)
+{
+    const bt_law_state *laws = cell->laws;
+    if (!is_shared(cell, j)) return 1;
+    const shared *own = bsearch(&(shared){.pair = cell->contacts[j].pair}, laws->overlaps, (size_t)laws->n_overlaps,
+                                sizeof *own, by_pair);
+    int here = 0, all = 0;
+    for (bt_idx i = 0; i < laws->n_overlaps; i++) {
+        const shared *overlap = &laws->overlaps[i];
+        const bt_idx contact = cell->search.pairs[overlap->pair].contact;
+        if (contact < 0 || same_face(world, cell, own, overlap) == 0) continue;
+        const bt_closing closing = closing_of(world, cell, overlap);
+        for (int k = 0; k < overlap->manifold.n_points; k++) {
+            if (overlap->by[k].contact != contact || !closing.point[k]) continue; // a point of its own
+            all++;
+            here += contact == j;
+        }
+    }
+    return here > 0 ? (double)here / all : 1;
 }
 
 double bt_bearing_whole(const bt_world *world, const bt_cell *cell, bt_idx j, double depth, double *area)

@@ -31,6 +31,10 @@ typedef struct bt_bearing {
 void bt_bearing_of(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold,
                    const bt_closing *closing, const double depth[2], bt_bearing of[2]);
 
+/// Share of contact j in the least length of the face that its outlines press on each other: by the points of the face
+/// that take part; 1 if the contact is the only one.
+double bt_bearing_share(const bt_world *world, const bt_cell *cell, bt_idx j);
+
 /// Length, m, of all that contact j bears at one depth; *area, m².
 double bt_bearing_whole(const bt_world *world, const bt_cell *cell, bt_idx j, double depth, double *area);
 

@@ -52,9 +52,8 @@
 // Outlines in several polygons bear where they would in one piece (contact/bearing.h), and what one part of a floe, or
 // piece of a shore, has crushed is open to the others.
 //
-// Not modelled: the least length holds for each contact, so pieces of a shore that are shorter bear too much together.
-// The ends of flush pieces are contact points, where one piece has none: a face that comes in tilted by some degrees
-// turns about a seam, and its load and moment are up to half as large as without the cut.
+// Not modelled: the ends of flush pieces are contact points, where one piece has none. A face that comes in tilted by
+// some degrees turns about a seam, and its load and moment are as little as half of those without the cut.
 // A record holds two points, so a crushed corner that was not found is forgotten once two other features of the pair
 // have been crushed; its depth is then the present overlap, as for a new point.
 // Crushed ice does not pile up, extrude or lose mass, and the pressure does not fall with the area of contact.
