@@ -538,7 +538,7 @@ MUTANTS = {
          "own->value[k];", "sliding back brings overlap back"),
         ("several || own->value[UNSEEN + k]", "own->value[UNSEEN + k]", "an old depth of one piece is the dent of all"),
         ("gaps->gap[i] += limit->rise->depth[i];", ";", "crushed ice still bears"),
-        ("bt_bearing_share(world, cell, j) / closing.n", "bt_bearing_share(world, cell, j)", "twice the least length"),
+        ("h / (sharing > 0 ? sharing : closing.n)", "h / (sharing > 0 ? sharing : 1)", "twice the least length"),
         ("hit->touch = dt * ice->touch,", "hit->touch = ice->touch,", "a force for an impulse"),
         ("dt * dt * (ice->mean - ice->touch) / way", "2 * dt * dt * (ice->mean - ice->touch) / way",
          "not the mean force"),

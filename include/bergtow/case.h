@@ -348,8 +348,8 @@ static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }
 int64_t bt_case_steps(const bt_case *input);
 
 /// Earliest start of the window of the statistics, s: output.window_start, or the end of the ramp; at a prescribed
-/// speed the end of the first sample without a step of the ramp; plus two periods if the ramp is short for a body on
-/// its line, but at most halfway to the end of the run.
+/// speed one step later; plus two periods if the ramp is short for a body on its line, but at most halfway to the end
+/// of the run.
 double bt_case_earliest_window(const bt_case *input);
 
 /// Reference speed of the solver tolerance, m/s (> 0).

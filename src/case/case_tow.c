@@ -299,9 +299,8 @@ double bt_case_earliest_window(const bt_case *input)
 {
     if (input->output.window_start >= 0) return input->output.window_start;
     if (input->tow.mode == BT_TOW_NONE) return 0;
-    // At a prescribed speed the tow force of the ramp is the inertia of the body: no sample may hold a step of it.
-    if (input->tow.mode == BT_TOW_SPEED && input->tow.ramp > 0)
-        return input->tow.ramp + input->output.sample_every * input->run.dt;
+    // At a prescribed speed the tow force of the ramp is the inertia of the body, also in the step that ends with it.
+    if (input->tow.mode == BT_TOW_SPEED && input->tow.ramp > 0) return input->tow.ramp + input->run.dt;
     if (bt_case_start_is_slow(input)) return input->tow.ramp;
     // After a start that jerks the line the body keeps swinging, and a few swings are too few to be told from chance:
     // leave out two, but at most half of what follows the ramp.

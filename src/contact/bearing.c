@@ -311,25 +311,28 @@ void bt_bearing_of(const bt_world *world, const bt_cell *cell, bt_idx j, const b
     }
 }
 
-double bt_bearing_share(const bt_world *world, const bt_cell *cell, bt_idx j)
+int bt_bearing_points(const bt_world *world, const bt_cell *cell, bt_idx j, int *own)
 {
     const bt_law_state *laws = cell->laws;
-    if (!is_shared(cell, j)) return 1;
-    const shared *own = bsearch(&(shared){.pair = cell->contacts[j].pair}, laws->overlaps, (size_t)laws->n_overlaps,
-                                sizeof *own, by_pair);
-    int here = 0, all = 0;
-    for (bt_idx i = 0; i < laws->n_overlaps; i++) {
-        const shared *overlap = &laws->overlaps[i];
-        const bt_idx contact = cell->search.pairs[overlap->pair].contact;
-        if (contact < 0 || same_face(world, cell, own, overlap) == 0) continue;
-        const bt_closing closing = closing_of(world, cell, overlap);
-        for (int k = 0; k < overlap->manifold.n_points; k++) {
-            if (overlap->by[k].contact != contact || !closing.point[k]) continue; // a point of its own
-            all++;
-            here += contact == j;
+    *own = 0;
+    if (!is_shared(cell, j)) return 0;
+    const shared *first = bsearch(&(shared){.pair = cell->contacts[j].pair}, laws->overlaps, (size_t)laws->n_overlaps,
+                                  sizeof *first, by_pair);
+    double nearest = INFINITY;
+    int all = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (bt_idx i = 0; i < laws->n_overlaps; i++) {
+            const shared *overlap = &laws->overlaps[i];
+            const bt_idx contact = cell->search.pairs[overlap->pair].contact;
+            if (contact < 0 || same_face(world, cell, first, overlap) == 0) continue;
+            for (int k = 0; k < overlap->manifold.n_points; k++) {
+                if (overlap->by[k].contact != contact) continue; // merged into a point of another
+                const double gap = overlap->manifold.p[k].gap + laws->limits[contact].rise->depth[overlap->by[k].point];
+                if (pass == 0) nearest = bt_min(nearest, gap);
+                else if (gap <= bt_max(nearest, 0) + world->par.slop) all++, *own += contact == j;
+            }
         }
-    }
-    return here > 0 ? (double)here / all : 1;
+    return all > 0 ? all : 1;
 }
 
 double bt_bearing_whole(const bt_world *world, const bt_cell *cell, bt_idx j, double depth, double *area)

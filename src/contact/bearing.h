@@ -31,9 +31,9 @@ typedef struct bt_bearing {
 void bt_bearing_of(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold,
                    const bt_closing *closing, const double depth[2], bt_bearing of[2]);
 
-/// Share of contact j in the least length of the face that its outlines press on each other: by the points of the face
-/// that take part; 1 if the contact is the only one.
-double bt_bearing_share(const bt_world *world, const bt_cell *cell, bt_idx j);
+/// How many points of the face on which the outlines of contact j touch are within a slop of the nearest, at least 1:
+/// they share its least length. *own: how many of them are of this contact. 0 if the outlines are single polygons.
+int bt_bearing_points(const bt_world *world, const bt_cell *cell, bt_idx j, int *own);
 
 /// Length, m, of all that contact j bears at one depth; *area, m².
 double bt_bearing_whole(const bt_world *world, const bt_cell *cell, bt_idx j, double depth, double *area);

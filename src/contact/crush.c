@@ -272,7 +272,9 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     if (rafts) limit->record[BT_LAW_CRUSHING] = -1, limit->rise->depth[0] = limit->rise->depth[1] = 0;
     for (int i = 0; i < manifold->n_points; i++) gaps->gap[i] += limit->rise->depth[i];
     const bt_closing closing = bt_law_closing(world, cell, j, manifold);
-    const double least = own[BT_CRUSH_LEAST] * h * bt_bearing_share(world, cell, j) / closing.n,
+    int touching;
+    const int sharing = bt_bearing_points(world, cell, j, &touching);
+    const double least = own[BT_CRUSH_LEAST] * h / (sharing > 0 ? sharing : closing.n),
                  least_way = bt_max(LEAST_WAY * world->par.size, 2 * slop);
     bt_hit hits[2] = {0};
     double place[2] = {0}, in[2] = {0};
@@ -322,8 +324,10 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
     if (cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0) return INFINITY;
     const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), touch = TOUCH * world->par.size,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
+    int touching;
+    const int sharing = bt_bearing_points(world, cell, j, &touching);
     const double line = own[BT_CRUSH_PRESSURE] * h,
-                 least = own[BT_CRUSH_LEAST] * h * bt_bearing_share(world, cell, j);
+                 least = own[BT_CRUSH_LEAST] * h * (sharing > 0 && touching > 0 ? (double)touching / sharing : 1);
     double gap = INFINITY, way = LEAST_WAY * world->par.size, length[2], area[2];
     for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
     length[0] = bt_bearing_whole(world, cell, j, gap + touch, &area[0]);
