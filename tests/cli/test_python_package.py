@@ -222,7 +222,7 @@ STUDY = {"base": "base.yml", "repeats": 2, "parameters": {"tow.speed": [0.1, 0.2
 
 
 def study(folder, **more):
-    write_case(folder, changed(SHORT, run__duration=2), "base.yml")
+    write_case(folder, changed(SHORT, run__duration=3), "base.yml")
     (folder / "study.yml").write_text(json.dumps(STUDY | more))
     return folder / "study.yml"
 
