@@ -497,6 +497,8 @@ MUTANTS = {
         ("if (!(away < least)) continue;", "if (least < INFINITY) continue;", "any point bears, not the nearest"),
         ("shore && bt_shore_holds(world, own->a) != bt_shore_holds(world, pair->a) ? -1 : 1;",
          "o->manifold.nx * m->nx + o->manifold.ny * m->ny < 0 ? -1 : 1;", "opposite faces are one"),
+        ("else if (gap <= bt_max(nearest, 0) + world->par.slop)", "else",
+         "points that do not touch take a share of the least length"),
         ("if (from == to || body < 0 || from == body || to == body) {", "if (true) {", "the seam of another image"),
     ]),
     "src/contact/law_pair.c": (

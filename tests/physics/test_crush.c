@@ -1009,4 +1009,28 @@ TEST(a_corner_in_a_shallow_bay_stays)
     bt_world_free(w);
 }
 
+/// A blunt corner bears on the least length. A seam beside it, which the floe touches only deeper in, takes none of it.
+TEST(a_seam_beside_a_corner_leaves_it_the_least_length)
+{
+    static const quay beside[] = {{1, {{-9, 9}}}, {2, {{-9, 0.03}, {0.03, 9}}}, {2, {{-9, -0.03}, {-0.03, 9}}}};
+    enum { N = 6 };
+    double depth[3];
+    for (int i = 0; i < 3; i++) {
+        bt_params p = params(0.2);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 1;
+        bt_world *w = bt_world_create(&p);
+        add_quay(w, beside[i].n, beside[i].from_to);
+        double v[2 * N];
+        for (int k = 0; k < N; k++)
+            v[2 * k] = 0.5 * cos(2 * BT_PI * k / N), v[2 * k + 1] = 0.5 * sin(2 * BT_PI * k / N);
+        const bt_gid floe = beside[i].n;
+        add_floe(w, N, v, -0.5, 0, 0, 0.5, 0.1);
+        for (int s = 0; s < 10; s++) bt_world_step(w);
+        depth[i] = pose(w, floe)->x + 0.5;
+        bt_world_free(w);
+    }
+    assert_true(depth[0] > 0.01);
+    for (int i = 1; i < 3; i++) CHECK_CLOSE(depth[i], depth[0], 0.02 * depth[0]);
+}
+
 TEST_MAIN(NULL, NULL)
