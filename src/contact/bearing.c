@@ -19,9 +19,6 @@ typedef struct bt_shared_overlap {
     struct { bt_idx contact; int point; } by[2]; ///< contact −1: no contact of the two outlines is left
 } shared;
 
-#define ALIKE 0.98    // cosine between normals of one face, as where points are merged (detect.c)
-#define MAX_STRETCHES 16 // that others leave to one overlap
-
 void bt_bearing_note(bt_cell *cell, bt_idx pair, const bt_manifold *found)
 {
     bt_law_state *laws = cell->laws;
@@ -67,7 +64,7 @@ static int same_face(const bt_world *world, const bt_cell *cell, const shared *o
     const bt_manifold *m = &overlap->manifold, *o = &other->manifold;
     const bool shore = beside_shore(world, own) >= 0;
     const int sign = shore && bt_shore_holds(world, own->a) != bt_shore_holds(world, pair->a) ? -1 : 1;
-    return sign * (o->nx * m->nx + o->ny * m->ny) > ALIKE && same_outlines(world, own, pair) ? sign : 0;
+    return sign * (o->nx * m->nx + o->ny * m->ny) > BT_SQUARE && same_outlines(world, own, pair) ? sign : 0;
 }
 
 /// Arm of point i of a contact from the centroid of its a, m.
@@ -216,8 +213,10 @@ static bt_patch patch_of(const bt_world *world, const bt_cell *cell, const share
     const bt_patch patch = bt_law_patch(world, own->part, m, depth, area);
     const bool shore = beside_shore(world, own) >= 0;
     if (!(patch.length > 0)) return patch;
-    double from[MAX_STRETCHES] = {patch.middle - 0.5 * patch.length},
-           to[MAX_STRETCHES] = {patch.middle + 0.5 * patch.length};
+    // each of those before it can divide one stretch
+    const size_t most = (size_t)(overlap - cell->laws->overlaps) + 1;
+    double *from = bt_alloc_unset(2 * most, sizeof *from), *to = from + most;
+    from[0] = patch.middle - 0.5 * patch.length, to[0] = patch.middle + 0.5 * patch.length;
     int n = 1;
     for (const shared *o = cell->laws->overlaps; o < overlap; o++) {
         const bt_pair *pair = &pairs[o->pair];
@@ -230,17 +229,18 @@ static bt_patch patch_of(const bt_world *world, const bt_cell *cell, const share
         const double middle = sign * other.middle + m->nx * off[1] - m->ny * off[0],
                      low = middle - 0.5 * other.length, high = middle + 0.5 * other.length;
         bool meet = false;
-        for (int i = n - 1; i >= 0; i--) { // what is left on either side
+        for (int i = n - 1; i >= 0; i--) { // leave the parts on either side
             if (!(low < to[i] && high > from[i])) continue;
             const double end = to[i];
             meet = true;
             to[i] = bt_max(from[i], low);
-            if (high < end && n < MAX_STRETCHES) from[n] = high, to[n++] = end;
+            if (high < end) from[n] = high, to[n++] = end;
         }
         if (meet && shore) *area -= common_area(world, cell, overlap, o, depth);
     }
     double length = 0, moment = 0;
     for (int i = 0; i < n; i++) length += to[i] - from[i], moment += 0.5 * (to[i] - from[i]) * (to[i] + from[i]);
+    free(from);
     *area = bt_max(0, *area);
     return (bt_patch){length, length > 0 ? moment / length : patch.middle};
 }

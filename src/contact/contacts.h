@@ -19,6 +19,9 @@
 #include "body/bodies.h"
 #include "contact/cell_contacts.h"
 
+/// Edges face each other squarely, and normals belong to one face, up to this cosine between them (11.5 degrees).
+#define BT_SQUARE 0.98
+
 /// One contact point. Both arms end at the same point in space, between the two surfaces, so that equal and opposite
 /// impulses conserve angular momentum exactly. Two points of a manifold lie on a line along the tangent.
 typedef struct bt_point {

@@ -30,7 +30,6 @@
 // sides, as in a notch, and stay. Of two points at one place the deeper stays: the other may be the end of an edge cut
 // off at the seam, above the corner just beyond it.
 
-#define SQUARE 0.98 // cosine, as for reference edges
 #define PLACE 0.01  // of the smaller radius, as for reference edges
 
 /// A contact of a body that touches several polygons of one outline.
@@ -48,7 +47,7 @@ static const double *arm(const touch *t, int i) { return t->flip ? t->m->p[i].rb
 static bool same_place(const touch *p, int i, const touch *q, int j, double reach)
 {
     const double sign = p->flip == q->flip ? 1 : -1;
-    if (sign * (p->m->nx * q->m->nx + p->m->ny * q->m->ny) < SQUARE) return false;
+    if (sign * (p->m->nx * q->m->nx + p->m->ny * q->m->ny) < BT_SQUARE) return false;
     const double *x = arm(p, i), *y = arm(q, j), dx = x[0] - y[0], dy = x[1] - y[1];
     return fabs(p->m->nx * dy - p->m->ny * dx) <= reach; // along the surface: their heights differ by half of the gaps
 }

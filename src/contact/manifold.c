@@ -282,7 +282,7 @@ BT_INLINE bool reference_is_b(const edge *a, const edge *b, double tie, int befo
 {
     bool ref_b = b->s > a->s;
     if (!isfinite(a->s) || !isfinite(b->s)) return ref_b;
-    const bool square = a->nx * b->nx + a->ny * b->ny < -0.98;
+    const bool square = a->nx * b->nx + a->ny * b->ny < -BT_SQUARE;
     if (square && before >= 0 && fabs(a->s - b->s) < tie) ref_b = before;
     else if (square && before < 0 && b->s < a->s + tie) ref_b = false;
     // one axis shows them apart: the tie must not feign overlap

@@ -7,8 +7,6 @@
 
 #include "geometry/polygons.h"
 
-#define ALONG 0.98 // cosine between edges that may lie on each other, as for reference edges (manifold.c)
-
 static int count_of(const bt_bodies *bodies, bt_idx i, int part)
 {
     const int64_t first = bodies->offset[i] + part;
@@ -70,7 +68,7 @@ static double inside_of(const double *q, int n, double x, double y, const double
     for (int e = 0; e < n; e++) {
         const double *p0 = q + 2 * e, *p1 = q + 2 * (e + 1 < n ? e + 1 : 0);
         const double ex = p1[0] - p0[0], ey = p1[1] - p0[1], along = ey * nx - ex * ny;
-        if (!(along > 0) || !(along * along > ALONG * ALONG * (ex * ex + ey * ey))) continue;
+        if (!(along > 0) || !(along * along > BT_SQUARE * BT_SQUARE * (ex * ex + ey * ey))) continue;
         const double depth = (ex * (p[1] - p0[1] - y) - ey * (p[0] - p0[0] - x)) / sqrt(ex * ex + ey * ey);
         least = bt_min(least, bt_max(0, depth));
     }

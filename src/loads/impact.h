@@ -22,10 +22,10 @@
 // Collision. What lies within one outline is hit once: a floe with all its parts, and a shore (space/shore.h) with all
 // its pieces, however it is cut. Its manifolds act together in a step as the points of one do: λ_c adds up, and with
 // the shares s_k = λ_c,k / Σ λ_c, m_e = 1/W of J = Σ s_k J_k. So two faces of a shore that meet in a bay, or two of its
-// quays that the body hits in the same step, are one collision, of which x, y, panel, thickness, corner and the name
-// (of the floe, or the piece of the shore) are those of the manifold with the largest λ_c. Two shores are two
-// collisions. A quasi-static load, too, is that of an outline. Rejected: one collision for each piece, which divided a
-// blow, and its peak, by the cuts; faces told apart by their normals, for which a limit would have to be chosen.
+// quays that the body hits in the same step, are one collision. Its x, y, panel, thickness, corner and name (of the
+// floe, or the piece of the shore) are those of the manifold with the largest λ_c. Two shores are two collisions. A
+// quasi-static load, too, is that of an outline. Rejected: one collision for each piece, which divided a blow, and its
+// peak, by the cuts; faces told apart by their normals, for which a limit would have to be chosen.
 //
 // Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step stops the
 // rest. So a collision continues in the next step if the last one left an approach above the solver's tolerance and
