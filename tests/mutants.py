@@ -399,11 +399,14 @@ MUTANTS = {
         ("if (colour < MAX_COLOURS && j >= 0)", "if (colour < MAX_COLOURS && i < 0 && j >= 0)", "colours share a body"),
     ]),
     "src/contact/passing.c": (["physics/test_passing"], [
-        ("else if (release) bt_pack_set_row", "else if (false) bt_pack_set_row", "nothing is released"),
-        ("if (meet_without(world, cell, contact) != released)", "if (released || meet_without(world, cell, contact))",
+        ("else if (r->release) bt_pack_set_row", "else if (false) bt_pack_set_row", "nothing is released"),
+        ("if (meets(world, cell, contact, &va, &vb) != released)", "if (released || meets(world, cell, contact, &va, &vb))",
          "nothing comes back"),
-        ("    bt_apply(contact, -(contact->ln[0]", "    if (false) bt_apply(contact, -(contact->ln[0]",
+        ("add_load(world, contact, -1, &va, &vb);", "add_load(world, contact, 0, &va, &vb);",
          "a row is judged with its own impulse"),
+        ("(in_question > 0 ? release_circles(world, &r, in_question) : 0)", "0", "rows confirm each other"),
+        ("        add_load_to(world, contact, 1, v);\n", "", "a push ends at the first gap"),
+        ("gaps->row = BT_ROW_OPEN;", "gaps->row = BT_ROW_STAYS;", "confirmed rows are not reviewed again"),
     ]),
     "src/geometry/polygons.c": (["physics/test_passing"], [
         ("bt_sincos(moving->rate * t, &s, &c);", "bt_sincos(0, &s, &c);", "outlines do not turn"),

@@ -67,6 +67,17 @@ SHAPES = [{"shape": "disc", "length": 1.1, "x": 5.5, "y": 0.1, "yaw": 50, "vx": 
           {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 8.6, "y": 0, "yaw": 80, "vx": -0.5, "vy": 0},
           {"shape": "ship", "length": 2, "width": 0.7, "x": 5.5, "y": 1.8, "yaw": -50, "vx": 0.1, "vy": -0.5},
           {"shape": "square", "length": 0.9, "x": 6, "y": -1.6, "yaw": 10, "vx": 0, "vy": 0.3, "yaw_rate": -40}]
+# Floes that fit with a clearance between the piers of four gates, which they pass in one step or more.
+GATES = {
+    "run": {"dt": 2, "duration": 40},
+    "domain": {"length": 24, "width": 16, "ends": "periodic", "sides": "periodic"},
+    "ice": {"concentration": 0, "friction": 0.3, "drag": {"water_form": 0, "water_skin": 0}},
+    "floes": [{"shape": "square", "length": 1.5, "x": 3 + 6 * (k // 8), "y": -7 + 2 * (k % 8), "fixed": k // 8 % 2 == 0,
+               "vx": 0, "vy": 0.03 * (k // 8 % 2)} for k in range(32)] +
+             [{"shape": "square", "length": 0.3 + 0.02 * (k % 8), "x": 0.7 + 6 * (k // 8), "y": -6 + 2 * (k % 8),
+               "yaw": 45 * (k % 2), "vx": 0.5 + 0.05 * (k % 5)} for k in range(32)],
+    "body": {"shape": "none"},
+}
 # Two blocks of squares that turn and drive into each other: Newton's law of restitution would give them energy.
 REBOUNDS = {
     "run": {"dt": 0.05, "duration": 2},
@@ -204,6 +215,7 @@ SCENES = {
     "dyneema": changed(LINE, tow__line_stiffness=None, tow__line={"type": "dyneema", "diameter": "4 mm"}),
     "no_body": changed(PRESS, run__duration=1, domain__length=18, domain__width=14, ice__concentration=0.8),
     "rebounds": REBOUNDS,
+    "gates": GATES,
 }
 
 

@@ -85,11 +85,19 @@ void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n);
 // again from the present impulses until nothing changes: then every row that bears load stops two bodies that would
 // meet, and no released pair meets.
 //
+// Rows that confirm each other. A body that fits between two others meets neither. But the rows of both slow and turn
+// it, so that without one of them it meets the body of the other, and the check above keeps both. So a loaded row must
+// also follow from loads that do not depend on it: beginning with the velocities without the impulses of all rows that
+// may be released, the impulse of a row is added if its pair meets under those added before, cell by cell in the order
+// of a sweep, until a pass adds none. The rows left over are released. A push that runs through a row of floes within
+// one step is confirmed link by link, without a solve between.
+//
 // Why without its own impulse: a corner that is hit as if it stood in the way turns its floe, and this rotation may be
 // the only reason why the two touch. Also, a row that rebounds separates the pair by its own impulse.
 //
-// Rejected: leaving rows out before the solve because the pair would pass at its free velocities. A push that runs
-// through a row of floes within one step makes pairs meet that otherwise would not; each would take another solve.
+// Rejected: leaving rows out because the pair would pass at its free velocities, before the solve or in the review. A
+// push that runs through a row of floes within one step makes pairs meet that otherwise would not; each would take
+// another solve (berg.yml at 80 %: 85 sweeps a step instead of 58).
 
 /// Collective. After a solve that converged: release the rows of pairs that pass (if `release`), and restore those of
 /// released pairs that meet. Returns the number of rows changed; if not 0, the step has to be solved again.

@@ -201,6 +201,51 @@ TEST(a_push_runs_through_a_row_within_the_step)
         }
 }
 
+/// A floe, a square on edge or on a corner, on its way between two squares with this clearance on either side, off the
+/// middle by a part of it; the two are fixed or free.
+static bt_world *gate(double clearance, double off, double phase, bool diamond, bool fixed, double dt)
+{
+    bt_params p = scene_params(dt, 1);
+    p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    double s[8];
+    scene_square(1, s);
+    bt_body_def d = scene_prism(4, s, 900);
+    d.friction = 0.3;
+    const double half = diamond ? sqrt(0.5) : 0.5;
+    d.motion = fixed ? BT_STATIC : BT_DYNAMIC;
+    for (int side = -1; side <= 1; side += 2) {
+        d.y = side * (half + clearance + 0.5);
+        bt_world_add(w, &d);
+    }
+    d.motion = BT_DYNAMIC;
+    d.x = -0.5 - half - phase, d.y = off * clearance, d.yaw = diamond ? BT_PI / 4 : 0;
+    d.vx = 0.2 / dt;
+    bt_world_add(w, &d);
+    return w;
+}
+
+// Each of the two corner rows slows and turns the floe so that it would meet the other corner. Red: rows that are looked
+// at one by one only, which confirm each other.
+TEST(what_fits_between_two_others_passes)
+{
+    int n = 0;
+    for (int k = 0; k < 400; k++) {
+        const double clearance = 1.3e-3 * pow(1.6, k % 10), off = 0.2 * (k / 10 % 4), phase = 0.02 * (k / 40 % 10);
+        bt_world *w = gate(clearance, clearance * (1 - off) > 1.2e-3 ? off : 0, phase, k % 2, k % 3, 0.1 * (1 + k % 4));
+        const bt_vel before = w->bodies.vel[bt_world_index(w, 2)];
+        for (int step = 0; step < 14; step++) {
+            bt_world_step(w);
+            assert_int_equal(w->stats.misjudged, 0);
+            if (!same_velocity(w->bodies.vel[bt_world_index(w, 2)], before))
+                fail_msg("gate %d, clearance %g m: stopped in step %d", k, clearance, step);
+        }
+        n += w->bodies.pose[bt_world_index(w, 2)].x > 0.5;
+        bt_world_free(w);
+    }
+    assert_int_equal(n, 400);
+}
+
 /// Floes of all sizes that are driven together, turning.
 static bt_world *random_jam(uint64_t *rng, double dt)
 {
