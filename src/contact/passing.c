@@ -27,8 +27,8 @@ static bool of_same_outlines(const bt_world *world, const bt_pair *pair, const b
            (pair->b == contact->b || (bt_shore_holds(world, pair->b) && bt_shore_holds(world, contact->b)));
 }
 
-/// Would the bodies of the contact meet at these velocities? All their parts and pieces nearby count: where several touch
-/// at one place, one row stands for all (detect.c).
+/// Would the bodies of the contact meet at these velocities? All their parts and pieces nearby count: where several
+/// touch at one place, one row stands for all (detect.c).
 static bool meets(const bt_world *world, const bt_cell *cell, const bt_contact *contact, const bt_vel *va,
                   const bt_vel *vb)
 {
@@ -177,6 +177,7 @@ int64_t bt_passing_review(bt_world *world, bool release)
     review r = {.release = release};
     bt_phases_any_order(world, review_cell, &r, &totals);
     bt_domain_reduce(world, &totals);
-    const int64_t in_question = (int64_t)bt_sum_value(&totals.sum[IN_QUESTION]);
-    return (int64_t)bt_sum_value(&totals.sum[CHANGED]) + (in_question > 0 ? release_circles(world, &r, in_question) : 0);
+    const int64_t in_question = (int64_t)bt_sum_value(&totals.sum[IN_QUESTION]),
+                  circular = in_question > 0 ? release_circles(world, &r, in_question) : 0;
+    return (int64_t)bt_sum_value(&totals.sum[CHANGED]) + circular;
 }

@@ -225,8 +225,8 @@ static bt_world *gate(double clearance, double off, double phase, bool diamond, 
     return w;
 }
 
-// Each of the two corner rows slows and turns the floe so that it would meet the other corner. Red: rows that are looked
-// at one by one only, which confirm each other.
+// Each of the two corner rows slows and turns the floe so that it would meet the other corner. Red: rows that are
+// looked at one by one only, which confirm each other.
 TEST(what_fits_between_two_others_passes)
 {
     int n = 0;
