@@ -41,8 +41,8 @@ typedef struct bt_law_state {
     struct bt_rise *rises;          ///< [n_contacts] their rising parts; NULL where no law has one
     /// [n_memory] records of the laws for pairs of this cell, sorted by bt_memory_by_names
     bt_memory *memory;
-    /// [n_overlaps] in the order of pairs, of outlines in several polygons, where bounds have a rising part
-    struct bt_shared_overlap *overlaps; // contact/law_pair.h
+    /// [n_overlaps] of outlines in several polygons, where bounds have a rising part
+    struct bt_shared_overlap *overlaps; // contact/bearing.c
     bt_idx cap_limits, n_memory, cap_memory, n_overlaps, cap_overlaps;
     bool rising;                    ///< some bounds have a rising part
 } bt_law_state;

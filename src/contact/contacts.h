@@ -66,6 +66,10 @@ double bt_contacts_overlap(bt_world *world);
 bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *manifold, bt_axes *axes);
 
+/// Is the point of the pair with this feature a corner of an outline? Else polygons of one outline meet there in a
+/// straight line or a bay.
+bool bt_contacts_at_corner(const bt_world *world, const bt_pair *pair, uint32_t feature);
+
 /// Among the manifolds man [n], sorted by gids and parts, remove the duplicate points of bodies that are not convex and
 /// of shores: points also found by another part of the same pair of bodies, or by another piece of the shore with the
 /// same body. A manifold without a point left has n_points = 0.

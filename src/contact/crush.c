@@ -15,6 +15,7 @@
 
 // Of the mean floe size: the contact length is linear over the approach of the step, or over this.
 #define LEAST_WAY 0.01
+#define LEAST_OF_FACE 1e-4 // the same for a face of several polygons: farther in, some have not been found
 #define NEAR 0.5 // of the penetration at which the overlap was evaluated: if it ends below this share, evaluate again
 #define MAX_DEPTH 0.3 // of the mean floe size: deeper, unchanged outlines are no longer a valid model
 
@@ -255,9 +256,25 @@ static void bound_push(bt_limit *limit, int i, const resistance *ice, double way
     limit->rise->slope[i] = dt * dt * (ice->mean - ice->touch) / way;
 }
 
+/// bt_bearing_of, where both outlines are single polygons.
+static void bear_alone(const bt_world *world, const bt_pair *pair, const bt_manifold *manifold,
+                       const bt_closing *closing, const double depth[2], bt_bearing of[2])
+{
+    double area[2];
+    bt_patch patch[2];
+    for (int k = 0; k < 2; k++) patch[k] = bt_law_patch(world, pair->part, manifold, depth[k], &area[k]);
+    const double all = patch[0].length + patch[1].length;
+    for (int i = 0; i < manifold->n_points; i++) {
+        const double share = bt_law_share(manifold, i, patch[0], closing), first = patch[0].length * share,
+                     second = patch[1].length * bt_law_share(manifold, i, patch[1], closing),
+                     part = all > 0 ? (first + second) / all : 0, before = area[0] * share;
+        of[i] = (bt_bearing){.length = {first, second}, .area = {before, before + (area[1] - area[0]) * part},
+                             .least = 1.0 / closing->n};
+    }
+}
+
 static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair *pair, const bt_manifold *manifold)
 {
-    (void)pair;
     enum { LOOKS = 4 };
     const bt_bodies *bodies = &world->bodies;
     const bt_contact *contact = &cell->contacts[j];
@@ -271,11 +288,10 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     const bool rafts = limit->record[BT_LAW_RAFTING] >= 0;
     if (rafts) limit->record[BT_LAW_CRUSHING] = -1, limit->rise->depth[0] = limit->rise->depth[1] = 0;
     for (int i = 0; i < manifold->n_points; i++) gaps->gap[i] += limit->rise->depth[i];
-    const bt_closing closing = bt_law_closing(world, cell, j, manifold);
-    int touching;
-    const int sharing = bt_bearing_points(world, cell, j, &touching);
-    const double least = own[BT_CRUSH_LEAST] * h / (sharing > 0 ? sharing : closing.n),
-                 least_way = bt_max(LEAST_WAY * world->par.size, 2 * slop);
+    const bt_closing *face = bt_bearing_closing(world, cell, j),
+                     closing = face ? *face : bt_law_closing(world, cell, j, manifold);
+    const double least = own[BT_CRUSH_LEAST] * h,
+                 least_way = bt_max((face ? LEAST_OF_FACE : LEAST_WAY) * world->par.size, 2 * slop);
     bt_hit hits[2] = {0};
     double place[2] = {0}, in[2] = {0};
     bool strikes[2] = {false};
@@ -290,9 +306,12 @@ static void bound(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair 
     resistance ice[2], found[2];
     for (int look = 0; look < LOOKS; look++) {
         bt_bearing of[2];
-        bt_bearing_of(world, cell, j, manifold, &closing, (double[2]){closing.gap + slop, closing.gap + way}, of);
+        const double depth[2] = {closing.gap + slop, closing.gap + way};
+        if (face) bt_bearing_of(world, cell, j, depth, of);
+        else bear_alone(world, pair, manifold, &closing, depth, of);
         for (int i = 0; i < manifold->n_points; i++) {
-            found[i] = resistance_of(of[i].length, of[i].area, least, line, slop, way);
+            const double own_way = bt_max(way - of[i].late, 2 * slop);
+            found[i] = resistance_of(of[i].length, of[i].area, least * of[i].least, line, slop, own_way);
             if (look == 0) ice[i] = found[i];
             take_resistance(&hits[i], &found[i], dt);
         }
@@ -324,11 +343,13 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
     if (cell->laws->limits[j].record[BT_LAW_RAFTING] >= 0) return INFINITY;
     const double h = bt_crush_thickness(&world->bodies, contact->a, contact->b), touch = TOUCH * world->par.size,
                  *own = world->par.law_own[BT_LAW_CRUSHING];
-    int touching;
-    const int sharing = bt_bearing_points(world, cell, j, &touching);
-    const double line = own[BT_CRUSH_PRESSURE] * h,
-                 least = own[BT_CRUSH_LEAST] * h * (sharing > 0 && touching > 0 ? (double)touching / sharing : 1);
-    double gap = INFINITY, way = LEAST_WAY * world->par.size, length[2], area[2];
+    const double line = own[BT_CRUSH_PRESSURE] * h, least = own[BT_CRUSH_LEAST] * h;
+    const bt_closing *face = bt_bearing_closing(world, cell, j);
+    // of a face with several contacts each takes the same share of the energy and of the force
+    const double share = bt_bearing_share(world, cell, j);
+    if (!(share > 0)) return 0;
+    energy /= share;
+    double gap = face ? face->gap : INFINITY, way = LEAST_WAY * world->par.size, length[2], area[2];
     for (int i = 0; i < contact->n; i++) gap = bt_min(gap, bt_max(0, cell->gaps[j].gap[i]));
     length[0] = bt_bearing_whole(world, cell, j, gap + touch, &area[0]);
     resistance ice = {0};
@@ -341,9 +362,10 @@ static double bears(const bt_world *world, const bt_cell *cell, bt_idx j, double
         if (!(fabs(next - way) > PRECISION * way)) break;
         way = next;
     }
-    const double y = bt_hit_root(0.5 * ice.ramp, ice.touch, energy);
-    return y <= ice.kink ? ice.touch + ice.ramp * y
-                         : ice.force + ice.slope * bt_hit_root(0.5 * ice.slope, ice.force, energy - ice.work);
+    double y = bt_hit_root(0.5 * ice.ramp, ice.touch, energy);
+    if (y <= ice.kink) return share * (ice.touch + ice.ramp * y);
+    y = bt_hit_root(0.5 * ice.slope, ice.force, energy - ice.work);
+    return share * (ice.force + ice.slope * y);
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------

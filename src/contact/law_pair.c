@@ -44,32 +44,30 @@ double bt_law_approach(const bt_world *world, const bt_contact *contact, int i)
     return bt_max(0, -bt_min(before, free));
 }
 
-bt_closing bt_law_closing_at(const bt_world *world, int n, const double gap[2], const double outline[2],
-                             const double approach[2])
+bool bt_law_takes_part(const bt_world *world, double gap, double outline, double approach, double least,
+                       double nearest)
 {
+    // These points are found whatever the margin: it is at least the slop, and the distance that two bodies at the
+    // highest speed nearby cover (space/cells.h, except for its cap); and manifold.c looks a slop farther.
     const double slop = world->par.slop;
-    bt_closing closing = {.gap = INFINITY};
-    double nearest = INFINITY;
-    for (int i = 0; i < n; i++)
-        closing.gap = bt_min(closing.gap, bt_max(gap[i], 0)), nearest = bt_min(nearest, outline[i]);
-    for (int i = 0; i < n; i++) {
-        // These points are found whatever the margin: it is at least the slop, and the distance that two bodies at the
-        // highest speed nearby cover (space/cells.h, except for its cap); and manifold.c looks a slop farther.
-        closing.point[i] = gap[i] <= bt_max(world->par.dt * approach[i], slop) || gap[i] <= closing.gap ||
-                           outline[i] <= nearest + slop;
-        closing.n += closing.point[i];
-        if (closing.point[i]) closing.approach = bt_max(closing.approach, approach[i]);
-    }
-    return closing;
+    return gap <= bt_max(world->par.dt * approach, slop) || gap <= least || outline <= nearest + slop;
 }
 
 bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, const bt_manifold *manifold)
 {
     const bt_contact *contact = &cell->contacts[j];
-    double outline[2], approach[2];
+    const double *gap = cell->gaps[j].gap;
+    bt_closing closing = {.gap = INFINITY};
+    double nearest = INFINITY;
     for (int i = 0; i < contact->n; i++)
-        outline[i] = manifold->p[i].gap, approach[i] = bt_law_approach(world, contact, i);
-    return bt_law_closing_at(world, contact->n, cell->gaps[j].gap, outline, approach);
+        closing.gap = bt_min(closing.gap, bt_max(gap[i], 0)), nearest = bt_min(nearest, manifold->p[i].gap);
+    for (int i = 0; i < contact->n; i++) {
+        const double approach = bt_law_approach(world, contact, i);
+        closing.point[i] = bt_law_takes_part(world, gap[i], manifold->p[i].gap, approach, closing.gap, nearest);
+        closing.n += closing.point[i];
+        if (closing.point[i]) closing.approach = bt_max(closing.approach, approach);
+    }
+    return closing;
 }
 
 bt_patch bt_law_patch(const bt_world *world, const uint16_t part[2], const bt_manifold *manifold, double way,

@@ -33,9 +33,10 @@ bt_closing bt_law_closing(const bt_world *world, const bt_cell *cell, bt_idx j, 
 /// m/s.
 double bt_law_approach(const bt_world *world, const bt_contact *contact, int i);
 
-/// The same from the gaps between the remaining surfaces and between the outlines, m, and the approaches of n points.
-bt_closing bt_law_closing_at(const bt_world *world, int n, const double gap[2], const double outline[2],
-                             const double approach[2]);
+/// Does a point take part, by its gaps between the remaining surfaces and between the outlines, m, and its approach?
+/// least: the first gap of the nearest, at least 0; nearest: the second.
+bool bt_law_takes_part(const bt_world *world, double gap, double outline, double approach, double least,
+                       double nearest);
 
 /// Place of point i along the tangent, from the centroid of a, m.
 static inline double bt_law_along(const bt_manifold *manifold, int i)

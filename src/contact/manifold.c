@@ -402,6 +402,7 @@ static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margi
 
 // rad by which a direction may stand outside a cone: two parts of a straight shore may both count, never neither
 #define CONE 1e-6
+#define STRAIGHT 0.01 // rad by which an outline may turn where it is no corner that bears
 #define DETOUR 4  // depth along an axis that counts / depth along the best of all; more only within the tie
 
 typedef struct {
@@ -429,17 +430,26 @@ static bool edge_counts(const part_of_body *part, int i)
     return part->whole || part->mark[next].corner == (after < part->corners ? after : 0);
 }
 
+/// The edges of the outline before and after corner i of a part of a floe.
+static void edges_at(const part_of_body *part, int i, double before[2], double after[2])
+{
+    const int here = part->mark[i].corner, last = here > 0 ? here - 1 : part->corners - 1,
+              next = here + 1 < part->corners ? here + 1 : 0;
+    for (int k = 0; k < 2; k++) {
+        before[k] = part->outline[2 * here + k] - part->outline[2 * last + k];
+        after[k] = part->outline[2 * next + k] - part->outline[2 * here + k];
+    }
+}
+
 static bool corner_counts(const part_of_body *part, int i, double nx, double ny)
 {
     if (part->whole) return true;
     if (part->face) return bt_shore_in_cone(&part->face[i], nx, ny);
-    const int here = part->mark[i].corner, before = here > 0 ? here - 1 : part->corners - 1,
-              after = here + 1 < part->corners ? here + 1 : 0;
-    const double *o = part->outline;
-    const double ax = o[2 * here] - o[2 * before], ay = o[2 * here + 1] - o[2 * before + 1];
-    const double bx = o[2 * after] - o[2 * here], by = o[2 * after + 1] - o[2 * here + 1];
-    if (ax * by - ay * bx <= 0) return false;
-    return nx * ax + ny * ay >= -CONE * bt_hypot(ax, ay) && nx * bx + ny * by <= CONE * bt_hypot(bx, by);
+    double a[2], b[2];
+    edges_at(part, i, a, b);
+    if (a[0] * b[1] - a[1] * b[0] <= 0) return false;
+    return nx * a[0] + ny * a[1] >= -CONE * bt_hypot(a[0], a[1]) &&
+           nx * b[0] + ny * b[1] <= CONE * bt_hypot(b[0], b[1]);
 }
 
 /// Vertex of `shape` that reaches farthest against (nx, ny).
@@ -575,6 +585,22 @@ static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint1
     clip_what_counts(&p[ref], &side[ref], &p[!ref], ref, d, most, manifold);
     if (manifold->n_points == 0) deepest_point(&p[ref].p, &side[ref], &p[!ref].p, ref, d, manifold);
     return true;
+}
+
+bool bt_contacts_at_corner(const bt_world *world, const bt_pair *pair, uint32_t feature)
+{
+    if ((feature & 0x7ff00000u) == 0x7ff00000u) return true; // join_corners
+    const bool in_b = (feature >> 31) == (feature & 1);
+    const part_of_body part = part_of(world, in_b ? pair->b : pair->a, pair->part[in_b], 0, 0);
+    const int i = (int)((feature & 0xfffff) >> 1) % part.p.count;
+    if (part.whole) return true;
+    if (part.face) {
+        const double *u = part.face[i].u, *w = part.face[i].w;
+        return u[0] * w[1] - u[1] * w[0] > STRAIGHT;
+    }
+    double a[2], b[2];
+    edges_at(&part, i, a, b);
+    return a[0] * b[1] - a[1] * b[0] > STRAIGHT * bt_hypot(a[0], a[1]) * bt_hypot(b[0], b[1]);
 }
 
 bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin,

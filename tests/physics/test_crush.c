@@ -837,6 +837,8 @@ static const quay quays[] = {
     {4, {{-9, -0.3}, {-0.3, 0}, {0, 0.2}, {0.2, 9}}},        // with short pieces
     {2, {{-9, 0.25}, {-0.25, 9}}},                           // overlapping
     {3, {{-9, 0.4}, {-0.4, 9}, {-0.2, 0.3}}},                // three times in places
+    {2, {{-9, -0.497}, {-0.497, 9}}},                        // at the end of the face, where points are merged
+    {2, {{-0.497, 9}, {-9, -0.497}}},
 };
 enum { QUAYS = sizeof quays / sizeof *quays };
 
@@ -1031,6 +1033,112 @@ TEST(a_seam_beside_a_corner_leaves_it_the_least_length)
     }
     assert_true(depth[0] > 0.01);
     for (int i = 1; i < 3; i++) CHECK_CLOSE(depth[i], depth[0], 0.02 * depth[0]);
+}
+
+/// A corner strikes a quay some millimetres beside a seam: v √(m/k) deep, as if there were none.
+TEST(a_corner_beside_a_seam_bears_as_elsewhere)
+{
+    const double h = 0.1, speed = 0.5, depth = speed * sqrt(sheet / (2 * pressure * h)), beside[] = {5e-4, 2e-3, 7e-3};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            const double steps[] = {1e-3, 0.02, 0.1};
+            bt_params p = params(steps[k]);
+            p.slop = 1e-3, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+            bt_world *w = bt_world_create(&p);
+            add_quay(w, 2, (const double[2][2]){{-9, beside[i]}, {beside[i], 9}});
+            double v[8];
+            scene_square(1, v);
+            add_floe(w, 4, v, -sqrt(0.5), 0, 0.25 * BT_PI, speed, h);
+            for (int s = 0; s < 0.6 / p.dt; s++) bt_world_step(w);
+            CHECK_CLOSE(pose(w, 2)->x + sqrt(0.5), depth, 2e-3 * depth);
+            bt_world_free(w);
+        }
+}
+
+/// A tilted face that turns on a quay until it lies flush bears at its ends, not at the seams between them, and ends as
+/// on a quay in one piece.
+TEST(a_tilted_face_turns_about_its_ends)
+{
+    const double yaw = 0.08;
+    bt_pose whole = {0};
+    double work[QUAYS] = {0};
+    for (int i = 0; i < QUAYS; i++) {
+        bt_params p = params(5e-3);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        bt_world *w = bt_world_create(&p);
+        add_quay(w, quays[i].n, quays[i].from_to);
+        double v[8];
+        scene_square(1, v);
+        const bt_gid floe = quays[i].n;
+        add_floe(w, 4, v, -0.5 * (cos(yaw) + sin(yaw)), 0.05, yaw, 0.5, 0.1);
+        for (int s = 0; s < 300; s++) {
+            bt_world_step(w);
+            work[i] += scene_law(w, "crushed_work");
+        }
+        if (i == 0) whole = *pose(w, floe);
+        CHECK_CLOSE(work[i], work[0], 0.01 * work[0]);
+        CHECK_CLOSE(pose(w, floe)->x, whole.x, 2e-3);
+        CHECK_CLOSE(pose(w, floe)->yaw, whole.yaw, 5e-3);
+        bt_world_free(w);
+    }
+}
+
+/// A quay stands closely behind a narrower one. A floe that crushes the first reaches the second, which then bears only
+/// beside the first: p h times the width of the floe from there on, whichever is first in the list.
+TEST(a_piece_behind_another_adds_only_what_it_shows)
+{
+    const double h = 0.1, speed = 2, behind = 0.01, width = 0.94, energy = 0.5 * sheet * speed * speed / (pressure * h),
+                 depth = energy + behind * (1 - width);
+    for (int i = 0; i < 4; i++) {
+        const bool behind_first = i & 1;
+        bt_params p = params(i & 2 ? 0.02 : 0.002);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        bt_world *w = bt_world_create(&p);
+        for (int k = 0; k < 4; k++) {
+            const bool back = k / 2 != behind_first;
+            const double half = back ? 2 : 0.25 * width, thick = back ? 2 : 5e-3;
+            double v[] = {-thick, -half, thick, -half, thick, half, -thick, half};
+            const bt_body_def d = {.motion = BT_STATIC, .n_vertices = 4, .vertices = v,
+                                   .x = thick + (back ? behind : 0), .y = k % 2 ? half : -half};
+            bt_world_add(w, &d);
+        }
+        bt_shore_create(w);
+        double v[8];
+        scene_square(1, v);
+        add_floe(w, 4, v, -0.5, 0, 0, speed, h);
+        for (int s = 0; s < (i & 2 ? 20 : 100); s++) bt_world_step(w);
+        CHECK_CLOSE(pose(w, 4)->x, -0.5 + depth, 0.02 * depth);
+        CHECK_CLOSE(pose(w, 4)->yaw, 0, 1e-3);
+        bt_world_free(w);
+    }
+}
+
+/// A round floe in parts comes in so fast that a step takes it past its next corners, Δt √(k/m) = 3. They bear only
+/// from where they touch: the dent is as deep as in short steps.
+TEST(parts_reached_within_the_step)
+{
+    enum { N = 32 };
+    double depth[2];
+    for (int i = 0; i < 2; i++) {
+        double v[2 * N];
+        for (int k = 0; k < N; k++) v[2 * k] = cos(2 * BT_PI * k / N), v[2 * k + 1] = sin(2 * BT_PI * k / N);
+        v[N] = 0.2, v[N + 1] = 0;
+        bt_parts parts;
+        bt_body_def d = scene_prism(N, v, sheet);
+        assert_true(bt_outline_split(N, v, &parts));
+        const double k = 2 * pressure * 0.1 * tan(BT_PI / 2 - BT_PI / N);
+        bt_params p = params((i ? 3 : 0.01) * sqrt(d.mass / k));
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        bt_world *w = bt_world_create(&p);
+        d.parts = &parts, d.vx = 0.75, d.thickness = 0.1;
+        bt_world_add(w, &d);
+        scene_wall(w, v[0], -50, 5, 50, 0);
+        for (int s = 0; s < (i ? 10 : 1000); s++) bt_world_step(w);
+        depth[i] = pose(w, 0)->x;
+        bt_world_free(w);
+    }
+    assert_true(depth[0] > 0.03);
+    CHECK_CLOSE(depth[1], depth[0], 0.12 * depth[0]);
 }
 
 TEST_MAIN(NULL, NULL)
