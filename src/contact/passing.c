@@ -69,37 +69,41 @@ static void add_load_to(const bt_world *world, const bt_contact *contact, double
     bt_store(&v[contact->b], inv[contact->b], &vb);
 }
 
-static bool is_loaded(const bt_contact *contact) { return contact->ln[0] != 0 || contact->ln[1] != 0; }
+/// Is row j one that may be released: loaded, and not known to belong to a pair that meets?
+static bool in_question(const bt_cell *cell, bt_idx j)
+{
+    const bt_contact *contact = &cell->contacts[j];
+    return cell->gaps[j].row != BT_ROW_STAYS && cell->gaps[j].row != BT_ROW_RELEASED &&
+           (contact->ln[0] != 0 || contact->ln[1] != 0);
+}
 
-/// A review under way. Totals: the rows that it has changed; loaded rows that may be released.
+/// A review under way.
 typedef struct {
     bool release;
-    bt_vel *v; ///< [n bodies] velocities under the loads that stay and those of rows confirmed so far
+    bt_vel *v; ///< [n bodies] velocities without the loads in question, but with those of the rows confirmed so far
 } review;
-enum { CHANGED, IN_QUESTION, N_REVIEW };
+enum { PASSING, OPEN, CONFIRMED, AGAINST, RELEASED, N_REVIEW }; ///< totals: rows
 
-/// Release rows whose pair passes without their load, and restore those of released pairs that meet.
-static void review_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+static int64_t count(const bt_totals *totals, int which) { return (int64_t)bt_sum_value(&totals->sum[which]); }
+
+/// Mark rows whose pair passes without their load.
+static void look_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    const review *r = context;
+    (void)context;
     bt_cell *cell = &world->cells->cell[k];
-    int changed = 0, in_question = 0;
+    int n[N_REVIEW] = {0};
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];
-        const bool released = cell->gaps[j].row == BT_ROW_RELEASED;
-        if (cell->gaps[j].row == BT_ROW_STAYS || (!released && !is_loaded(contact))) continue;
+        n[RELEASED] += cell->gaps[j].row == BT_ROW_RELEASED;
+        if (!in_question(cell, j)) continue;
         bt_vel va = world->bodies.vel[contact->a], vb = world->bodies.vel[contact->b];
         add_load(world, contact, -1, &va, &vb);
-        if (meets(world, cell, contact, &va, &vb) != released) {
-            in_question += !released;
-            continue;
-        }
-        if (released) bt_pack_set_row(world, cell, j, BT_ROW_STAYS);
-        else if (r->release) bt_pack_set_row(world, cell, j, BT_ROW_RELEASED);
-        changed++;
+        const bool open = meets(world, cell, contact, &va, &vb);
+        if (!open) cell->gaps[j].row = BT_ROW_PASSING;
+        n[open ? OPEN : PASSING]++;
     }
-    if (changed > 0) bt_sum_add(&totals->sum[CHANGED], changed);
-    if (in_question > 0) bt_sum_add(&totals->sum[IN_QUESTION], in_question);
+    for (int i = 0; i < N_REVIEW; i++)
+        if (n[i] > 0) bt_sum_add(&totals->sum[i], n[i]);
 }
 
 static void copy_velocities(bt_world *world, bt_idx k, const void *context, bt_totals *none)
@@ -110,17 +114,16 @@ static void copy_velocities(bt_world *world, bt_idx k, const void *context, bt_t
            (size_t)(cell->end - cell->first) * sizeof *world->bodies.vel);
 }
 
-/// Remove the loads of the rows in question.
+/// Remove the loads in question.
 static void unload_cell(bt_world *world, bt_idx k, const void *context, bt_totals *none)
 {
     (void)none;
     const bt_cell *cell = &world->cells->cell[k];
     for (bt_idx j = 0; j < cell->n_contacts; j++)
-        if (cell->gaps[j].row == BT_ROW_OPEN && is_loaded(&cell->contacts[j]))
-            add_load_to(world, &cell->contacts[j], -1, ((const review *)context)->v);
+        if (in_question(cell, j)) add_load_to(world, &cell->contacts[j], -1, ((const review *)context)->v);
 }
 
-/// Confirm rows in question whose pair meets under the loads so far, and add their loads.
+/// Confirm rows whose pair meets under the loads so far, and add their loads.
 static void confirm_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     bt_vel *v = ((const review *)context)->v;
@@ -128,56 +131,76 @@ static void confirm_cell(bt_world *world, bt_idx k, const void *context, bt_tota
     int confirmed = 0;
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *contact = &cell->contacts[j];
-        if (cell->gaps[j].row != BT_ROW_OPEN || !is_loaded(contact) ||
+        if (cell->gaps[j].row != BT_ROW_OPEN || !in_question(cell, j) ||
             !meets(world, cell, contact, &v[contact->a], &v[contact->b])) continue;
         add_load_to(world, contact, 1, v);
         cell->gaps[j].row = BT_ROW_CONFIRMED;
         confirmed++;
     }
-    if (confirmed > 0) bt_sum_add(&totals->sum[CHANGED], confirmed);
+    if (confirmed > 0) bt_sum_add(&totals->sum[CONFIRMED], confirmed);
 }
 
-/// Release the rows that were not confirmed.
-static void end_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
+/// Collective. Confirm the open rows, of this number, that follow from loads which do not depend on them.
+static void confirm(bt_world *world, review *r, int64_t open)
+{
+    r->v = bt_alloc_unset((size_t)world->bodies.n + 1, sizeof *r->v); // a rank may hold nothing
+    bt_phases_run(world, BT_WITH_WORK, &(bt_before){copy_velocities, r}, unload_cell, r, r->v, &(bt_totals){0});
+    for (int64_t more = 1; open > 0 && more > 0; open -= more) {
+        bt_totals totals = {.n_sums = N_REVIEW};
+        bt_phases_run(world, BT_WITH_WORK, NULL, confirm_cell, r, r->v, &totals);
+        bt_domain_reduce(world, &totals);
+        more = count(&totals, CONFIRMED);
+    }
+    free(r->v);
+}
+
+/// Release the rows in question that were not confirmed.
+static void release_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
     const review *r = context;
     bt_cell *cell = &world->cells->cell[k];
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
-        bt_gaps *gaps = &cell->gaps[j];
-        if (gaps->row == BT_ROW_CONFIRMED) {
-            gaps->row = BT_ROW_OPEN;
-        } else if (gaps->row == BT_ROW_OPEN && is_loaded(&cell->contacts[j])) {
-            if (r->release) bt_pack_set_row(world, cell, j, BT_ROW_RELEASED);
-            bt_sum_add(&totals->sum[CHANGED], 1);
-        }
+        if (!in_question(cell, j)) continue;
+        const bool stays = cell->gaps[j].row == BT_ROW_CONFIRMED || !r->release;
+        if (cell->gaps[j].row != BT_ROW_CONFIRMED) bt_sum_add(&totals->sum[AGAINST], 1);
+        if (stays) cell->gaps[j].row = BT_ROW_OPEN;
+        else bt_pack_set_row(world, cell, j, BT_ROW_RELEASED);
     }
 }
 
-/// Collective. Release rows in question, of this number, that only confirm each other. Returns how many.
-static int64_t release_circles(bt_world *world, review *r, int64_t in_question)
+/// Restore released rows whose pair meets.
+static void restore_cell(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
 {
-    r->v = bt_alloc_unset((size_t)world->bodies.n + 1, sizeof *r->v);
-    bt_phases_run(world, BT_WITH_WORK, &(bt_before){copy_velocities, r}, unload_cell, r, r->v, &(bt_totals){0});
-    for (int64_t more = in_question; in_question > 0 && more > 0; in_question -= more) {
-        bt_totals totals = {.n_sums = N_REVIEW};
-        bt_phases_run(world, BT_WITH_WORK, NULL, confirm_cell, r, r->v, &totals);
-        bt_domain_reduce(world, &totals);
-        more = (int64_t)bt_sum_value(&totals.sum[CHANGED]);
+    (void)context;
+    bt_cell *cell = &world->cells->cell[k];
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *contact = &cell->contacts[j];
+        if (cell->gaps[j].row != BT_ROW_RELEASED ||
+            !meets(world, cell, contact, &world->bodies.vel[contact->a], &world->bodies.vel[contact->b])) continue;
+        bt_pack_set_row(world, cell, j, BT_ROW_STAYS);
+        bt_sum_add(&totals->sum[AGAINST], 1);
     }
-    free(r->v);
+}
+
+/// Collective. A pass in any order; returns the rows of this kind.
+static int64_t pass(bt_world *world, bt_visit *visit, const review *r)
+{
     bt_totals totals = {.n_sums = N_REVIEW};
-    bt_phases_any_order(world, end_cell, r, &totals);
+    bt_phases_any_order(world, visit, r, &totals);
     bt_domain_reduce(world, &totals);
-    return (int64_t)bt_sum_value(&totals.sum[CHANGED]);
+    return count(&totals, AGAINST);
 }
 
 int64_t bt_passing_review(bt_world *world, bool release)
 {
-    bt_totals totals = {.n_sums = N_REVIEW};
     review r = {.release = release};
-    bt_phases_any_order(world, review_cell, &r, &totals);
+    bt_totals totals = {.n_sums = N_REVIEW};
+    bt_phases_any_order(world, look_cell, &r, &totals);
     bt_domain_reduce(world, &totals);
-    const int64_t in_question = (int64_t)bt_sum_value(&totals.sum[IN_QUESTION]),
-                  circular = in_question > 0 ? release_circles(world, &r, in_question) : 0;
-    return (int64_t)bt_sum_value(&totals.sum[CHANGED]) + circular;
+    const int64_t open = count(&totals, OPEN);
+    if (open > 0) confirm(world, &r, open);
+    const int64_t against = open + count(&totals, PASSING) > 0 ? pass(world, release_cell, &r) : 0;
+    // What is released now may be the only reason why pairs that were released before meet.
+    if ((release && against > 0) || count(&totals, RELEASED) == 0) return against;
+    return against + pass(world, restore_cell, &r);
 }

@@ -233,7 +233,7 @@ static void clock_phase(bt_world *world, double *phase, double *t0)
 /// grown are detected again.
 static void solve_contacts(bt_world *world)
 {
-    enum { MAX_REPEATS = 4, MAX_ROUNDS = 8, MAX_RELEASES = 3 };
+    enum { MAX_REPEATS = 4, MAX_ROUNDS = 16, MAX_RELEASES = 7 };
     bt_step_stats *st = &world->stats;
     bt_bodies *bodies = &world->bodies;
     double t0 = bt_clock();
