@@ -1,8 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # House rules that a machine can check: names of external symbols, licence lines, include guards, layers, comments of
-# public functions, length of lines, and what cppcheck, shellcheck, pyflakes and mypy find. A checker that is not
-# installed is left out and named; where CI=true it must be there. clang-tidy takes minutes: make tidy.
+# public functions, their care for locale and rounding, length of lines, and what cppcheck, shellcheck, pyflakes and
+# mypy find. A checker that is not installed is left out and named; where CI=true it must be there. clang-tidy takes
+# minutes: make tidy.
 #
 # lint.sh changed: files that differ from the branch main, or from the last commit where there is none, alone; rules
 # between files are held by all.
@@ -51,6 +52,7 @@ python=${PYTHON:-/usr/bin/python3}
 for f in sys.argv[1:]: ast.parse(open(f).read(), f)" $(files '*.py') || complain "not Python: see above"
 "$python" tests/layers.py || complain "layers: see above; docs/architecture.md says what may call what"
 "$python" tests/documented.py include/bergtow/*.h || complain "public headers: see above"
+"$python" tests/plain_numbers.py || complain "numbers: see above"
 "$python" tests/mutants.py || complain "mutants: their texts have to follow the sources"
 # shellcheck disable=SC2046 # one word a file
 "$python" tests/columns.py $(files '*.c' '*.h' '*.py' '*.md' \

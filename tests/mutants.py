@@ -1038,8 +1038,11 @@ MUTANTS = {
         ("if (write(fd, \".\", 1) == 1) fsync(fd);", "if (write(fd, \".\", 1) != 1) (void)0;",
          "attempts are not synced"),
     ]),
-    "src/base/base.c": (["cli/test_faults.py::test_no_memory"], [
+    "src/base/base.c": (["cli/test_faults.py::test_no_memory", "unit/test_plain_numbers", "cli/test_host.py"], [
         ("    leave(BT_ERR_NUMERIC);\n", "    exit(BT_ERR_NUMERIC);\n", "HDF5 closes files from within itself"),
+        ("if (before->changed) fesetenv(&before->environment);", "", "the program loses its rounding mode"),
+        (".changed = !is_default_environment()", ".changed = fegetround() != FE_TONEAREST", "traps stay"),
+        ("return uselocale(locale);", "return uselocale((locale_t)0);", "the program's decimal comma"),
     ]),
     "src/app/main.c": (["cli/test_resume.py::test_nohup"], [
         ("if (hangup_known) sigaction(SIGHUP, &hangup, NULL);", "", "a library takes SIGHUP from nohup"),

@@ -138,7 +138,8 @@ def prepare(n):
         if name != "tree0" and not tree.exists():
             subprocess.run(["cp", "-a", HERE / "tree0", tree], check=True)
         copy_source(tree)
-        code, out = make(tree, "all", *(f"build/release/tests/fault/{s}.so" for s in ("fault", "calls", "memory")))
+        preloaded = (f"build/release/tests/fault/{s}.so" for s in ("fault", "calls", "memory", "host"))
+        code, out = make(tree, "all", *preloaded)
         assert code == 0, out
         short = tree / "build/release/limited"
         short.write_text(f'#!/bin/sh\nulimit -t {PROCESSOR["scene"]}\nexec "$(dirname "$0")/bergtow" "$@"\n')

@@ -57,8 +57,9 @@ void bt_errors_add(bt_errors *err, const char *fmt, ...) __attribute__((format(p
 void bt_errors_add_list(bt_errors *err, const char *fmt, va_list args) __attribute__((format(printf, 2, 0)));
 /// Append a message. Errors: returns the given status.
 bt_status bt_fail(bt_errors *err, bt_status status, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
-/// Set the code of the last message. Codes of errors: no_solution, by guard.no_solution (src/run/guard.h); other_study,
-/// the folder of an ensemble holds another study; one_field, no seed changes the ice of a study with several fields.
+/// Set the code of the last message, if there is one. Codes of errors: no_solution, by guard.no_solution
+/// (src/run/guard.h); other_study, the folder of an ensemble holds another study; one_field, no seed changes the ice of
+/// a study with several fields.
 void bt_errors_code(bt_errors *err, const char *code);
 /// Print every message on stderr, one per line, prefixed "bergtow: ", followed by its code in brackets; if the
 /// environment has BERGTOW_MESSAGES=json, as an object {"warning", "code", "text"} for programs.

@@ -43,7 +43,8 @@ extern const bt_comm bt_comm_alone;
 /// processes but MPI sees only one.
 bt_status bt_comm_start(int *argc, char ***argv);
 
-/// Collective. End the program: wait for all ranks without using their cores, stop MPI, and return the worst code.
+/// Collective. End the program: wait for all ranks without using their cores, stop MPI, and return the worst code: that
+/// of bt_comm_agree, or the largest of those that are no bt_status, such as EXIT_FAILURE.
 int bt_comm_end(int code);
 
 /// End all ranks now, from any rank, without waiting for the others. Flushes stdout and stderr first.

@@ -23,6 +23,9 @@
 // Additions of a program (laws, applied forces, quantities, keys, shapes) belong to the process, and must precede the
 // simulations that use them; existing simulations continue without them. None acts while an ice field is made.
 //
+// Numbers. Calls, and functions that they call, have a decimal point and the default floating-point environment; on
+// return the program has its own again.
+//
 // Signals. None is caught, unless options.signals requests the program's handlers, from create to end. While METIS cuts
 // the field into parts for several ranks, SIGTERM is delayed.
 //

@@ -189,6 +189,7 @@ static bool knows_all(const bt_launcher *by)
 
 bt_status bt_comm_start(int *argc, char ***argv)
 {
+    BT_PLAIN_NUMBERS;
     if (running) return BT_OK;
     if (!wants_division(&world.divides)) return BT_ERR_USAGE;
     int begun = 0;
@@ -219,6 +220,7 @@ bt_status bt_comm_start(int *argc, char ***argv)
 
 int bt_comm_end(int code)
 {
+    BT_PLAIN_NUMBERS;
     if (!running) return code;
     // Wait for all: a launcher that sees one rank exit with an error ends the others, in the middle of their messages.
     fflush(NULL);
@@ -243,14 +245,15 @@ _Noreturn void bt_comm_abort(int code)
 
 bt_status bt_comm_agree(const bt_comm *comm, bt_status status)
 {
+    BT_PLAIN_NUMBERS;
     if (comm->size == 1) return status;
     static const bt_status order[] = {BT_OK, BT_ERR_SIGNAL, BT_ERR_USAGE, BT_ERR_CASE, BT_ERR_NUMERIC, BT_ERR_IO};
     enum { N = sizeof order / sizeof *order };
-    double worst = N - 1;
+    double worst = N + (double)(uint32_t)status; // a code of the program's own
     for (int i = 0; i < N; i++)
         if (order[i] == status) worst = i;
     bt_comm_reduce(comm, NULL, 0, &worst, 1, NULL, 0);
-    return order[(int)worst];
+    return worst < N ? order[(int)worst] : (bt_status)(uint32_t)(worst - N);
 }
 
 static bool has(const bt_errors *err, const char *text)
@@ -264,6 +267,7 @@ static const char *code_of(const bt_errors *err, size_t i) { return err->note[i]
 
 void bt_comm_errors(const bt_comm *comm, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     if (comm->size == 1) return;
     int n = 0, *counts = NULL, *starts = NULL, all = 0;
     for (size_t i = 0; i < err->n; i++) n += (int)(strlen(code_of(err, i)) + strlen(err->text[i])) + 2;
@@ -303,6 +307,7 @@ void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes)
 
 bt_status bt_comm_same(const bt_comm *comm, const char *path, const char *text, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     char mine[BT_CHECKSUM_DIGEST], first[BT_CHECKSUM_DIGEST];
     bt_checksum_digest_text(text, strlen(text), mine);
     memcpy(first, mine, sizeof first);
@@ -392,6 +397,7 @@ static void combine_all(const bt_comm *comm, item *items, item *other, int n)
 
 void bt_comm_reduce(const bt_comm *comm, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors)
 {
+    BT_PLAIN_NUMBERS;
     if (comm->size == 1) return;
     enum { FEW = 64 };
     item few[2 * FEW], *items = few;
@@ -493,6 +499,7 @@ static int running_sum(int size, const int *counts, int *starts)
 bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
                               const double *rows, double *block, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const int size = comm->size;
     const int64_t from = first[comm->rank], count = first[comm->rank + 1] - from;
     if (size == 1) return put_in_order(from, count, n, gid, width, rows, block, err);

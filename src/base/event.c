@@ -28,6 +28,7 @@ void bt_events_free(bt_events *events)
 
 void bt_event_describe(const bt_event *event, char out[160])
 {
+    BT_PLAIN_NUMBERS;
     switch (event->kind) {
     case BT_EVENT_LINE_BROKEN:
         snprintf(out, 160, "branch %" PRId64 " of the tow line broke under %.4g N", event->subject, event->value);

@@ -3,7 +3,9 @@
 #ifndef BT_INSIDE_H
 #define BT_INSIDE_H
 
+#include <fenv.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 /// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
@@ -14,10 +16,24 @@
 #define BT_MANY(n, few) ((n) > (few))
 #endif
 
-/// From here on this thread writes and reads numbers with a decimal point, whatever the locale of the program that uses
-/// the library. Returns the argument for bt_point_end, which restores the locale; such pairs may be nested.
-void *bt_point_begin(void);
-void bt_point_end(void *before);
+/// From here to the end of the block this thread writes and reads numbers with a decimal point, and computes as C does
+/// by default: rounding to nearest, no traps, subnormal numbers kept. The locale and the floating-point environment of
+/// the program that uses the library are back at the end. Blocks may be nested.
+///
+/// It comes first in every public function, except those without such numbers (named in tests/plain_numbers.py), and in
+/// every OpenMP team: threads keep the environment in which they were created, maybe by a team of the program's own.
+/// So functions of the program that the library calls (forces, quantities) run with it, too. 10 ns where there is
+/// nothing to change, 0.3 µs where there is.
+#define BT_PLAIN_NUMBERS                                                                                               \
+    __attribute__((cleanup(bt_numbers_restore), unused)) const bt_numbers numbers_until_return = bt_numbers_plain()
+
+typedef struct bt_numbers {
+    void *locale;        ///< of the thread
+    bool changed;        ///< the environment
+    fenv_t environment;  ///< as it was, if changed
+} bt_numbers;
+bt_numbers bt_numbers_plain(void);
+void bt_numbers_restore(const bt_numbers *before);
 
 /// Set the function that ends the program at once, with a code: _Exit, or one that ends the other ranks, too.
 void bt_leave_by(void (*by)(int code));

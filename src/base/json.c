@@ -89,12 +89,10 @@ void bt_json_number(bt_json *json, const char *key, double value)
 {
     member(json, key);
     char text[40] = "null";
-    void *locale = bt_point_begin();
     for (int digits = 15; isfinite(value) && digits <= 17; digits++) {
         snprintf(text, sizeof text, "%.*g", digits, value);
         if (strtod(text, NULL) == value) break;
     }
-    bt_point_end(locale);
     puts_(json, text);
 }
 
@@ -116,14 +114,12 @@ void bt_json_numbers(bt_json *json, const char *key, int64_t n, const double *va
 {
     member(json, key);
     puts_(json, "[");
-    void *locale = bt_point_begin();
     for (int64_t i = 0; i < n; i++) {
         char text[40] = "null";
         if (isfinite(values[i])) snprintf(text, sizeof text, "%.7g", values[i]);
         if (i) puts_(json, ", ");
         puts_(json, text);
     }
-    bt_point_end(locale);
     puts_(json, "]");
 }
 
@@ -226,6 +222,7 @@ static void print_json(const char *text, const char *code)
 
 void bt_errors_print(const bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const char *as = getenv("BERGTOW_MESSAGES");
     for (size_t i = 0; i < err->n; i++) {
         const char *code = err->note[i].code;
@@ -236,6 +233,7 @@ void bt_errors_print(const bt_errors *err)
 
 void bt_errors_warn(const char *fmt, ...)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors one = {0};
     va_list ap;
     va_start(ap, fmt);

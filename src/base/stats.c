@@ -28,8 +28,8 @@
 // separates the means of the two halves by three standard errors of their difference is detected in 89 to 92 %, 90 % on
 // average (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
-#include "base/inside.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -94,6 +94,7 @@ static double slow_variance(const double *z, int count, int64_t n, int from, int
 
 bt_mean bt_stats_mean(const double *x, int64_t n)
 {
+    BT_PLAIN_NUMBERS;
     bt_mean mean = {.mean = NAN, .sd = NAN, .se = NAN, .low = NAN, .high = NAN, .tau = 0.5, .n_eff = (double)n, .n = n};
     if (n < 1) return mean;
     mean.mean = mean_of(x, n);
@@ -127,6 +128,7 @@ bt_mean bt_stats_mean(const double *x, int64_t n)
 
 bt_trend bt_stats_trend(const double *x, int64_t n)
 {
+    BT_PLAIN_NUMBERS;
     bt_trend trend = {.change = NAN, .se = NAN, .low = NAN, .high = NAN};
     if (n < BT_TREND_LEAST) return trend;
     double z[BATCHES], squares = 0, product = 0, level = 0;
@@ -149,6 +151,7 @@ bt_trend bt_stats_trend(const double *x, int64_t n)
 
 void bt_stats_quarters(const double *x, int64_t n, double quarter[4])
 {
+    BT_PLAIN_NUMBERS;
     for (int64_t k = 0; k < 4; k++) {
         const int64_t first = n * k / 4, end = n * (k + 1) / 4;
         quarter[k] = end > first ? mean_of(x + first, end - first) : NAN;
@@ -236,6 +239,7 @@ static bool is_transient(const double *x, int64_t n, int64_t start, double mater
 // A start that leaves few floes, the cause of most of that error, is not accepted (output/steady.c).
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first, double material)
 {
+    BT_PLAIN_NUMBERS;
     if (first < 0) first = 0;
     if (first >= n) return first;
     const int64_t k = (n - first) / BATCH, step = bt_stats_start_step(n - first);

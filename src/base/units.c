@@ -5,7 +5,6 @@
 // 30·0.001 may not be. So a case in millimetres gives the same bits as the same case in metres.
 #include "base/units.h"
 
-#include "base/inside.h"
 #include "bergtow/base.h"
 
 #include <ctype.h>
@@ -167,9 +166,7 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
     size_t n_symbol = strlen(symbol);
     while (n_symbol && isspace((unsigned char)symbol[n_symbol - 1])) n_symbol--;
 
-    void *locale = bt_point_begin();
     double number = strtod(text, NULL);
-    bt_point_end(locale);
     const bt_unit_entry *unit = NULL;
     if (n_symbol) {
         unit = find_unit(symbol, n_symbol, kind);
@@ -195,14 +192,12 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
 int bt_units_format(double value, bt_unit kind, char *out, size_t size)
 {
     if (isnan(value)) return snprintf(out, size, "none");
-    void *locale = bt_point_begin();
     char digits[40];
     for (int precision = 15; precision <= 17; precision++) {
         snprintf(digits, sizeof digits, "%.*g", precision, value);
         double back = strtod(digits, NULL);
         if (!memcmp(&back, &value, sizeof back)) break;
     }
-    bt_point_end(locale);
     const char *symbol = kinds[kind].symbol;
     return snprintf(out, size, "%s%s%s", digits, *symbol ? " " : "", symbol);
 }

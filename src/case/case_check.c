@@ -4,6 +4,7 @@
 // A check names the keys it looks at. If one of them was refused already, the check is skipped: its message would be
 // about the default that stands in for the refused value.
 #include "case/case_check.h"
+#include "base/inside.h"
 #include "case/case_tow.h"
 #include "case/warning.h"
 
@@ -516,4 +517,8 @@ void bt_case_warn_body(const bt_case *input, bt_errors *warnings)
                       input->impact.duration, input->impact.duration / input->run.dt);
 }
 
-bt_status bt_case_finish(bt_case *input, bt_errors *err) { return bt_case_check(input, NULL, err); }
+bt_status bt_case_finish(bt_case *input, bt_errors *err)
+{
+    BT_PLAIN_NUMBERS;
+    return bt_case_check(input, NULL, err);
+}

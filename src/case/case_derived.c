@@ -7,6 +7,7 @@
 
 #include "bergtow/outline.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/name.h"
 #include "base/table.h"
 #include "case/size_law.h"
@@ -30,6 +31,7 @@ static int body_shape_named(bt_body_shape shape, double length, double width, do
 
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const size_t before = err->n;
     bool taken = false;
     for (int k = 0; name && bt_body_shapes[k]; k++) taken = taken || !strcmp(bt_body_shapes[k], name);
@@ -52,10 +54,15 @@ bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_error
 
 double bt_case_rise(double ice_density, double water_density)
 {
+    BT_PLAIN_NUMBERS;
     return ice_density * (1 - ice_density / water_density) * BT_GRAVITY;
 }
 
-double bt_case_tow_sign(const bt_case *input) { return bt_cos(input->tow.direction) < 0 ? -1 : 1; }
+double bt_case_tow_sign(const bt_case *input)
+{
+    BT_PLAIN_NUMBERS;
+    return bt_cos(input->tow.direction) < 0 ? -1 : 1;
+}
 
 /// fault: returns why an outline is refused, or NULL.
 static int outline_of(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
@@ -93,10 +100,15 @@ int bt_case_floe_admit(const bt_floe_def *floe, double *v, const char **why)
     return outline_of(floe->shape, floe->length, floe->width, floe->n_vertices, floe->vertices, v, floe_fault, why);
 }
 
-int bt_case_floe_outline(const bt_floe_def *floe, double *v) { return bt_case_floe_admit(floe, v, NULL); }
+int bt_case_floe_outline(const bt_floe_def *floe, double *v)
+{
+    BT_PLAIN_NUMBERS;
+    return bt_case_floe_admit(floe, v, NULL);
+}
 
 int bt_case_waterline(const bt_case *input, double *v)
 {
+    BT_PLAIN_NUMBERS;
     return bt_case_outline(input->body.shape, input->body.length, input->body.width, input->body.n_vertices,
                            input->body.vertices, v, NULL);
 }
@@ -246,12 +258,14 @@ double bt_case_floes_made(const bt_case *input)
 
 int64_t bt_case_steps(const bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     double steps = ceil(input->run.duration / input->run.dt * (1 - 1e-12));
     return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case may ask for more than fits
 }
 
 double bt_case_body_mass(const bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     double v[2 * BT_MAX_VERTICES];
     int n = bt_case_waterline(input, v);
     if (!n) return 0;
@@ -261,6 +275,7 @@ double bt_case_body_mass(const bt_case *input)
 
 double bt_case_reference_speed(const bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     if (input->solver.reference_speed > 0) return input->solver.reference_speed;
     if (input->tow.mode != BT_TOW_NONE && input->tow.speed > 0) return input->tow.speed;
     double u = bt_max(input->domain.ends_closing, input->domain.sides_closing);

@@ -4,6 +4,7 @@
 
 #include "bergtow/shape.h"
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/json.h"
 #include "base/largest.h"
 #include "case/case_base.h"
@@ -28,6 +29,7 @@ typedef struct {
 
 void bt_case_defaults(bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     *input = (bt_case){0};
     bt_schema_preset(bt_case_keys, bt_n_case_keys, input);
     input->n_extra = bt_schema_added();
@@ -408,12 +410,14 @@ static bt_status read_text(bt_case *input, size_t size, bool alone, const char *
 
 bt_status bt_case_read(bt_case *input, const char *path, const char *const *overrides, int n, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     return bt_case_read_placed(input, path, overrides, NULL, n, err);
 }
 
 bt_status bt_case_read_placed(bt_case *input, const char *path, const char *const *overrides, const char *const *place,
                               int n, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     size_t size;
     begin_case(input, path);
     const bt_status status = bt_file_read(path, "a case file", &input->text, &size, err);
@@ -423,6 +427,7 @@ bt_status bt_case_read_placed(bt_case *input, const char *path, const char *cons
 bt_status bt_case_read_text(bt_case *input, const char *path, const char *text, const char *const *overrides,
                             const char *const *place, int n, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     begin_case(input, path);
     const size_t size = strlen(text);
     input->text = memcpy(bt_alloc(size + 1, 1), text, size + 1);
@@ -440,6 +445,7 @@ static void keep_table(bt_table *table, const bt_table *from)
 bt_status bt_case_read_kept(bt_case *input, const char *path, const char *text, const bt_table *current,
                             const bt_table *wind, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     begin_case(input, path);
     input->text = bt_text_copy(text);
     keep_table(&input->water.table, current);

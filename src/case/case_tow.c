@@ -6,6 +6,7 @@
 
 #include "geometry/path.h"
 #include "bergtow/catenary.h"
+#include "base/inside.h"
 #include "case/warning.h"
 #include "case/rope.h"
 #include "bergtow/shape.h"
@@ -297,6 +298,7 @@ bool bt_case_start_is_slow(const bt_case *input)
 
 double bt_case_earliest_window(const bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     if (input->output.window_start >= 0) return input->output.window_start;
     if (input->tow.mode == BT_TOW_NONE) return 0;
     // At a prescribed speed the tow force of the ramp is the inertia of the body, also in the step that ends with it.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Writing a case: the resolved file, and the table of keys for --list-keys.
 #include "base/json.h"
+#include "base/inside.h"
 #include "base/largest.h"
 #include "case/case_base.h"
 #include "case/schema.h"
@@ -36,6 +37,7 @@ static void write_floes(const bt_case *input, FILE *out)
 
 char *bt_case_resolved(const bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     return bt_case_text(input, BT_CASE_RESOLVED_HEAD);
 }
 
@@ -67,6 +69,7 @@ static void json_value(bt_json *json, const bt_key *key, const bt_case *input)
 
 char *bt_case_resolved_json(const bt_case *input)
 {
+    BT_PLAIN_NUMBERS;
     bt_json json = {0};
     bt_json_open(&json, NULL, '{');
     const int n = bt_n_case_keys - bt_schema_added() + input->n_extra;
@@ -77,6 +80,7 @@ char *bt_case_resolved_json(const bt_case *input)
 
 char *bt_case_text(const bt_case *input, const char *head)
 {
+    BT_PLAIN_NUMBERS;
     bt_text text;
     bt_text_begin(&text);
     FILE *out = text.out;
@@ -123,6 +127,7 @@ static void list_keys(FILE *out, const bt_key *keys, int n)
 
 void bt_case_list_keys(void *stream)
 {
+    BT_PLAIN_NUMBERS;
     FILE *out = stream;
     fprintf(out, "%-24s %-8s %-10s %-36s %s\n", "key", "unit", "default", "range", "meaning");
     list_keys(out, bt_case_keys, bt_n_case_keys);
@@ -186,6 +191,7 @@ static void json_keys(bt_json *json, const char *name, const bt_key *keys, int n
 
 void bt_case_list_keys_json(void *stream)
 {
+    BT_PLAIN_NUMBERS;
     bt_json json = {0};
     bt_json_open(&json, NULL, '{');
     json_keys(&json, "keys", bt_case_keys, bt_n_case_keys);

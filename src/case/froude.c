@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/inside.h"
 #include "case/case_check.h"
 #include "case/schema.h"
 
@@ -119,6 +120,7 @@ static void scale_members(const bt_case *input, const bt_key *keys, int n, void 
 
 bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const size_t before = err->n;
     bool *was = bt_alloc((size_t)bt_n_case_keys, sizeof *was), *now = bt_alloc((size_t)bt_n_case_keys, 1);
     bt_case_mark_idle(input, was);
@@ -149,6 +151,7 @@ bt_status bt_case_scale(bt_case *input, double ratio, bt_errors *err)
 
 char *bt_case_scaled_text(const bt_case *twin, double ratio)
 {
+    BT_PLAIN_NUMBERS;
     const char *path = twin->path ? twin->path : "a case";
     const char *coriolis = twin->water.latitude == 0
                                ? ""

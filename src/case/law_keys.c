@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/inside.h"
 #include "case/schema.h"
 
 static int unit_of(const char *symbol)
@@ -32,6 +33,7 @@ bool bt_keys_sound(bt_errors *err)
 
 bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const int before = bt_schema_added();
     bool all = true;
     for (int k = 0; k < n; k++) {
@@ -58,6 +60,7 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
 
 void bt_keys_get(const bt_case *input, const char *section, const bt_law_key *keys, int n, double *own)
 {
+    BT_PLAIN_NUMBERS;
     for (int k = 0; k < n; k++) {
         char name[128];
         snprintf(name, sizeof name, "%s.%s", section, keys[k].name);

@@ -6,6 +6,7 @@
 
 #include "bergtow/catenary.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 
 // --- a line with weight ----------------------------------------------------------------------------------------------
 
@@ -15,6 +16,7 @@ enum { MAX_STEPS = 200 }; // of Newton's method, which takes fewer than 40
 
 double bt_catenary_span(double length, double stiffness, double weight, double pull)
 {
+    BT_PLAIN_NUMBERS;
     const double u = 0.5 * weight * length / pull;
     return length * (bt_asinh(u) / u + pull / stiffness);
 }
@@ -34,6 +36,7 @@ static double slackness(double u)
 // L/l. If l > L, asinh(u) ≤ u also gives u ≤ e/(l/L − 1). The iteration ends when rounding stops the descent.
 double bt_catenary_pull(double length, double stiffness, double weight, double span, double *tangent)
 {
+    BT_PLAIN_NUMBERS;
     if (tangent) *tangent = 0;
     if (!(span > 0)) return 0;
     const double half = 0.5 * weight * length, e = half / stiffness, s = span / length;

@@ -454,15 +454,15 @@ static bt_overlaps overlaps_of(const bt_world *world, const bt_cell *cell, doubl
     return all;
 }
 
-bt_overlaps bt_world_overlaps(bt_world *world, double allowed)
+/// Overlaps in all cells of this rank.
+static bt_overlaps all_overlaps(bt_world *world, double allowed)
 {
-    bt_cells_begin(world);
-    bt_cells_update(world, world->par.slop);
     const bt_cells *cells = world->cells;
     bt_overlaps all = {0};
     // One cell at a time, on temporary lists: needs neither the step's contacts nor memory for all lists.
 #pragma omp parallel if (BT_MANY(cells->n, BT_FEW_CELLS))
     {
+        BT_PLAIN_NUMBERS;
         bt_pair_scratch scratch = {0};
 #pragma omp for schedule(dynamic, 4)
         for (bt_idx k = 0; k < cells->n; k++) {
@@ -480,4 +480,12 @@ bt_overlaps bt_world_overlaps(bt_world *world, double allowed)
         bt_pair_scratch_free(&scratch);
     }
     return all;
+}
+
+bt_overlaps bt_world_overlaps(bt_world *world, double allowed)
+{
+    BT_PLAIN_NUMBERS;
+    bt_cells_begin(world);
+    bt_cells_update(world, world->par.slop);
+    return all_overlaps(world, allowed);
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/name.h"
+#include "base/inside.h"
 #include "contact/added.h"
 
 static bool is_known(const char *name)
@@ -56,6 +57,7 @@ static void check_series(const bt_contact_law *law, const char *name, bt_errors 
 
 bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
     bt_name_check("contact law", name, BT_MAX_LAW_NAME, is_known(name), err);

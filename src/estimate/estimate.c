@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/name.h"
 #include "case/arch.h"
 #include "case/case_derived.h"
@@ -14,6 +15,7 @@
 
 double bt_estimate_strength(const bt_estimate_input *in)
 {
+    BT_PLAIN_NUMBERS;
     return in->p_star * in->thickness * bt_exp(-BT_EST_STRENGTH * (1 - in->concentration));
 }
 
@@ -95,6 +97,7 @@ static bt_estimate ships(const bt_estimate_input *in)
 
 bt_estimate bt_estimate_ship(double beam, double thickness, double concentration, double speed, double ice_density)
 {
+    BT_PLAIN_NUMBERS;
     const bt_estimate_input in = {.concentration = concentration,
                                   .thickness = thickness,
                                   .width = beam,
@@ -165,6 +168,7 @@ const bt_estimate_def *bt_estimate_of(int k) { return &estimates[k]; }
 
 bt_status bt_estimate_register(const bt_estimate_def *def, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const size_t before = err->n;
     const char *name = def->name ? def->name : "";
     bool taken = !strcmp(name, "curves"); // by the summary, for all curves
@@ -192,6 +196,7 @@ static bt_estimate force_of(const bt_estimate_def *def, const bt_estimate_input 
 
 bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
 {
+    BT_PLAIN_NUMBERS;
     const bt_estimate_def *def = &estimates[kind];
     bt_estimate estimate = force_of(def, in);
     estimate.compares =
@@ -207,11 +212,13 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
 
 void bt_estimate_conditions(const bt_case *input, bt_estimate_input *in)
 {
+    BT_PLAIN_NUMBERS;
     bt_estimate_ordered(input, (const double[]){NAN, NAN}, in);
 }
 
 void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_input *in)
 {
+    BT_PLAIN_NUMBERS;
     const double scale = input->estimate.length_scale;
     *in = (bt_estimate_input){
         .concentration = input->ice.concentration,
@@ -262,6 +269,7 @@ void bt_estimate_ordered(const bt_case *input, const double ice[2], bt_estimate_
 
 void bt_estimate_field(const bt_field *field, double *thickness, double *radius)
 {
+    BT_PLAIN_NUMBERS;
     double area = 0, volume = 0, reach = 0;
     for (bt_idx i = 0; i < field->n; i++) {
         area += field->area[i];

@@ -91,6 +91,7 @@ static void reserve(bt_field *field, int64_t floes, int64_t n_vertices)
 
 double bt_field_floe_area(const bt_field *field)
 {
+    BT_PLAIN_NUMBERS;
     double area = 0;
     for (bt_idx i = 0; i < field->n; i++) area += field->area[i];
     return area;
@@ -98,6 +99,7 @@ double bt_field_floe_area(const bt_field *field)
 
 double bt_field_mean_size(const bt_field *field)
 {
+    BT_PLAIN_NUMBERS;
     double sum = 0;
     for (bt_idx i = 0; i < field->n; i++) sum += sqrt(4 * field->area[i] / BT_PI);
     return field->n ? sum / field->n : NAN;
@@ -105,6 +107,7 @@ double bt_field_mean_size(const bt_field *field)
 
 void bt_field_add(bt_field *field, int nv, const double *v, double x, double y, double yaw, double thickness)
 {
+    BT_PLAIN_NUMBERS;
     bt_idx i = field->n;
     int64_t at = field->offsets[i];
     reserve(field, i + 1, at + nv);

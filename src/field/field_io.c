@@ -27,6 +27,7 @@
 #include "base/fileio.h"
 #include "base/h5dataset.h"
 #include "base/h5read.h"
+#include "base/inside.h"
 #include "base/largest.h"
 #include "case/ice_bounds.h"
 #include "field/field_admit.h"
@@ -43,6 +44,7 @@ const char *bt_field_frame(const bt_case *input)
 
 bt_status bt_field_write(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     // Write under another name until complete, so that a full disk never leaves half a field under the right one.
     const char *part = BT_BESIDE(path, ".part");
     bt_h5 h5;
@@ -332,6 +334,7 @@ static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
 
 bt_status bt_field_read(bt_field *field, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bool bare;
     const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
     if (checked != BT_OK) return checked;
@@ -372,6 +375,7 @@ bool bt_field_fixed_ours(const char *path) { return bt_file_begins(path, HEAD); 
 
 bt_status bt_field_write_fixed(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bt_text lines;
     bt_text_begin(&lines);
     FILE *out = lines.out;

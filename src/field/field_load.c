@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "bergtow/field.h"
+#include "base/inside.h"
 #include "case/case_derived.h"
 #include "case/warning.h"
 #include "case/ice_bounds.h"
@@ -28,6 +29,7 @@ static void note_case(const bt_case *input, bt_field *field)
 
 bt_status bt_field_load(const bt_case *input, bt_field *field, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     if (input->ice.outlines) return bt_field_read_outlines(input, field, err);
     if (!input->ice.field) return bt_field_generate(input, field, err);
     const bt_status status = bt_field_read(field, input->ice.field, input->ice.nonconvex, err);
@@ -150,6 +152,7 @@ static void warn_of_plane(const bt_map_place *place, const bt_case *input, bt_er
 
 void bt_outline_warn(const bt_outline_counts *counts, const bt_case *input, bt_errors *warnings)
 {
+    BT_PLAIN_NUMBERS;
     if (counts->unnamed)
         bt_warn(warnings, BT_WARN_NO_THICKNESS,
                 "%lld of %lld outlines have no property `thickness`, but some have %s, which is not read: they have "

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/largest.h"
 #include "base/rng.h"
 #include "case/case_derived.h"
@@ -56,6 +57,7 @@ static bool as_drawn(const bt_case *input) { return !bt_case_reads_field(input) 
 
 bt_field_sizes bt_field_sizes_of(const bt_case *input, const bt_field *field)
 {
+    BT_PLAIN_NUMBERS;
     const double limit = as_drawn(input) && input->ice.size_law != BT_SIZE_SINGLE
                          ? (1 - BELOW_SLACK) * input->ice.size_min : 0;
     bt_field_sizes sizes = {.n = field->n, .mean = bt_field_mean_size(field), .least = INFINITY};
@@ -69,6 +71,7 @@ bt_field_sizes bt_field_sizes_of(const bt_case *input, const bt_field *field)
 
 void bt_field_size_warn(const bt_case *input, const bt_field_sizes *found, bt_errors *warnings)
 {
+    BT_PLAIN_NUMBERS;
     bt_sizes sizes;
     bt_errors refused = {0}; // a case with faulty sizes makes no ice
     const bt_idx n = found->n;
@@ -303,6 +306,7 @@ static bool settled(const bt_region *region, bt_field *field, double wanted, cha
 
 double bt_field_thickness(const bt_case *input, bt_idx i)
 {
+    BT_PLAIN_NUMBERS;
     // ln h ~ N(μ, σ) with the mean and standard deviation asked for
     double h = input->ice.thickness, s2 = bt_log1p(input->ice.thickness_spread * input->ice.thickness_spread);
     if (input->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
@@ -347,6 +351,7 @@ static bt_status make(const bt_case *input, const bt_region *region, const bt_si
 
 bt_status bt_field_generate(const bt_case *input, bt_field *field, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bt_field_free(field);
     bt_field_init(field);
     bt_sizes sizes;

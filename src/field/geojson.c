@@ -24,6 +24,7 @@
 #include <string.h>
 
 #include "bergtow/outline.h"
+#include "base/inside.h"
 #include "field/field_admit.h"
 #include "field/field_make.h"
 #include "base/elementary.h"
@@ -616,6 +617,7 @@ static void read_features(reader *in, const json_t *root, size_t n)
 
 bt_status bt_field_read_outlines(const bt_case *input, bt_field *field, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const char *path = input->ice.outlines;
     bt_field_free(field);
     bt_field_init(field);
@@ -682,6 +684,7 @@ bool bt_field_outlines_ours(const char *path) { return bt_file_begins(path, HEAD
 
 bt_status bt_field_write_outlines(const bt_field *field, const bt_case *input, const char *path, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bt_text lines;
     bt_text_begin(&lines);
     FILE *out = lines.out;

@@ -19,8 +19,8 @@
 #include <string.h>
 
 #include "field/field_make.h"
-#include "base/inside.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "base/rng.h"
 
 enum {
@@ -338,15 +338,19 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *region, bt_idx n, co
     double *area = bt_alloc((size_t)n, sizeof *area), *next = bt_alloc(2 * (size_t)n, sizeof *next);
     for (int round = 0; round < ROUNDS; round++) {
         sort_into_bins(&tiling);
-#pragma omp parallel for schedule(dynamic, 256) if (BT_MANY(n, 2000))
-        for (bt_idx i = 0; i < n; i++) {
-            double v[2 * 2 * WORK];
-            int m = ice_cell(&tiling, i, v);
-            bt_moments mo = m >= 3 ? bt_shape_centroid(m, v)
-                                   : (bt_moments){.cx = tiling.p[2 * i], .cy = tiling.p[2 * i + 1]};
-            area[i] = mo.area;
-            next[2 * i] = mo.cx;
-            next[2 * i + 1] = mo.cy;
+#pragma omp parallel if (BT_MANY(n, 2000))
+        {
+            BT_PLAIN_NUMBERS;
+#pragma omp for schedule(dynamic, 256)
+            for (bt_idx i = 0; i < n; i++) {
+                double v[2 * 2 * WORK];
+                int m = ice_cell(&tiling, i, v);
+                bt_moments mo = m >= 3 ? bt_shape_centroid(m, v)
+                                       : (bt_moments){.cx = tiling.p[2 * i], .cy = tiling.p[2 * i + 1]};
+                area[i] = mo.area;
+                next[2 * i] = mo.cx;
+                next[2 * i + 1] = mo.cy;
+            }
         }
         double sum = 0;
         for (bt_idx i = 0; i < n; i++) sum += area[i];
@@ -359,17 +363,21 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *region, bt_idx n, co
         }
     }
     sort_into_bins(&tiling);
-#pragma omp parallel for schedule(dynamic, 256) if (BT_MANY(n, 2000))
-    for (bt_idx i = 0; i < n; i++) {
-        double v[2 * 2 * WORK];
-        int m = ice_cell(&tiling, i, v);
-        if (m < 3) continue;
-        double full = bt_shape_centroid(m, v).area;
-        m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI), BT_TESSELLATION_VERTICES);
-        bt_moments mo = bt_shape_area_moments(m, v);
-        if (mo.inradius < SLIVER * sqrt(mo.area / BT_PI) || mo.area < 0.1 * target[i] * share) continue;
-        cells.nv[i] = m;
-        memcpy(cells.v[i], v, 2 * (size_t)m * sizeof *v);
+#pragma omp parallel if (BT_MANY(n, 2000))
+    {
+        BT_PLAIN_NUMBERS;
+#pragma omp for schedule(dynamic, 256)
+        for (bt_idx i = 0; i < n; i++) {
+            double v[2 * 2 * WORK];
+            int m = ice_cell(&tiling, i, v);
+            if (m < 3) continue;
+            double full = bt_shape_centroid(m, v).area;
+            m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI), BT_TESSELLATION_VERTICES);
+            bt_moments mo = bt_shape_area_moments(m, v);
+            if (mo.inradius < SLIVER * sqrt(mo.area / BT_PI) || mo.area < 0.1 * target[i] * share) continue;
+            cells.nv[i] = m;
+            memcpy(cells.v[i], v, 2 * (size_t)m * sizeof *v);
+        }
     }
     free(radius);
     free(area);

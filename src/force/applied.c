@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "bergtow/forces.h"
+#include "base/inside.h"
 #include "base/name.h"
 #include "force/forces.h"
 #include "force/load.h"
@@ -168,6 +169,7 @@ static void copy_line(char *to, size_t room, const char *text)
 
 bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *force, void *user, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     slot *arrays = name ? find(name) : NULL;
     if (!arrays) {
         arrays = bt_alloc(1, sizeof *arrays);

@@ -4,6 +4,7 @@
 
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "body/bodies.h"
 #include "force/laws.h"
 #include "force/load.h"
@@ -52,6 +53,7 @@ void bt_linear_add_outline(const bt_bodies *bodies, bt_idx i, bt_stream stream, 
 
 void bt_forces_load(const bt_world *world, bt_idx i, const bt_vel *u, bt_load *load)
 {
+    BT_PLAIN_NUMBERS;
     bt_force_body body = bt_load_body(world, i, u);
     bt_load_clear(load);
     bt_load_fill(world->forces, 0, &body, load);
@@ -122,6 +124,7 @@ static void load_of_sum(const bt_forces *forces, const char *name, bt_force_body
 
 void bt_forces_impulses(const bt_world *world, bt_idx i, bt_impulse *law, bt_impulse *series)
 {
+    BT_PLAIN_NUMBERS;
     const bt_bodies *bodies = &world->bodies;
     const bt_forces *forces = world->forces;
     const bool led = bodies->motion[i] != BT_DYNAMIC;
@@ -280,6 +283,7 @@ bt_vel bt_forces_drift(const bt_world *world, bt_force_body *body)
 bt_drag bt_forces_drag(const bt_moments *moments, double draft, double sail, double water_density, double air_density,
                        double water_form, double water_skin, double air_form, double air_skin)
 {
+    BT_PLAIN_NUMBERS;
     return (bt_drag){
         .water_skin = water_density * water_skin * moments->area,
         .water_form = 0.5 * water_density * water_form * draft,

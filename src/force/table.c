@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/name.h"
+#include "base/inside.h"
 #include "force/forces.h"
 #include "case/schema.h"
 #include "force/laws.h"
@@ -71,6 +72,7 @@ static void check_series(const bt_force_law *law, const char *name, bt_errors *e
 
 bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
     bt_name_check("force law", name, BT_MAX_LAW_NAME, bt_force_series_find(name) >= 0, err);

@@ -2,6 +2,7 @@
 // Simple polygons: cleaning, faults, convex parts, projection.
 #include "bergtow/outline.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "geometry/box.h"
 
 #include <math.h>
@@ -34,6 +35,7 @@ static bool idle(const double *p, const double *q, const double *r, double tiny)
 
 int bt_outline_clean(int n, double *v)
 {
+    BT_PLAIN_NUMBERS;
     const double tiny = NEAR * extent_of(n, v);
     // Test each vertex against its present neighbours, as the previous one may be gone; repeat until none goes.
     for (bool changed = true; changed && n > 2;) {
@@ -51,6 +53,7 @@ int bt_outline_clean(int n, double *v)
 
 double bt_outline_area2(int n, const double *v)
 {
+    BT_PLAIN_NUMBERS;
     double a = 0;
     for (int i = 1; i + 1 < n; i++) a += cross(v, v + 2 * i, v + 2 * (i + 1));
     return a;
@@ -78,6 +81,7 @@ static bool meet(const double *a, const double *b, const double *c, const double
 
 bool bt_outline_crosses(int n, const double *v)
 {
+    BT_PLAIN_NUMBERS;
     for (int i = 0; i < n; i++) {
         const double *a = v + 2 * i, *b = v + 2 * ((i + 1) % n);
         for (int j = i + 1; j < n; j++) {
@@ -99,13 +103,18 @@ bool bt_outline_crosses(int n, const double *v)
 
 const char *bt_outline_fault(int n, const double *v)
 {
+    BT_PLAIN_NUMBERS;
     double extent;
     const char *fault = bt_ring_fault(n, v, NEAR, &extent);
     if (fault) return fault;
     return bt_outline_crosses(n, v) ? "its edges cross or touch each other" : bt_ring_area_fault(n, v, extent);
 }
 
-bool bt_outline_convex(int n, const double *v) { return bt_shape_fault(n, v) == NULL; }
+bool bt_outline_convex(int n, const double *v)
+{
+    BT_PLAIN_NUMBERS;
+    return bt_shape_fault(n, v) == NULL;
+}
 
 // --- convex parts ----------------------------------------------------------------------------------------------------
 
@@ -215,6 +224,7 @@ static bool split(int n, const double *v, double near, bt_parts *parts)
 
 bool bt_outline_split(int n, const double *v, bt_parts *parts)
 {
+    BT_PLAIN_NUMBERS;
     // Where several vertices lie on one line, such as on both sides of a neck, rounding may leave no ear.
     const double extent = extent_of(n, v);
     return split(n, v, 0, parts) || split(n, v, NEAR * extent * extent, parts);
@@ -236,6 +246,7 @@ static void on_ellipsoid(double lon, double lat, double p[3])
 
 void bt_outline_project(double lon, double lat, double lon0, double lat0, double *north, double *east)
 {
+    BT_PLAIN_NUMBERS;
     double p[3], o[3];
     on_ellipsoid(lon, lat, p);
     on_ellipsoid(lon0, lat0, o);
@@ -255,6 +266,7 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
 /// from (x² + y²)/a² + z²/b² = 1, starting with −c²/(2R), that of the sphere.
 void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat)
 {
+    BT_PLAIN_NUMBERS;
     double o[3];
     on_ellipsoid(lon0, lat0, o);
     const double sl = bt_sin(lon0), cl = bt_cos(lon0), sp = bt_sin(lat0), cp = bt_cos(lat0);
@@ -286,11 +298,13 @@ void bt_outline_unproject(double north, double east, double lon0, double lat0, d
 
 bool bt_outline_in_degrees(double lon, double lat, bool narrow)
 {
+    BT_PLAIN_NUMBERS;
     return fabs(lon) <= (narrow ? 180 : 360) && fabs(lat) <= 90;
 }
 
 void bt_outline_middle(int64_t n, const double *place, double middle[2])
 {
+    BT_PLAIN_NUMBERS;
     const double degree = BT_PI / 180;
     double sum[3] = {0};
     for (int64_t i = 0; i < n; i++) {

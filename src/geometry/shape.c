@@ -15,6 +15,7 @@
 // The antiderivative is checked by differentiation. As h → 0 the bracket stays bounded (h⁴ asinh(s/h) → 0).
 #include "bergtow/shape.h"
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "geometry/box.h"
 
 #include <math.h>
@@ -33,6 +34,7 @@ static double cubic_antiderivative(double h, double s)
 
 bt_moments bt_shape_centroid(int n, const double *v)
 {
+    BT_PLAIN_NUMBERS;
     bt_moments moments = {0};
     if (n < 1) return moments;
     // Area and centroid relative to the first vertex, so that a polygon far from the origin loses no digits.
@@ -76,9 +78,17 @@ static bt_moments moments(int n, const double *v, bool cubic)
     return moments;
 }
 
-bt_moments bt_shape_moments(int n, const double *v) { return moments(n, v, true); }
+bt_moments bt_shape_moments(int n, const double *v)
+{
+    BT_PLAIN_NUMBERS;
+    return moments(n, v, true);
+}
 
-bt_moments bt_shape_area_moments(int n, const double *v) { return moments(n, v, false); }
+bt_moments bt_shape_area_moments(int n, const double *v)
+{
+    BT_PLAIN_NUMBERS;
+    return moments(n, v, false);
+}
 
 const char *bt_ring_fault(int n, const double *v, double near, double *extent)
 {
@@ -127,12 +137,21 @@ static const char *fault_of(int n, const double *v, double near, double angle)
     return NULL;
 }
 
-const char *bt_shape_fault(int n, const double *v) { return fault_of(n, v, 1e-9, 1e-9); }
+const char *bt_shape_fault(int n, const double *v)
+{
+    BT_PLAIN_NUMBERS;
+    return fault_of(n, v, 1e-9, 1e-9);
+}
 
-bool bt_shape_broken(int n, const double *v) { return fault_of(n, v, 1e-12, 1e-6) != NULL; }
+bool bt_shape_broken(int n, const double *v)
+{
+    BT_PLAIN_NUMBERS;
+    return fault_of(n, v, 1e-12, 1e-6) != NULL;
+}
 
 bt_moments bt_shape_centre(int n, double *v)
 {
+    BT_PLAIN_NUMBERS;
     bt_moments moments = bt_shape_area_moments(n, v);
     for (int i = 0; i < n; i++) {
         v[2 * i] -= moments.cx;
@@ -143,6 +162,7 @@ bt_moments bt_shape_centre(int n, double *v)
 
 double bt_shape_width(int n, const double *v, double ux, double uy)
 {
+    BT_PLAIN_NUMBERS;
     if (n < 1) return 0;
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < n; i++) {
@@ -155,6 +175,7 @@ double bt_shape_width(int n, const double *v, double ux, double uy)
 
 void bt_shape_regular(int n, double area, double *v)
 {
+    BT_PLAIN_NUMBERS;
     double r = sqrt(2 * area / (n * bt_sin(2 * BT_PI / n)));
     for (int i = 0; i < n; i++) {
         v[2 * i] = r * bt_cos(2 * BT_PI * i / n);
@@ -179,6 +200,7 @@ static bool turns_left(const double *a, const double *b, const double *c)
 // Andrew's monotone chain (1979, Inf. Process. Lett. 9): lower hull left to right, then upper hull back.
 int bt_shape_hull(int n, double *v)
 {
+    BT_PLAIN_NUMBERS;
     if (n < 2) return n;
     double *p = bt_alloc(2 * (size_t)n, sizeof *p), *h = bt_alloc(4 * (size_t)n + 2, sizeof *h);
     memcpy(p, v, 2 * (size_t)n * sizeof *p);
@@ -210,6 +232,7 @@ int bt_shape_hull(int n, double *v)
 // alternate along an edge that lies on the line, so that never more than n+1 vertices come out.
 int bt_shape_clip(int n, const double *v, double nx, double ny, double d, double *out)
 {
+    BT_PLAIN_NUMBERS;
     int worst = 0, deepest = 0;
     double far = -INFINITY, near = INFINITY;
     for (int i = 0; i < n; i++) {
@@ -307,6 +330,7 @@ static int ship(double l, double w, double *v)
 
 int bt_shape_named(const char *name, double l, double w, double *v)
 {
+    BT_PLAIN_NUMBERS;
     if (strcmp(name, "disc") == 0) return disc(l, w, v);
     if (strcmp(name, "square") == 0) return rectangle(l, l, v);
     if (strcmp(name, "rectangle") == 0) return rectangle(l, w, v);

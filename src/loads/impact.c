@@ -126,6 +126,7 @@ static bt_body_contact *collect_body_contacts(const bt_world *world, const bt_im
     else {
 #pragma omp parallel
         {
+            BT_PLAIN_NUMBERS;
             contact_rows mine = {.c = all.c, .s = all.s};
 #pragma omp for schedule(dynamic, 16)
             for (bt_idx i = from; i < ts->n_order; i++) add_cell(world, impacts, ts->order[i], &mine);

@@ -138,6 +138,7 @@ static void write_more(bt_h5 *h5, const bt_fclib_problem *p)
 
 bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bt_status status = check_problem(path, p, err);
     if (status != BT_OK) return status;
     const char *temporary = BT_BESIDE(path, ".tmp");

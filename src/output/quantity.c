@@ -11,6 +11,7 @@
 
 #include "bergtow/contact.h"
 #include "bergtow/forces.h"
+#include "base/inside.h"
 #include "base/name.h"
 #include "contact/law.h"
 #include "output/sample.h"
@@ -109,6 +110,7 @@ static bt_status add_series(const bt_quantity *quantity, bt_errors *err)
 
 bt_status bt_quantity_register(const bt_quantity *quantity, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bt_n_added(); // series of laws registered before, which are made when first needed, have their names
     return add_series(quantity, err);
 }

@@ -7,6 +7,7 @@
 #include "bergtow/route.h"
 
 #include "base/elementary.h"
+#include "base/inside.h"
 
 #include <math.h>
 
@@ -19,6 +20,7 @@ static double turn_of(double a)
 
 double bt_route_word(const double from[3], const double to[3], double radius, int word, double leg[3][2])
 {
+    BT_PLAIN_NUMBERS;
     static const int sense[6][3] = {{1, 0, 1}, {-1, 0, -1}, {1, 0, -1}, {-1, 0, 1}, {-1, 1, -1}, {1, -1, 1}};
     const int *w = sense[word];
     double s0, c0, s1, c1;
@@ -60,6 +62,7 @@ double bt_route_word(const double from[3], const double to[3], double radius, in
 
 double bt_route_dubins(const double from[3], const double to[3], double radius, double leg[3][2])
 {
+    BT_PLAIN_NUMBERS;
     double best = INFINITY, tried[3][2];
     for (int word = 0; word < 6; word++) {
         const double length = bt_route_word(from, to, radius, word, tried);

@@ -638,6 +638,7 @@ static void make(const bt_route_task *task, bt_route_plan *plan)
 
 void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
 {
+    BT_PLAIN_NUMBERS;
     bt_route_task fast = *task; // the cheapest speed may be too slow for a goal that drifts away
     qsort(fast.speed, (size_t)fast.n_speeds, sizeof *fast.speed, bt_descending);
     const bool still = task->drift[0] == 0 && task->drift[1] == 0;
@@ -653,6 +654,7 @@ void bt_route_make(const bt_route_task *task, bt_route_plan *plan)
 
 void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2], bt_route_plan *plan)
 {
+    BT_PLAIN_NUMBERS;
     bt_planner planner;
     begin(&planner, task);
     *plan = (bt_route_plan){.n = 1};
@@ -666,6 +668,7 @@ void bt_route_through(const bt_route_task *task, int n, const double (*corner)[2
 
 void bt_route_cover(const bt_route_task *task, int64_t nx, int64_t ny, double *cover)
 {
+    BT_PLAIN_NUMBERS;
     const double *e = task->extent, sx = (double)nx / (e[2] - e[0]), sy = (double)ny / (e[3] - e[1]);
     double *sums = bt_alloc((size_t)((nx + 2) * ny), sizeof *sums), *v = NULL;
     for (int64_t i = 0; i < task->n_floes; i++) {

@@ -12,6 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/inside.h"
 #include "output/checkpoint.h"
 #include "field/field_kept.h"
 #include "bergtow/run.h"
@@ -385,6 +386,7 @@ static void release(bt_ensemble *ensemble)
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *study, const bt_ensemble_options *options,
                           bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     char digest[BT_DIGEST_TEXT] = "";
     int threads = 1;
     bool open = false;

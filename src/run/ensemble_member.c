@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/inside.h"
 #include "output/checkpoint.h"
 #include "bergtow/ensemble.h"
 #include "base/fileio.h"
@@ -130,6 +131,7 @@ static bool read_failure(const char *folder, int which, int *code, char **failur
 
 bt_member_state bt_ensemble_state(const char *folder, int *code, char **failure, char **why)
 {
+    BT_PLAIN_NUMBERS;
     if (why) *why = NULL;
     if (failure) *failure = NULL;
     if (code) *code = 0;

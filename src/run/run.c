@@ -9,6 +9,7 @@
 
 #include "base/checksum.h"
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/process.h"
 #include "case/case_files.h"
 #include "output/checkpoint.h"
@@ -198,6 +199,7 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *input, const bt
 
 bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options *options, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     if (comm->size > 1 && options->dump_step >= 0)
         return bt_fail(err, BT_ERR_USAGE,
             "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the "
@@ -208,6 +210,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *input, const bt_run_options
 
 bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *options, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const double start = bt_clock();
     bt_resume resume;
     bt_status status = bt_resume_begin(&resume, comm, options, err);

@@ -12,6 +12,7 @@
 #include <time.h>
 
 #include "output/checkpoint.h"
+#include "base/inside.h"
 #include "contact/contacts.h"
 #include "bergtow/estimate.h"
 #include "loads/impact.h"
@@ -161,6 +162,7 @@ static bt_status take_folder(const bt_comm *comm, const bt_run_options *options,
 
 int bt_run_threads(const bt_comm *comm, const bt_case *input, int asked)
 {
+    BT_PLAIN_NUMBERS;
     const int share = bt_cores_share(comm); // called by all ranks, whatever the options and environment of each
     if (asked > 0) return asked;
     if (input->run.threads > 0) return (int)input->run.threads;

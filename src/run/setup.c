@@ -306,13 +306,17 @@ static bool begin_drift(const bt_case *input, bt_world *world, const bt_roster *
     bt_bodies *bodies = &world->bodies;
     const bool hold[2] = {input->domain.ends == BT_BOUND_WALL, input->domain.sides == BT_BOUND_WALL};
     bt_idx lost = 0;
-#pragma omp parallel for schedule(dynamic, 64) reduction(+ : lost) if (BT_MANY(bodies->n, 2000))
-    for (bt_idx i = 0; i < bodies->n; i++) {
-        if (!begins_adrift(input, world, i, roster)) continue;
-        double u[2];
-        if (!bt_drift_velocity(world, i, hold, u)) lost++;
-        bodies->vel[i] =
-            bodies->vel_start[i] = bodies->vel_free[i] = (bt_vel){.x = u[0], .y = u[1], .w = bodies->vel[i].w};
+#pragma omp parallel reduction(+ : lost) if (BT_MANY(bodies->n, 2000))
+    {
+        BT_PLAIN_NUMBERS;
+#pragma omp for schedule(dynamic, 64)
+        for (bt_idx i = 0; i < bodies->n; i++) {
+            if (!begins_adrift(input, world, i, roster)) continue;
+            double u[2];
+            if (!bt_drift_velocity(world, i, hold, u)) lost++;
+            bodies->vel[i] =
+                bodies->vel_start[i] = bodies->vel_free[i] = (bt_vel){.x = u[0], .y = u[1], .w = bodies->vel[i].w};
+        }
     }
     if (lost > 0)
         bt_errors_add(err,

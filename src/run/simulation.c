@@ -11,6 +11,7 @@
 
 #include "base/checksum.h"
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/json.h"
 #include "base/largest.h"
 #include "base/units.h"
@@ -168,6 +169,7 @@ static bt_status finish_create(bt_simulation **out, bt_simulation *sim, bt_statu
 
 bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *options)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     bt_simulation *sim = simulation_of(options);
     bt_status status = check_numbers(options, &err);
@@ -179,6 +181,7 @@ bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options 
 
 bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options *options)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     bt_simulation *sim = simulation_of(options);
     bt_resume resume = {.lock = -1};
@@ -220,6 +223,7 @@ static void forget_moved(bt_simulation *sim)
 
 bt_status bt_simulation_step(bt_simulation *sim, int64_t n)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     if (stepping) return refuse_within(); // of any simulation: applied forces hold the bodies of one world at a time
     if (sim->status != BT_OK) return refuse("a step has failed before; end the simulation");
@@ -260,6 +264,7 @@ static void add_lines(bt_errors *err, const char *text)
 
 bt_status bt_simulation_end(bt_simulation *sim)
 {
+    BT_PLAIN_NUMBERS;
     if (sim == stepping) return refuse_within();
     bt_errors err = {0};
     bt_status status = sim->status == BT_ERR_SIGNAL ? BT_OK : sim->status;
@@ -272,6 +277,7 @@ bt_status bt_simulation_end(bt_simulation *sim)
 
 void bt_simulation_drop(bt_simulation *sim)
 {
+    BT_PLAIN_NUMBERS;
     if (!sim) return;
     if (sim == stepping) {
         refuse_within();
@@ -285,6 +291,7 @@ void bt_simulation_drop(bt_simulation *sim)
 
 bt_status bt_simulation_checkpoint(bt_simulation *sim)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     if (sim == stepping) return refuse_within();
     if (!sim->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
@@ -294,6 +301,7 @@ bt_status bt_simulation_checkpoint(bt_simulation *sim)
 
 bt_status bt_simulation_frame(bt_simulation *sim)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     if (sim == stepping) return refuse_within();
     if (!sim->dir) return refuse("there is no folder for a frame; name one in the options (dir)");
@@ -307,8 +315,18 @@ int64_t bt_simulation_steps_left(const bt_simulation *sim)
     return sim->status == BT_OK && bt_running_has_next(&sim->r) ? sim->r.end_step - sim->r.w->step : 0;
 }
 double bt_simulation_dt(const bt_simulation *sim) { return sim->r.w->par.dt; }
-double bt_simulation_time(const bt_simulation *sim) { return (double)sim->r.w->step * sim->r.w->par.dt; }
-uint64_t bt_simulation_hash(const bt_simulation *sim) { return bt_world_hash(sim->r.w); }
+
+double bt_simulation_time(const bt_simulation *sim)
+{
+    BT_PLAIN_NUMBERS;
+    return (double)sim->r.w->step * sim->r.w->par.dt;
+}
+
+uint64_t bt_simulation_hash(const bt_simulation *sim)
+{
+    BT_PLAIN_NUMBERS;
+    return bt_world_hash(sim->r.w);
+}
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
@@ -344,6 +362,7 @@ static void numbers_of(const bt_bodies *bodies, bt_idx i, bt_body_numbers kind, 
 
 bt_status bt_simulation_read(const bt_simulation *sim, bt_body_numbers kind, double *out)
 {
+    BT_PLAIN_NUMBERS;
     if ((unsigned)kind >= BT_BODY_KINDS) return refuse("there are no such numbers of a body; see bt_body_numbers");
     const bt_bodies *bodies = &sim->r.w->bodies;
     const int width = bt_body_widths[kind];
@@ -358,6 +377,7 @@ bt_status bt_simulation_read(const bt_simulation *sim, bt_body_numbers kind, dou
 
 int64_t bt_simulation_outline(const bt_simulation *sim, int64_t id, double *xy, int64_t room)
 {
+    BT_PLAIN_NUMBERS;
     const bt_bodies *bodies = &sim->r.w->bodies;
     const bt_idx i = id < 0 || id >= bodies->n_global ? -1 : bodies->index_of[id];
     if (i < 0) return 0;
@@ -386,6 +406,7 @@ static bt_status edited(bt_simulation *sim, bt_status status, bt_errors *err)
 
 bt_status bt_simulation_set_velocity(bt_simulation *sim, int64_t id, double x, double y, double rate)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     if (sim == stepping) return refuse_within();
     if (!may_edit(sim)) return refuse(NO_EDIT);
@@ -396,6 +417,7 @@ static bool is_outside(double x, double low, double length) { return x < low || 
 
 bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, double y, double yaw)
 {
+    BT_PLAIN_NUMBERS;
     if (sim == stepping) return refuse_within();
     if (!may_edit(sim)) return refuse(NO_EDIT);
     bt_errors err = {0};
@@ -418,6 +440,7 @@ bt_status bt_simulation_set_place(bt_simulation *sim, int64_t id, double x, doub
 
 bt_status bt_simulation_quantity(const bt_simulation *sim, const char *name, double *value)
 {
+    BT_PLAIN_NUMBERS;
     *value = NAN;
     if (!bt_series_find(name)) {
         bt_errors err = {0};
@@ -455,6 +478,7 @@ static bool still_there(const bt_simulation *sim, const bt_contact *contact)
 
 int64_t bt_simulation_contacts(const bt_simulation *sim, double *out, int64_t room)
 {
+    BT_PLAIN_NUMBERS;
     const bt_world *world = sim->r.w;
     if (world->forces->under_way) {
         refuse("a step is replacing the contacts; read them between two steps, or in a quantity");
@@ -476,6 +500,7 @@ int64_t bt_simulation_contacts(const bt_simulation *sim, double *out, int64_t ro
 
 bt_status bt_case_check_text(const bt_simulation_options *options, char **resolved, char **values)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     bt_case input;
     const bt_status status = read_case(&input, options, &err);
@@ -487,6 +512,7 @@ bt_status bt_case_check_text(const bt_simulation_options *options, char **resolv
 
 char *bt_case_unused(const char *text)
 {
+    BT_PLAIN_NUMBERS;
     double row[2][3] = {{0}, {1e300}}; // replaces tables that the text names
     const bt_table table = {.n = 2, .row = row[0]};
     bt_case input;
@@ -504,15 +530,21 @@ char *bt_case_unused(const char *text)
 
 char *bt_simulation_progress(const bt_simulation *sim)
 {
+    BT_PLAIN_NUMBERS;
     char line[BT_PROGRESS_LINE];
     bt_progress_line(&sim->r.progress, line);
     return bt_text_copy(line);
 }
 
-char *bt_simulation_case(const bt_simulation *sim) { return bt_case_resolved(&sim->c); }
+char *bt_simulation_case(const bt_simulation *sim)
+{
+    BT_PLAIN_NUMBERS;
+    return bt_case_resolved(&sim->c);
+}
 
 const char *bt_file_holds(const char *path)
 {
+    BT_PLAIN_NUMBERS;
     static const char *const kinds[] = {
         [BT_FILE_OTHER] = "", [BT_FILE_CASE] = "case", [BT_FILE_STUDY] = "study"};
     return kinds[bt_case_kind_of(path)];
@@ -520,6 +552,7 @@ const char *bt_file_holds(const char *path)
 
 bt_status bt_number_read(const char *text, const char *unit, double *value)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     char why[BT_WHY];
     int kind = 0;
@@ -532,6 +565,7 @@ bt_status bt_number_read(const char *text, const char *unit, double *value)
 
 bt_status bt_seal_check(const char *path, const char *kind)
 {
+    BT_PLAIN_NUMBERS;
     static const char *const kinds[] = {BT_CHECKSUM_CHECKPOINT, BT_CHECKSUM_RESULT, BT_CHECKSUM_FIELD,
                                         BT_CHECKSUM_ENSEMBLE};
     const size_t n = strlen(kind);
@@ -545,6 +579,7 @@ bt_status bt_seal_check(const char *path, const char *kind)
 
 bt_status bt_record_check(const char *folder, const char *name, const void *made_by, size_t n)
 {
+    BT_PLAIN_NUMBERS;
     uint64_t seen = 0;
     bt_errors err = {0};
     bt_member_records records = {.n = 1, .seen = &seen};
@@ -554,6 +589,7 @@ bt_status bt_record_check(const char *folder, const char *name, const void *made
 
 bt_status bt_folder_lock(const char *dir, int *lock)
 {
+    BT_PLAIN_NUMBERS;
     bt_errors err = {0};
     *lock = bt_lock_take_file(dir, "lock", NULL, &err);
     return reported(*lock >= 0 ? BT_OK : BT_ERR_IO, &err);
@@ -588,6 +624,7 @@ static char *limits_json(void)
 
 char *bt_list_json(const char *what)
 {
+    BT_PLAIN_NUMBERS;
     if (!strcmp(what, "limits")) return limits_json();
     const bool keys = !strcmp(what, "keys");
     if (!keys && strcmp(what, "quantities") != 0) return NULL;

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/largest.h"
 #include "base/rng.h"
 #include "case/case_check.h"
@@ -58,6 +59,7 @@ static void add_override(bt_member *member, char *set, const char *at)
 
 void bt_study_member(const bt_study *study, int64_t m, bt_member *out)
 {
+    BT_PLAIN_NUMBERS;
     *out = (bt_member){.condition = m / study->repeats, .repeat = m % study->repeats};
     snprintf(out->name, sizeof out->name, "c%03" PRId64 "-r%03" PRId64, out->condition + 1, out->repeat + 1);
     const int64_t condition = study->fields == BT_FIELDS_OWN ? out->condition : 0;
@@ -111,6 +113,7 @@ static void name_member(const bt_study *study, const bt_member *member, bt_case 
 
 bt_status bt_member_case(const bt_study *study, const bt_member *member, bt_case *input, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const bt_status status = bt_case_read_placed(input, study->base, (const char *const *)member->set, member->at,
                                                  member->n_set, err);
     if (status == BT_OK) name_member(study, member, input);
@@ -119,6 +122,7 @@ bt_status bt_member_case(const bt_study *study, const bt_member *member, bt_case
 
 bt_status bt_study_base_case(const bt_study *study, bt_case *input, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     static const char *const none[] = {NULL};
     return bt_case_read_placed(input, study->base, (const char *const *)study->set,
                                study->set_at ? (const char *const *)study->set_at : none, study->n_set, err);
@@ -157,6 +161,7 @@ static bool first_difference(const char **a, const char **b, const char **sectio
 
 bool bt_study_resolved_alike(const char *a, const char *b)
 {
+    BT_PLAIN_NUMBERS;
     const char *section;
     return !first_difference(&a, &b, &section);
 }
@@ -179,6 +184,7 @@ static const char *word(const char *key, unsigned choice)
 
 char *bt_study_resolved(const bt_study *study, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     bt_case input;
     const bt_status status = bt_study_base_case(study, &input, err);
     char *base = status == BT_OK ? bt_case_resolved(&input) : NULL;

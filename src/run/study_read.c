@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/name.h"
 #include "base/tree.h"
 #include "case/case_base.h"
@@ -320,6 +321,7 @@ static void read_entries(const bt_study_reader *reader, const bt_node *root)
 
 bt_status bt_study_read(bt_study *study, const char *path, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     *study = (bt_study){.path = bt_text_copy(path), .repeats = 1, .samples = 1, .seed = 1, .ranks = 1,
                         .n_conditions = 1};
     const size_t before = err->n;
@@ -379,6 +381,7 @@ static void take_override(bt_study *study, const char *text, bt_errors *err)
 
 bt_status bt_study_override(bt_study *study, const char *const *set, int n, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     const size_t before = err->n;
     for (int i = 0; i < n; i++) take_override(study, set[i], err);
     return err->n == before ? BT_OK : BT_ERR_CASE;
@@ -386,6 +389,7 @@ bt_status bt_study_override(bt_study *study, const char *const *set, int n, bt_e
 
 bt_status bt_study_fits(const bt_study *study, int ranks, bt_errors *err)
 {
+    BT_PLAIN_NUMBERS;
     if (study->ranks <= ranks) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,
         "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it",

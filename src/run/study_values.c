@@ -161,12 +161,10 @@ static char *value_text(const bt_study_parameter *parameter, double x)
     const bool bare = kind != BT_UNIT_ANGLE && kind != BT_UNIT_TURN;
     const char *unit = bare ? NULL : bt_units_symbol(kind);
     int digits = 6; // 0.3, not 0.30000000000000004, if nothing is lost
-    void *locale = bt_point_begin();
     for (char number[40]; digits < 17; digits++) {
         snprintf(number, sizeof number, "%.*g", digits, x);
         if (fabs(strtod(number, NULL) - x) <= 1e-12 * fabs(x)) break;
     }
-    bt_point_end(locale);
     return bt_text_of("%.*g%s%s", digits, x, unit ? " " : "", unit ? unit : "");
 }
 
@@ -223,6 +221,7 @@ bool bt_study_is_whole(const bt_study_parameter *parameter)
 
 char *bt_study_distribution(const bt_study_parameter *parameter)
 {
+    BT_PLAIN_NUMBERS;
     if (!parameter->continuous) return bt_text_copy("");
     return bt_text_of("%s%s%s %.6g to %.6g", parameter->logarithmic ? "log-" : "",
                       distributions[parameter->distribution], parameter->distribution == BT_NORMAL

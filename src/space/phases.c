@@ -263,6 +263,7 @@ static void run_on_team(void run(pass *), pass *o, bt_totals *totals)
     const double t0 = bt_clock();
 #pragma omp parallel num_threads(o->n_shares)
     {
+        BT_PLAIN_NUMBERS;
         bt_totals own = {.n_sums = totals->n_sums, .most = totals->most, .most2 = totals->most2};
         pass mine = *o;
         mine.me = omp_get_thread_num();

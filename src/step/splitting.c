@@ -244,6 +244,7 @@ static void add_cells(bt_world *world, pass what, load_list *to)
     const bt_cells *cells = world->cells;
 #pragma omp parallel if (BT_MANY(cells->n_order, BT_FEW_CELLS))
     {
+        BT_PLAIN_NUMBERS;
         load_list mine = {0};
 #pragma omp for schedule(dynamic, 16) nowait
         for (bt_idx i = 0; i < cells->n_order; i++) add_cell(world, &cells->cell[cells->order[i]], what, &mine);
@@ -298,10 +299,14 @@ static load_list collect(bt_world *world)
     }
     free(foreign.row);
     bool any = false;
-#pragma omp parallel for reduction(|| : any) if (BT_MANY(bodies->n, 4096))
-    for (bt_idx i = 0; i < bodies->n; i++) {
-        if (splitting->sum[i] > 0) splitting->sum[i] = !is_borne(world, i, splitting->sum[i]);
-        any = any || splitting->sum[i] > 0;
+#pragma omp parallel reduction(|| : any) if (BT_MANY(bodies->n, 4096))
+    {
+        BT_PLAIN_NUMBERS;
+#pragma omp for
+        for (bt_idx i = 0; i < bodies->n; i++) {
+            if (splitting->sum[i] > 0) splitting->sum[i] = !is_borne(world, i, splitting->sum[i]);
+            any = any || splitting->sum[i] > 0;
+        }
     }
     if (any) add_cells(world, LIST, &all);
     for (size_t k = 0; k < came.n; k++) {
@@ -467,8 +472,12 @@ static found_list find(bt_world *world, bt_sum count[N_COUNTS], double *most)
     size_t *first;
     const bt_idx n = by_floe(world, &loads, &floe, &first);
     judged *result = bt_alloc((size_t)n, sizeof *result);
-#pragma omp parallel for schedule(dynamic, 16) if (BT_MANY(n, 64))
-    for (bt_idx k = 0; k < n; k++) result[k] = judge(world, floe[k], loads.row + first[k], first[k + 1] - first[k]);
+#pragma omp parallel if (BT_MANY(n, 64))
+    {
+        BT_PLAIN_NUMBERS;
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx k = 0; k < n; k++) result[k] = judge(world, floe[k], loads.row + first[k], first[k + 1] - first[k]);
+    }
     found_list found = {0};
     for (bt_idx k = 0; k < n; k++) {
         judged *j = &result[k];

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "contact/law_pair.h"
+#include "base/inside.h"
 #include "contact/contacts.h"
 #include "contact/row.h"
 #include "contact/law.h"
@@ -301,6 +302,7 @@ static void solve_split(bt_world *world)
 
 void bt_world_step(bt_world *world)
 {
+    BT_PLAIN_NUMBERS;
     bt_step_stats *st = &world->stats;
     st->phases = st->shared = (bt_phases){0};
     st->in_team = 0;

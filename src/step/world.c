@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/inside.h"
 #include "body/bodies.h"
 #include "force/environment.h"
 #include "force/forces.h"
@@ -19,6 +20,7 @@
 
 bt_world *bt_world_create(const bt_params *par)
 {
+    BT_PLAIN_NUMBERS;
     bt_world *world = bt_alloc(1, sizeof *world);
     world->par = *par;
     world->towed = -1;
@@ -51,6 +53,7 @@ void bt_world_free(bt_world *world)
 
 bt_gid bt_world_add(bt_world *world, const bt_body_def *def)
 {
+    BT_PLAIN_NUMBERS;
     world->cells->labelled = false;
     return bt_bodies_add(&world->bodies, def);
 }
@@ -88,6 +91,7 @@ static uint64_t hash_memory(const bt_world *world, const bt_memory *memory)
 
 uint64_t bt_world_hash(const bt_world *world)
 {
+    BT_PLAIN_NUMBERS;
     // The sum over bodies does not depend on order or distribution.
     const bt_bodies *bodies = &world->bodies;
     uint64_t sum = 0;

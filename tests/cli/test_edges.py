@@ -204,42 +204,6 @@ def test_words_of_capability_that_are_no_value_of_a_key(tmp_path):
     assert found["resolution"] == pytest.approx(0.05) and found["speed"] == pytest.approx(0.1 * 1852 / 3600)
 
 
-COMMA = """
-import json, locale, pathlib, sys
-sys.path.insert(0, {postproc!r})
-locale.setlocale(locale.LC_NUMERIC, "comma")
-assert locale.localeconv()["decimal_point"] == ","
-import bergtow
-result = bergtow.run("case.yml", "out")
-summary = json.loads((result.folder / "summary.json").read_text())
-assert summary["dt_s"] == 0.1 and isinstance(summary["mean_ice_resistance_n"], float)
-assert locale.localeconv()["decimal_point"] == ","
-print(summary["state_hash"])
-"""
-
-
-def test_a_program_whose_numbers_have_a_comma(tmp_path):
-    """The library within a program of another locale, as a window system may set it. Red when a writer takes that: the
-    summary is no JSON then, and ParaView reads other times."""
-    charmap = ["<code_set_name> ANSI_X3.4-1968", "<comment_char> %", "<escape_char> /", "CHARMAP",
-               *(f"<U{c:04X}> /x{c:02x} C{c}" for c in range(128)), "END CHARMAP"]
-    (tmp_path / "ascii").write_text("\n".join(charmap) + "\n")
-    (tmp_path / "numbers").write_text('LC_NUMERIC\ndecimal_point "<U002C>"\nthousands_sep ""\ngrouping -1\n'
-                                      "END LC_NUMERIC\n")
-    subprocess.run(["localedef", "-c", "-f", "./ascii", "-i", "./numbers", "./comma"], cwd=tmp_path,
-                   capture_output=True)
-    case = changed(TOW, run__duration=6, output__window_start=2)
-    write_case(tmp_path, case)
-    (tmp_path / "program.py").write_text(COMMA.format(postproc=str(ROOT / "postproc")))
-    done = subprocess.run([sys.executable, "program.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120,
-                          env=environment(OMP_NUM_THREADS=1, LOCPATH=str(tmp_path)))
-    assert done.returncode == 0, done.stderr
-    plain = run(tmp_path, case, name="plain")
-    assert done.stdout.split() == [plain.hash]
-    for name in ("frames.xdmf", "case.resolved.yml"):
-        assert (tmp_path / "out" / name).read_text() == (plain.dir / name).read_text()
-
-
 def outlines(floes):
     """A map of squares in metres, (east, north, side)."""
     crs = {"type": "name", "properties": {"name": "bergtow:plane"}}

@@ -52,6 +52,7 @@ static void agreement(const bt_comm *c)
     CHECK(bt_comm_agree(c, BT_OK) == BT_OK);
     CHECK(bt_comm_agree(c, last ? BT_ERR_SIGNAL : BT_OK) == BT_ERR_SIGNAL);
     CHECK(bt_comm_agree(c, last ? BT_ERR_IO : c->rank ? BT_ERR_NUMERIC : BT_ERR_SIGNAL) == BT_ERR_IO);
+    CHECK((int)bt_comm_agree(c, last ? (bt_status)-3 : c->rank ? (bt_status)1 : BT_ERR_IO) == -3);
     if (c->size > 1) CHECK(bt_comm_agree(c, last ? BT_ERR_NUMERIC : BT_ERR_CASE) == BT_ERR_NUMERIC);
     CHECK(!bt_comm_any(c, false) && bt_comm_any(c, last));
     bt_comm_rest(c);
@@ -171,6 +172,7 @@ TEST(several_ranks)
 TEST(all_ranks_leave_with_the_worst_code)
 {
     assert_int_equal(mpirun(3, "worst"), BT_ERR_IO);
+    assert_int_equal(mpirun(2, "own"), EXIT_FAILURE);
     assert_int_equal(mpirun(2, "alone"), BT_ERR_NUMERIC); // the other waits for ever
     assert_int_equal(mpirun(2, "usage"), BT_ERR_USAGE);
 }
@@ -184,6 +186,7 @@ int main(int argc, char **argv)
         int code = BT_OK;
         if (!strcmp(argv[1], "ranks")) code = all_checks();
         else if (!strcmp(argv[1], "worst")) code = c->rank == 1 ? BT_ERR_IO : c->rank ? BT_ERR_CASE : BT_OK;
+        else if (!strcmp(argv[1], "own")) code = c->rank == 1 ? EXIT_FAILURE : BT_OK;
         else if (!strcmp(argv[1], "usage")) exit(BT_ERR_USAGE);
         else if (c->rank == 1) exit(BT_ERR_NUMERIC);
         else bt_comm_rest(c);
