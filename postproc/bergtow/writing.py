@@ -55,7 +55,7 @@ def may_write(path, force, remedies=REMEDIES):
 @contextmanager
 def written(path, force, remedies=REMEDIES):
     """with written(path, force) as new: write the file `new`, which replaces `path` once it is complete. Raises
-    RunError."""
+    RunError. Also for a file that a later call reads: a full disk or a kill leaves what was there."""
     may_write(path, force, remedies)
     new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
     try:
@@ -65,7 +65,8 @@ def written(path, force, remedies=REMEDIES):
             os.fsync(whole.fileno())  # so that a crash leaves either the old file or the new one
         os.replace(new, path)
     except OSError as error:
-        raise RunError(path, f"cannot be written ({error.strerror or error})", remedies[0]) from None
+        why = os.strerror(error.errno) if error.errno else error  # strerror is a paragraph if the error is of HDF5
+        raise RunError(path, f"cannot be written ({why})", remedies[0]) from None
     finally:
         with suppress(OSError):
             new.unlink()
