@@ -6,6 +6,7 @@ text fields, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_b
 list of the files in the folder, which does not cover a file that was moved there.
 """
 import csv
+import errno
 import io
 import json
 import math
@@ -66,7 +67,8 @@ def written(path, force, remedies=REMEDIES):
         os.replace(new, path)
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else error  # strerror is a paragraph if the error is of HDF5
-        raise RunError(path, f"cannot be written ({why})", remedies[0]) from None
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)  # another place would be one without the finished runs
+        raise RunError(path, f"cannot be written ({why})", "free some disk space" if full else remedies[0]) from None
     finally:
         with suppress(OSError):
             new.unlink()
