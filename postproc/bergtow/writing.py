@@ -6,6 +6,7 @@ text fields, a PDF, an SVG and a page in their metadata, JSON and CSV as `made_b
 list of the files in the folder, which does not cover a file that was moved there.
 """
 import csv
+import errno
 import io
 import json
 import math
@@ -55,7 +56,7 @@ def may_write(path, force, remedies=REMEDIES):
 @contextmanager
 def written(path, force, remedies=REMEDIES):
     """with written(path, force) as new: write the file `new`, which replaces `path` once it is complete. Raises
-    RunError."""
+    RunError. Also for a file that a later call reads: a full disk or a kill leaves what was there."""
     may_write(path, force, remedies)
     new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
     try:
@@ -65,7 +66,9 @@ def written(path, force, remedies=REMEDIES):
             os.fsync(whole.fileno())  # so that a crash leaves either the old file or the new one
         os.replace(new, path)
     except OSError as error:
-        raise RunError(path, f"cannot be written ({error.strerror or error})", remedies[0]) from None
+        why = os.strerror(error.errno) if error.errno else error  # strerror is a paragraph if the error is of HDF5
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)  # another place would be one without the finished runs
+        raise RunError(path, f"cannot be written ({why})", "free some disk space" if full else remedies[0]) from None
     finally:
         with suppress(OSError):
             new.unlink()

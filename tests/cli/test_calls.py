@@ -6,10 +6,12 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from harness import BERGTOW, TOW, call, changed, environment, heard, quick, write_case
 
+from bergtow import _calls
 from bergtow._calls import called
 from bergtow._interrupts import held
 from bergtow.study import runs as case_runs
@@ -121,6 +123,31 @@ def test_ctrl_c_while_python_loads(tmp_path):
     (tmp_path / "sitecustomize.py").write_text("import os\nos.kill(os.getpid(), 2)\n")
     p = call("report", "nothing", env=environment(PYTHONPATH=tmp_path), preexec_fn=heard)
     assert (p.returncode, p.stderr) == (6, "bergtow report: stopped\n")
+
+
+#: a stop where Python executes a text, as in the making of a dataclass, and in a callback of h5py, whose exception is
+#: SystemError
+WITHIN = {"text": 'exec("os.kill(os.getpid(), 15)")',
+          "h5py": 'h5py.h5a.iterate(file.id, lambda _: os.kill(os.getpid(), 15))'}
+
+
+@pytest.mark.parametrize("within", WITHIN)
+def test_a_stop_has_its_code_wherever_it_arrives(tmp_path, within):
+    """Red at death by SIGINT, and at a traceback with code 1."""
+    (tmp_path / "stopped.py").write_text(f"""
+import os
+import h5py
+from bergtow.cli import command
+def main():
+    with h5py.File("of-memory", "w", driver="core", backing_store=False) as file:
+        file.attrs["some"] = 1
+        {WITHIN[within]}
+command.guarded("bergtow", main)
+""")
+    package = os.pathsep.join(map(str, (tmp_path, Path(_calls.__file__).parents[1])))
+    p = subprocess.run([sys.executable, "-m", "stopped"], env=environment(PYTHONPATH=package), capture_output=True,
+                       text=True, preexec_fn=heard)
+    assert (p.returncode, p.stderr) == (6, "bergtow: stopped\n")
 
 
 def test_a_second_stop_leaves_no_run_behind(tmp_path):

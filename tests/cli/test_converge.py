@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """bergtow converge: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
+import errno
 import json
+import os
 import re
 import subprocess
 import time
@@ -307,6 +309,30 @@ def test_runs_of_other_values_or_another_program_are_made_anew(tmp_path, change,
         "given": ("body: `draft: ", "`draft: 0.4 m` now"), "values": ("`friction: 0.1` there, `friction: 0.3` now",)}[
             change])
     assert not runs.kept("case", 1)
+
+
+def test_a_full_disk_and_a_cut_study_leave_finished_runs(tmp_path, monkeypatch):
+    """Red: the file is empty after the full disk, which is then the name of another program."""
+    runs_of(tmp_path, SHORT).make("case", [0], {})
+    file = tmp_path / "out/converge/case.yml"
+    text, runs = file.read_text(), runs_of(tmp_path, SHORT)
+
+    def full(path, *_, **__):
+        path.open("w").close()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as m:
+        m.setattr(Path, "write_text", full)
+        runs.write("case", 1, {})
+        with pytest.raises(RunError) as refused:
+            runs.write("case", 2, {})
+    assert refused.value.path == file and refused.value.remedy and refused.value.status == 4
+    assert file.read_text() == text and not list(file.parent.glob(".*.new*"))
+    for left in ("", text[:12]):
+        file.write_text(left)
+        runs = runs_of(tmp_path, SHORT)
+        assert runs.make("case", [0], {}) == [None] and runs.made == 0 and file.read_text() == text
+    assert not list(file.parent.glob("*.old*"))
 
 
 def test_finished_runs_and_the_files_of_others_are_set_aside(tmp_path):

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import json
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -232,6 +233,22 @@ def test_the_image_of_a_floe_keeps_clear_of_the_hull():
         s = SimpleNamespace(start=(5, 0.6), outline=square, hull=SimpleNamespace(radius=0.8), extent=(0, 0, 10, 10),
                             values={"body.yaw": 0, "domain.ends": "open", "domain.sides": sides})
         assert members.clear_of_hull([square + at for at in ([5, 9.9], [5, 5], [9.9, 0.6])], s).tolist() == clear
+
+
+def test_a_field_file_gives_way_only_to_a_whole_one(tmp_path):
+    """Red: it is cut, and the error is a paragraph of HDF5 without a remedy."""
+    floes = members.Floes(np.zeros((4, 2)), np.arange(5), np.zeros((4, 3)), np.ones(4), np.ones(4), {"ice_area": 10.0})
+    file, many = tmp_path / "m001.h5", dataclasses.replace(floes, vertices=np.zeros((10000, 2)))
+    floes.write(file)
+    before, limits = file.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
+    try:
+        with pytest.raises(RunError) as refused:
+            many.write(file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert refused.value.path == file and refused.value.remedy and "\n" not in str(refused.value)
+    assert file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
 
 
 def test_a_map_without_floes_has_members_without_floes():

@@ -52,13 +52,26 @@ class _Stream:
         self._try(self._stream.flush)
 
 
+class _Stop(KeyboardInterrupt):
+    """A request to stop. A class of its own, because python -m kills itself by SIGINT at its end, whatever its exit
+    code, once a bare KeyboardInterrupt has left the exec() of a text, as in the making of a dataclass, even if caught.
+    Rejected: os._exit, which leaves out what modules do at the end; a start with -c, which mends only one start."""
+
+
 def guarded(name, main):
     """Run main() and exit with the matching code. SIGTERM and SIGHUP act like Ctrl-C, so that runs started by main()
-    write checkpoints before they end; nohup still works. Once the outcome is known these signals are ignored, because
-    they would kill Python while it shuts down. name: prefix of messages."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
+    write checkpoints before they end; nohup still works. Whatever ends main() after a stop is that stop: a library may
+    make another exception of it, as h5py makes SystemError of one that arrives in its callbacks. Once the outcome is
+    known these signals are ignored, because they would kill Python while it shuts down. name: prefix of messages."""
+    stops = []
+
+    def stop(number, frame):
+        stops.append(number)
+        raise _Stop
+
+    for number in STOPS:
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, stop)
     for stream in (sys.stdout, sys.stderr):  # a terminal whose encoding has no dash still gets its table
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
@@ -69,6 +82,10 @@ def guarded(name, main):
             signal.pthread_sigmask(signal.SIG_SETMASK, ())  # blocked by src/app/cmd_python.c while Python loads
             with progress.told(name):
                 main()
+        except BaseException as error:
+            if stops:
+                raise _Stop from error
+            raise
         finally:
             for number in STOPS:
                 signal.signal(number, signal.SIG_IGN)

@@ -13,6 +13,7 @@ The halves are assumed. Floes that end up on the towed body or outside the domai
 import math
 from dataclasses import dataclass
 
+from bergtow import writing
 from bergtow.errors import CASE, RunError
 from bergtow.result.frames import place
 from bergtow.routing import apart
@@ -68,7 +69,7 @@ class Floes:
                         if k in g.attrs})
 
     def write(self, file):
-        with h5py.File(file, "w") as f:
+        with writing.written(file, True) as new, h5py.File(new, "w") as f:
             g = f.create_group("floes")
             for name in ("vertices", "offsets", "pose", "thickness", "area"):
                 g[name] = getattr(self, name)

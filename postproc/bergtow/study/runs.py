@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from bergtow import _library
+from bergtow import _library, writing
 from bergtow._calls import called
 from bergtow.errors import CASE, SIGNAL, USAGE, Message, Refused, RunError
 from bergtow.result import integrity
@@ -146,11 +146,15 @@ class CaseRuns:
         study = {"base": os.path.relpath(self.case.resolve(), path.parent.resolve()), **self.study(n, values)}
         for some in (study.get("set", {}), *study.get("variants", {}).values()):
             some |= {key: None for key, text in some.items() if text in ("", "~", "null")}
-        first = f"# {self.version}\n"
-        made_by = path.read_text(encoding="utf-8").partition("\n")[0] + "\n" if path.exists() else first
-        if made_by != first:
-            self.set_aside(name, f"they are of {made_by[2:-1]}, and this is {self.version}")
-        path.write_text(first + yaml.safe_dump(study, sort_keys=False, allow_unicode=True), encoding="utf-8")
+        first = f"# {self.version}"
+        text = first + "\n" + yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
+        there = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        made_by, whole, _ = there.partition("\n")
+        if whole and made_by != first:  # a first line without an end is damage and tells no version
+            self.set_aside(name, f"they are of {made_by[2:]}, and this is {self.version}")
+        if there != text:
+            with writing.written(path, True) as new:
+                new.write_text(text, encoding="utf-8")
         return path
 
     def kept(self, name, i):
