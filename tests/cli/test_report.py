@@ -738,7 +738,7 @@ def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
     } & set(ice) and "ice.friction" in ice
     assert (every["ice.size"].kind == "unused"
             and every["ice.size"].origin == "not used: no effect on ice that is read from a file")
-    assert said == [{"ice.size": f"{size.mean():.3g} m", "ice.thickness": "0.7 m"}]
+    assert said == [{"ice.size": f"{size.mean():.3g} m", "ice.thickness": f"{thickness:.3g} m"}]
     text = page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch).read_text()
     assert ice["floe size"][0] in text and "as read" in text
     some = run_of("some", [None] + [0.5] * (n - 1))[1]  # the case's thickness is that of the first

@@ -83,7 +83,7 @@ def ice_as_read(run):
     if source_of_ice(run.case) is None or not run.n_floes:
         return {}
     size = np.sqrt(4 * run.area[:run.n_start] / np.pi).mean()
-    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness[:run.n_start].mean():.3g} m"}
+    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.mean_thickness:.3g} m"}
 
 
 def case_of(e, rows):
