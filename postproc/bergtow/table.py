@@ -19,6 +19,11 @@ def hours_text(hours):
     return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
 
 
+def times_text(*times):
+    """Times of a run as bergtow prints them: "13560 to 14445 s". Three digits would name other samples."""
+    return " to ".join(f"{t:g}" for t in times) + " s"
+
+
 def percent(x):
     """A share, "–" if it is not known."""
     return "–" if x is None or not np.isfinite(x) else f"{round(100 * x) + 0} %"

@@ -204,10 +204,15 @@ int bt_units_format(double value, bt_unit kind, char *out, size_t size)
 
 const char *bt_force_text(char out[32], double newton)
 {
-    const double size = fabs(newton);
-    if (isnan(newton)) snprintf(out, 32, "–");
-    else if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
-    else if (size >= 1e3) snprintf(out, 32, "%#.4g kN", newton / 1e3);
-    else snprintf(out, 32, "%#.4g N", newton);
+    static const char *const unit[] = {"N", "kN", "MN", "GN", "TN"};
+    if (isnan(newton)) {
+        snprintf(out, 32, "–");
+        return out;
+    }
+    double value = newton;
+    int k = 0;
+    // "%#.4g" turns 999.95 into "1000.", so the unit is that of the rounded number
+    while (fabs(value) >= 999.95 && isfinite(value) && k < (int)(sizeof unit / sizeof *unit) - 1) value /= 1000, k++;
+    snprintf(out, 32, fabs(value) < 999.95 ? "%#.4g %s" : "%.4g %s", value, unit[k]);
     return out;
 }

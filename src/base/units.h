@@ -52,7 +52,7 @@ double bt_units_froude(bt_unit kind);
 const char *bt_units_symbol(bt_unit kind); ///< SI symbol of a formatted value, "" for plain numbers
 const char *bt_units_bare(bt_unit kind);   ///< unit of a number written without one, "-" for plain numbers
 
-/// A force in N, kN or MN, with at most three digits before the point below 1 GN; returns out.
+/// A force to four digits, in N, kN, MN, GN or TN, with at most three digits before the point; returns out.
 const char *bt_force_text(char out[32], double newton);
 
 #endif

@@ -156,3 +156,20 @@ def test_each_source_stands_once_with_what_is_from_it():
     blocks = document.sources(some, [{"source": "Jones 2001", "label": "ramming"}])
     table = dict(next(b for b in blocks if b["kind"] == "pairs")["rows"][1:])
     assert table == {"Smith 1999": "a.k0, a.k1, a.k2, a.k3 and 2 more", "Jones 2001": "a.y, estimate: ramming"}
+
+
+@pytest.mark.parametrize("wind", [0, -9])
+def test_the_check_by_hand_follows_a_bent_tow(tmp_path, wind):
+    """Red: water and wind along the first leg, which the body has left before the window."""
+    case = changed(TOW, run__duration=45, output__window_start=30, domain__sides="periodic", ice__concentration=0.1,
+                   tow__waypoints=[[4, 0], [4, 20]], tow__turn_radius=0.5, water__current_y=-0.05, air__wind_y=wind)
+    with Run(run(tmp_path, case).dir) as opened:
+        found = {row[0]: row for row in document.by_hand(opened)}
+    speed, along = re.findall(r"× (\S+) m/s", found["drag of the water"][1])
+    assert speed == along == "0.180"
+    assert 0.97 < float(found["drag of water and wind" if wind else "drag of the water"][4]) < 1.03
+
+
+def test_the_symbol_of_rafting_is_that_of_the_program():
+    """q0 = κ/2 · energy, as in tests/cli/test_rafting_known.py. Red: half of it."""
+    assert dict(document.SYMBOLS)["κ"].startswith("2 × work of rafting")

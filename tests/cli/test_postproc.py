@@ -349,11 +349,30 @@ def test_the_head_tells_the_speed_ordered_from_the_one_made_good(tmp_path):
 
 
 def test_the_head_tells_the_thickness_of_the_floes(tmp_path):
-    """Red: ice.thickness, also where the floes have another, and 1 floes."""
+    """The mean is that of the estimates, weighted with area. Red: ice.thickness, also where the floes have another; the
+    plain mean, 0.375 m, beside the other on one page; 1 floes."""
     with Run(make_run(tmp_path / "run")) as run:
-        assert ", 2 floes, 0.375 m thick, " in style.conditions(run)
+        assert ", 2 floes, 0.432 m thick, " in style.conditions(run)
         run.n_pieces = 1
         assert ", 1 floe, 0.5 m thick, " in style.conditions(run)
+
+
+def test_times_of_a_run_are_those_of_the_console():
+    """Red: 13600 to 14400 s."""
+    assert style.times_text(13560, 14445) == "13560 to 14445 s"
+    assert style.times_text(np.float64(700.5)) == "700.5 s"
+
+
+def test_a_page_and_its_pictures_name_the_window_of_the_summary(tmp_path, monkeypatch):
+    """Red: to three digits."""
+    with Run(make_run(tmp_path / "run")) as run:
+        monkeypatch.setitem(run.summary["window"], "start_s", 13560.0)
+        monkeypatch.setitem(run.summary["window"], "end_s", 14445.0)
+        assert any("13560 to 14445 s" in row[1] for row in report_run.quality(run))
+        assert "13560 to 14445 s" in report_run.figures(run)[0][2]
+        assert any("13560 to 14445 s" in t.get_text() for t in plot_force.draw(run).texts)
+        run.frame_times[0] = 14445.0
+        assert "14445 s" in plot_field.panel_words(run, "", 0, False)[0]
 
 
 def test_a_jam_of_one_step_hides_no_force(tmp_path):
@@ -452,7 +471,7 @@ def test_floes_take_the_colour_of_their_value(tmp_path):
 def test_field_panels_show_first_middle_and_last_frame(tmp_path):
     with Run(make_run(tmp_path / "run", path=[(float(i * i), 0.0) for i in range(5)])) as run:
         axes = plot_field.draw(run).axes[:3]
-        assert [a.get_title(loc="left") for a in axes] == ["before, t = 0", "during, t = 5.00 s", "after, t = 10.0 s"]
+        assert [a.get_title(loc="left") for a in axes] == ["before, t = 0 s", "during, t = 5 s", "after, t = 10 s"]
         for a, x in zip(axes, (0.0, 4.0, 16.0)):
             colour = matplotlib.colors.to_rgba(style.BODY)
             bodies = [p for c in a.collections for p in c.get_paths()

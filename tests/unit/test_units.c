@@ -175,4 +175,16 @@ TEST(short_values_are_written_short)
     assert_string_equal(text, "none");
 }
 
+TEST(a_force_has_four_digits_and_no_stray_point)
+{
+    static const struct { double newton; const char *text; } some[] = {
+        {0, "0.000 N"}, {12.34, "12.34 N"}, {999.94, "999.9 N"}, {999.96, "1.000 kN"}, {-1500, "-1.500 kN"},
+        {999960, "1.000 MN"}, {-6.359e9, "-6.359 GN"}, {5.007e10, "50.07 GN"}, {1.213e9, "1.213 GN"},
+        {3e14, "300.0 TN"}, {2.5e20, "2.5e+08 TN"}, {NAN, "–"}, {INFINITY, "inf N"},
+    };
+    char text[32];
+    for (size_t i = 0; i < sizeof some / sizeof *some; i++)
+        assert_string_equal(bt_force_text(text, some[i].newton), some[i].text);
+}
+
 TEST_MAIN(NULL, NULL)

@@ -30,6 +30,7 @@ from bergtow.result.frames import lonlat_of
 from bergtow.result.hdf5 import first_line
 from bergtow.result.run import Run
 from bergtow.said import say
+from bergtow.table import times_text
 
 import numpy as np
 
@@ -488,8 +489,8 @@ def perform(a):
             say(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
             if any(layer.name in FRAMED for layer in layers):
                 at = run.frame_times[frames]
-                say(f"frame: t = {at[0]:.6g} s" if len(at) == 1 else
-                    f"frames: {len(at)}, t = {at[0]:.6g} to {at[-1]:.6g} s")
+                say(f"frame: t = {times_text(at[0])}" if len(at) == 1 else
+                    f"frames: {len(at)}, t = {times_text(at[0], at[-1])}")
         say(f"coordinates: {place.words}")
 
 
@@ -501,8 +502,8 @@ def frames_of(run, time):
     if time == "last":
         return [run.n_frames - 1]
     if not run.frame_times[0] <= time <= run.frame_times[-1]:
-        raise BergtowError(f"--time: {time:g} s is outside the frames, {run.frame_times[0]:g} to "
-                           f"{run.frame_times[-1]:g} s", USAGE)
+        raise BergtowError(f"--time: {times_text(time)} is outside the frames, "
+                           f"{times_text(run.frame_times[0], run.frame_times[-1])}", USAGE)
     return [last]
 
 

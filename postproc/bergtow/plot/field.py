@@ -33,7 +33,7 @@ def body_place(run, frame):
 
 def panel_words(run, label, frame, follow):
     """The title of a panel: label, time, and the position of the body if the view follows it."""
-    words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
+    words = [f"t = {style.times_text(run.frame_times[frame])}"]
     if label:
         words.insert(0, label)
     lines = [", ".join(words)]

@@ -178,7 +178,7 @@ def draw(run, top=None):
     figure.text(0.02, 1 - 0.92 / height, "\n".join(doubts(run)), va="top", fontsize=9, color=style.TOW)
     notes = "assumed parameters: see case.resolved.yml"
     if run.window:
-        notes = f"shaded: {run.window_name} {style.short(run.window[0])} to {style.short(run.window[1])} s; " + notes
+        notes = f"shaded: {run.window_name} {style.times_text(*run.window)}; " + notes
     figure.text(0.975, 0.02, notes, ha="right", va="bottom", fontsize=8.5, color=style.FAINT)
     return figure
 

@@ -132,7 +132,8 @@ def draw(run):
                            f"wait for it, or continue it with `bergtow resume {run.path}`")
     figure = style.Figure(figsize=(11, 8.6))
     grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.855, bottom=0.09, hspace=0.26, wspace=0.16)
-    window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(panels["from"]) else "no window"
+    start = panels["from"]
+    window = f"over the window from {style.times_text(start)} on" if np.isfinite(start) else "no window"
     least = "at least the " if run.at_least else ""  # panels count nothing in steps without a converged solution
     draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"{least}mean load by panel, {window}")
     draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST,

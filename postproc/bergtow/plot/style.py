@@ -99,7 +99,8 @@ def subplots(rows=1, columns=1, *, figsize, **more):
 
 
 # used in pictures; tables use them without matplotlib
-scale, short, quantity = text_table.scale, text_table.short, text_table.quantity
+scale, short = text_table.scale, text_table.short
+quantity, times_text = text_table.quantity, text_table.times_text
 
 
 def conditions(run):
@@ -110,7 +111,7 @@ def conditions(run):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
         words += [f"{run.n_start} floe{'s' if run.n_start > 1 else ''}",
-                  f"{np.mean(run.thickness[:run.n_start]):.3g} m thick"]
+                  f"{run.mean_thickness:.3g} m thick"]
     mode, speed, made = run.case.get("tow.mode", ""), run.value("tow.speed"), run.speed_made_good
     if run.towed is not None and mode != "none" and np.isfinite(speed):
         words.append(f"towed{TOWED_BY.get(mode, '')}, {speed:.3g} m/s ordered" +

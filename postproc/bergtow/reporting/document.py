@@ -21,7 +21,8 @@ SYMBOLS = (("A", "concentration: area of ice / area of water"), ("C", "drag coef
            ("d", "draft of the body, m"),
            ("h", "thickness of the ice, m"),
            ("V, V_a", "speed of the body through water and ice, and its part along the tow, m/s"),
-           ("W", "width of the body across the tow, m"), ("κ", "work of rafting / potential energy that the ice gains"),
+           ("W", "width of the body across the tow, m"),
+           ("κ", "2 × work of rafting / potential energy that the ice gains"),
            ("p, T", "probability that the design value is exceeded, in a tow of T hours"),
            ("s", "height of the body above the water, m"),
            ("U, U_a", "wind relative to the body, and its part from ahead, m/s"),
@@ -118,13 +119,20 @@ def _row(what, by_hand, n, simulated):
             number(simulated / n, 2) if n and np.isfinite(simulated) else "–"]
 
 
-def met(run, what):
-    """(speed, part from ahead) of the mean wind or current that the body meets in the window, m/s, on the first leg of
-    the tow; 0 in still air."""
+def wind_met(run):
+    """(speed, part from ahead) of the mean wind that the body meets in the window, m/s; 0 in still air. Ahead is the
+    mean course of the body there: on a tow with way-points no leg stands for the window."""
+    wind, body = (window_mean(run, *(f"{name}{k}" for k in "xy")) for name in ("wind_", "body_v"))
+    if not wind.any():
+        return 0.0, 0.0
+    relative, speed = body - wind, float(np.hypot(*body))
+    return float(np.hypot(*relative)), float(body @ relative) / speed if speed else np.nan
+
+
+def window_mean(run, *names):
+    """Means of series over the window."""
     there = within(run["time"], *run.window)
-    flow = np.array([run[f"{what}_{k}"][there].mean() for k in "xy"])
-    relative = run.speed_made_good * run.headings[0] - flow if flow.any() or what == "current" else np.zeros(2)
-    return float(np.hypot(*relative)), float(run.headings[0] @ relative)
+    return np.array([run[name][there].mean() for name in names])
 
 
 def by_hand(run):
@@ -136,7 +144,7 @@ def by_hand(run):
     thick, concentration, ice = e.get("thickness_m", np.nan), e.get("concentration", np.nan), run.value("ice.density")
     if not np.isfinite([width, speed, draft, form, water]).all():
         return []
-    along, (wind, ahead) = met(run, "current")[1], met(run, "wind")
+    along, (wind, ahead) = float(window_mean(run, "speed_through_water")[0]), wind_met(run)
     drag, simulated = 0.5 * water * form * width * draft * speed * along, run.number("mean_drag_force_n")
     out = [_row("drag of the water", f"½ ρw C W d V V_a = ½ × {number(water, 4)} kg/m³ × {number(form)} × "
                 f"{number(width)} m × {number(draft)} m × {number(speed)} m/s × {number(along)} m/s", drag,

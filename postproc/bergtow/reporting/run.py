@@ -104,8 +104,7 @@ def figures(run):
     if run.towed is None:
         return []
     n = run.number
-    window = (f"{run.window_name} {style.short(run.window[0])} to {style.short(run.window[1])} s"
-              if run.window else "no window")
+    window = f"{run.window_name} {style.times_text(*run.window)}" if run.window else "no window"
     name = run.mean_name
     (ice, ice_range), (tow, tow_range) = (with_interval(*run.interval(key)) for key in ("ice_resistance", "tow_force"))
     out = [(f"ice resistance, {name}", ice,
@@ -215,7 +214,7 @@ def impacts(run):
             "largest peak",
             f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse "
             f"{style.short(big['impulse_ns'])} N s, "
-            f"approach {style.short(big['approach_m_s'])} m/s), {struck} at {style.short(big['time_s'])} s" +
+            f"approach {style.short(big['approach_m_s'])} m/s), {struck} at {style.times_text(big['time_s'])}" +
             start_peak(run, "impacts.start_largest_peak_n")))
     elif np.isfinite(run.number("impacts.start_largest_peak_n")):
         rows.append(("largest peak", "none in the window" + start_peak(run, "impacts.start_largest_peak_n")))
@@ -233,8 +232,7 @@ def quality(run):
         rows += [
             ("verdict", run.verdict[0], run.verdict[1]),
             (run.window_name,
-             f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples",
-             rule),
+             f"{style.times_text(*run.window)}, {n('window.n_samples'):.0f} samples", rule),
             ("independent samples in it", style.short(n("window.n_independent")),
              f"correlation time {style.short(n('window.correlation_time_s'))} s"
              if np.isfinite(n("window.correlation_time_s")) else "")
@@ -283,7 +281,7 @@ def events(run):
     """(rows of events, their total number)."""
     units = {"line_broken": "N", "adrift": "m/s", "waypoint": "m"}
     some = sorted(run.events, key=lambda e: e["kind"] == "waypoint")[:MAX_EVENTS]  # a broken line comes before corners
-    rows = [(f"{e['time_s']:g} s", e["kind"].replace("_", " "), str(e["subject"]),
+    rows = [(style.times_text(e["time_s"]), e["kind"].replace("_", " "), str(e["subject"]),
              f"{style.short(e['value'])} {units.get(e['kind'], '')}".strip() if e["value"] is not None else "")
             for e in sorted(some, key=lambda e: e["time_s"])]
     return rows, len(run.events)

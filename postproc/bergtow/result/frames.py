@@ -112,6 +112,11 @@ class Frames:
         own = self._read("floes/thickness", ndim=1)
         return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
 
+    @property
+    def mean_thickness(self):
+        """Mean thickness of the floes at the start, m, weighted with their areas like that of the estimates."""
+        return float(np.average(self.thickness[:self.n_start], weights=self.area[:self.n_start]))
+
     @cached_property
     def area(self):
         """[N] m²."""

@@ -148,9 +148,9 @@ def not_used(run, case):
     return found
 
 
-def spread(values, unit):
+def spread(values, unit, mean):
     """Mean and range of a quantity over the floes, in words."""
-    low, mean, high = np.min(values), np.mean(values), np.max(values)
+    low, high = np.min(values), np.max(values)
     return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(
         high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
 
@@ -160,12 +160,12 @@ def of_field(run):
     ice = source_of_ice(run.case)
     if ice is None or not run.n_floes:
         return []
-    said = f"counted in the ice that {ice} read"
+    said, size = f"counted in the ice that {ice} read", np.sqrt(4 * run.area[:run.n_start] / np.pi)
     rows = (("floes", str(run.n_start), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
                                   "area fraction of ice in the ice region at the start, before a lead"),
-            ("floe size", spread(np.sqrt(4 * run.area[:run.n_start] / np.pi),
-                                 "m"), "diameter of the circle of a floe's area: mean and range"),
-            ("floe thickness", spread(run.thickness[:run.n_start], "m"), "mean and range"))
+            ("floe size", spread(size, "m", np.mean(size)), "diameter of the circle of a floe's area: mean and range"),
+            ("floe thickness", spread(run.thickness[:run.n_start], "m", run.mean_thickness),
+             "mean weighted with area, and range"))
     return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
 
 

@@ -24,7 +24,7 @@ from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import load as stat_load
 from bergtow.stats import mean as stat_mean
 from bergtow.stats import profile as stat_profile
-from bergtow.table import counted, hours_text, quantity, short
+from bergtow.table import counted, hours_text, quantity, short, times_text
 
 LONG = 2.0          # the tow of the statement / the simulated tow: above, the value is for a longer tow than simulated
 FAR = 10.0          # times the simulated hours: an extrapolation beyond this is reported
@@ -83,7 +83,7 @@ def ice_as_read(run):
     if source_of_ice(run.case) is None or not run.n_floes:
         return {}
     size = np.sqrt(4 * run.area[:run.n_start] / np.pi).mean()
-    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.thickness[:run.n_start].mean():.3g} m"}
+    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.mean_thickness:.3g} m"}
 
 
 def case_of(e, rows):
@@ -230,7 +230,7 @@ def _of_the_start(case, load):
         return [(f"the start, which the windows leave out, takes more than {than}, {words}, while the ramp of "
                  f"{ramp:.3g} s accelerates the body; a longer ramp takes less", force + inertia)]
     return [(f"the start, which the windows leave out, takes more than {than}, {words}",
-             f"{force} at {found['time_s']:.3g} s")]
+             f"{force} at {times_text(found['time_s'])}")]
 
 
 def steps(e, rows):
@@ -278,7 +278,7 @@ def _of_the_line(e, rows, lines):
                     "tension until its branch parts), and mix the two; for a design value simulate without "
                     "breaking_load",
                     ", ".join([f"the line parted in {parted} of {counted(len(tows), 'tow')}", *each,
-                               *[f"the first at {first:.4g} s"] * bool(np.isfinite(first))])
+                               *[f"the first at {times_text(first)}"] * bool(np.isfinite(first))])
                     + f"; in {adrift} of them nothing towed the body then"))
     known = {f"{loads.TENSION}{v['subject']}" for v in broken}  # these are reported above
     for words, key, some in (("the design tension is", "design", lines),

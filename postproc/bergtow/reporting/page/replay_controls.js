@@ -184,7 +184,7 @@ function reading(time) {
     let k = curve.time.findIndex((t) => t >= time);
     if (k < 0) k = curve.time.length - 1;
     const said = (l) => `${l.label} ${l.smooth[k] === null ? "–" : quantity(l.smooth[k], l.unit)}`;
-    return `at ${+time.toPrecision(5)} s, running means: ` + curve.lines.map(said).join(", ");
+    return `at ${+time.toPrecision(6)} s, running means: ` + curve.lines.map(said).join(", ");
 }
 
 // ---- words
