@@ -397,7 +397,6 @@ void bt_impacts_take(bt_world *world)
 
 void bt_impacts_end(bt_impacts *impacts)
 {
-    impacts->n_closed = 0;
     for (int64_t i = 0; i < impacts->n_open; i++) close_event(impacts, &impacts->open[i]);
     impacts->n_open = 0;
 }

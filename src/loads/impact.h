@@ -34,6 +34,10 @@
 //     Λ = λ_c v1 / (v1 − v2)   for v2 < 0, otherwise λ_c
 // however the gap divides it.
 //
+// A collision counts in the step in which it ends, and the last step of a case ends those under way: series and rows
+// hold the same ones. Rejected: to end them in the rows of a run that is stopped. Its last sample is written by then,
+// and the run that resumes it continues them.
+//
 // Force of a collision with impulse λ, approach v_n and effective mass m_e, by the conversion:
 //   duration    T_c given:                       mean λ / T_c,  peak (π/2) λ / T_c of a half-sine
 //   crushing    a corner of angle φ is crushed at pressure p over thickness h: F = k x, k = 2 p h tan(φ/2), so
@@ -144,7 +148,7 @@ void bt_impacts_take(bt_world *world);
 /// they become one.
 void bt_impacts_resume(bt_world *world);
 
-/// At the end of the run: move the open collisions, as they are, to `closed`.
+/// After the last step of a case: the open collisions end with it, as they are, and follow those in `closed`.
 void bt_impacts_end(bt_impacts *impacts);
 
 /// Description of the conversion, such as "half-sine of 0.1 s".

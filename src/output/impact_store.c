@@ -132,9 +132,9 @@ static void write_rows(bt_impact_store *store)
     store->n_rows = 0;
 }
 
-void bt_impact_store_take_closed(bt_impact_store *store)
+static void take_closed(bt_impact_store *store)
 {
-    if (!store->h || store->from->n_closed == 0) return;
+    if (store->from->n_closed == 0) return;
     const int64_t n = store->from->n_closed;
     if (store->n_rows + n > store->cap_rows) {
         store->cap_rows = 2 * (store->n_rows + n);
@@ -150,7 +150,7 @@ void bt_impact_store_take_closed(bt_impact_store *store)
 void bt_impact_store_take(bt_impact_store *store, double time, bool no_load)
 {
     if (!store->h) return;
-    bt_impact_store_take_closed(store);
+    take_closed(store);
     bt_panel *none = no_load ? bt_alloc((size_t)store->n_panels, sizeof *none) : NULL;
     const bt_panel *panels = no_load ? none : store->from->panels.panel;
     bt_panel_blocks_add(&store->blocks, panels, time < store->earliest);

@@ -39,8 +39,6 @@ void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int
 /// Take the collisions that ended in the last step, and its panel loads; time: end of the step, s. no_load: the loads
 /// are not numbers: NaN in the series, zero in means and maxima, which are then lower bounds.
 void bt_impact_store_take(bt_impact_store *store, double time, bool no_load);
-/// Take only collisions: those closed by the end of the run.
-void bt_impact_store_take_closed(bt_impact_store *store);
 /// End the present sample.
 void bt_impact_store_end_sample(bt_impact_store *store);
 /// Write the buffered data to the file.

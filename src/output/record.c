@@ -319,7 +319,6 @@ static void warn_of_files(bt_record *record)
 static void conclude(bt_record *record, const bt_run_totals *totals)
 {
     if (record->n_merged > 0) end_entry(record);
-    bt_impact_store_take_closed(&record->impacts);
     bt_record_flush(record);
     bt_summary_make(&record->summary, &record->history, record->c, totals, record->n_floes, record->towed >= 0);
     warn_of_files(record);

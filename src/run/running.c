@@ -346,6 +346,8 @@ bt_status bt_running_step(bt_running *running, bt_errors *err)
     bt_world *world = running->w;
     bt_status status = BT_OK;
     step_at_pace(world, &running->pace);
+    // Before the sample, so that the series have them. A run that is stopped keeps them open for the one that resumes.
+    if (world->impacts && world->step == bt_case_steps(running->c)) bt_impacts_end(world->impacts);
 #define ADD(name, text) \
     running->totals.phases.name += world->stats.phases.name, running->totals.shared.name += world->stats.shared.name;
     BT_WALL_PHASES(ADD)
@@ -438,7 +440,6 @@ static void total_up(run *running)
     running->totals.n_steps = running->w->step;
     running->totals.whole_steps = bt_case_steps(running->c);
     running->totals.events = &running->w->events;
-    if (running->w->impacts) bt_impacts_end(running->w->impacts);
     running->totals.floes_outside = count_outside(running);
     running->totals.ice_area = bt_observe_ice_area(running->w);
     measure_memory(running);
@@ -473,7 +474,7 @@ static bt_status finish(run *running, bt_errors *err)
     char stopped[96] = "";
     bt_snapshot snap = {0};
     const double t0 = bt_clock();
-    bt_status status = bt_running_save(running, &snap, BT_CHECKPOINT_FILE, err); // before open events are closed
+    bt_status status = bt_running_save(running, &snap, BT_CHECKPOINT_FILE, err);
     clock_part(running, &running->totals.call.steps);
     running->totals.phases.output += running->clocked - t0;
     running->totals.wall_time += running->clocked - running->began;

@@ -13,7 +13,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import CASE, CLOSING, NUMERIC, ROOT, call, changed, differing, environment, launcher, run, write_case
+from harness import CASE, CLOSING, NUMERIC, ROOT, call, changed, differing, environment, launcher, quay, run, write_case
 from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, stepped
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -32,6 +32,21 @@ def test_the_state_is_that_of_the_command(case, tmp_path):
     assert ours.keys() == theirs.keys()
     for name, values in theirs.items():
         np.testing.assert_array_equal(ours[name], values, name)
+
+
+def test_the_collision_under_way_at_the_end(tmp_path):
+    """In the last sample, however the steps are divided, and at a simulation's own end only if that is the case's."""
+    case = quay((20, 0), run__duration=2.1)
+    there = run(tmp_path, case)
+    with bergtow.Simulation(case, tmp_path / "whole") as sim:
+        for n in 20, 5:
+            sim.step(n)
+    with bergtow.Simulation(quay((20, 0)), tmp_path / "early") as sim:
+        sim.step(21)
+    whole, early = (datasets_of(tmp_path / name / "result.h5") for name in ("whole", "early"))
+    for name in "collisions", "impact_peak":
+        np.testing.assert_array_equal(whole[name], there.series(name), name)
+        assert whole[name][-1] > 0 and not early[name].any()
 
 
 def test_simulations_that_are_stepped_in_turn_keep_apart(tmp_path):

@@ -60,6 +60,21 @@ def test_counted_over_the_window_that_is_found(tmp_path):
     assert_same_result(alone.dir, tmp_path / "cut")
 
 
+def test_the_collision_under_way_at_the_end(tmp_path):
+    """In the last sample of any ranks, also after a stop just before, and after one that ended all steps but not the
+    run."""
+    alone = run(tmp_path, quay(*QUAY_CUTS[1], run__duration=2.1), "--threads", 1)
+    assert alone.series("collisions")[-1] == 1
+    done(2, "run", "case.yml", "-o", "two", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(alone.dir, tmp_path / "two")
+    done(1, "run", "case.yml", "-o", "cut", "--quiet", "--threads", 1, "--steps", 20, cwd=tmp_path)
+    done(2, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(alone.dir, tmp_path / "cut")
+    (tmp_path / "cut/summary.json").unlink()
+    done(2, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(alone.dir, tmp_path / "cut")
+
+
 def test_a_quay_in_pieces(tmp_path):
     """One collision on any ranks, also when it is resumed; an earlier program had one under way for each piece."""
     case = quay(*QUAY_CUTS[1], run__duration=2.6)

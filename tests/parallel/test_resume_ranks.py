@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A run that is stopped or killed on some ranks ends, on others, as the run that was never stopped.
 
-What turns these tests red (tried): contact memory gathered from one rank alone, the state saved after the open
-collisions have been closed, the entry of the series under way left out, the frame that the end of --steps adds kept,
-the panel loads or the stall left out, a checkpoint without the result that it counts on.
+What turns these tests red (tried): contact memory gathered from one rank alone, open collisions
+ended by the last step of every call, the entry of the series under way left out, the frame that the end of --steps adds
+kept, the panel loads or the stall left out, a checkpoint without the result that it counts on.
 """
 import random
 import signal
