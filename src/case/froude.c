@@ -173,9 +173,10 @@ char *bt_case_scaled_text(const bt_case *twin, double ratio)
         "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the "
         "stiffness.\n"
         "%s"
-        "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. "
-        "Otherwise rounding changes the shaken\n"
-        "# field into another of the same statistics (not so with ice.shake: 0).\n"
+        "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4 and "
+        "ice.size_law is not lognormal.\n"
+        "# Otherwise rounding changes the shaken field into another of the same statistics (not so with "
+        "ice.shake: 0).\n"
         "# Every key with its value in SI units, and what it means; the sources named are those of the defaults.\n",
         path, ratio, coriolis);
     char *text = bt_case_text(twin, head);

@@ -229,6 +229,11 @@ static void moments_about_origin(int n, const double *v, double *area, double *s
     }
 }
 
+static bool same_point(const bt_floe_load *p, const bt_floe_load *q)
+{
+    return p->other == q->other && p->part == q->part && p->point == q->point;
+}
+
 bt_section bt_section_of(const bt_split_floe *floe, double area, double polar, const bt_load_case *loads,
                          const bt_chord *chord, double slop)
 {
@@ -270,7 +275,9 @@ bt_section bt_section_of(const bt_split_floe *floe, double area, double polar, c
         const int end = from_a <= from_b ? 0 : 1;
         section.at[end].opening += force->opening * fabs(force->edge_x * nx + force->edge_y * ny);
         section.at[end].thrust += (end ? -1 : 1) * (force->fx * dx + force->fy * dy);
-        section.at[end].bearing += force->length;
+        // the peak of a collision follows what persists at the same point, and bears on the same length
+        if (!(k > 0 && bt_load_acts(loads, k - 1) && same_point(force, loads->load[k - 1].load)))
+            section.at[end].bearing += force->length;
     }
     for (int end = 0; end < 2; end++) {
         section.at[end].thrust = bt_max(0, section.at[end].thrust);

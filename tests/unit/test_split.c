@@ -222,6 +222,13 @@ TEST(test_free_thrust)
     assert_int_equal(best.mode, BT_SPLIT_BURST);
     load.length = l / 2;
     assert_near(critical(&s, &load, 1, &law, &best), bt_split_strength(&law, l, false) * h * l / 0.215, 1e-8);
+    // a hit of which a share persists bears on the same length
+    for (double share = 1e-16; share < 1; share = share < 1e-3 ? 0.3 : 1) {
+        bt_floe_load parts[2] = {load, load};
+        parts[0].other = parts[1].other = 1;
+        parts[0].fx = share, parts[1].fx = 1 - share, parts[1].collision = true;
+        assert_near(critical(&s, parts, 2, &law, &best), bt_split_strength(&law, l, false) * h * l / 0.215, 1e-8);
+    }
 }
 
 // A force at the middle of a side, held at two fixed posts: 1.5 F/(h L) at the far end, nothing taken off.
