@@ -287,7 +287,8 @@ static double side(double place, double next, double from, double to)
     return isinf(next) ? to - from : (to - from) * (0.5 * (from + to) - next) / (place - next);
 }
 
-/// Length that point k bears of the stretches [n] at this depth: between two points reached, by the lever rule.
+/// Length that point k bears of the stretches [n] at this depth: between two points of the outlines that it reaches, by
+/// the lever rule.
 static double borne(const bt_cell *cell, const shared *own, int k, double depth, const stretch *list, int n)
 {
     const double place = place_of(own, own, k);
@@ -295,7 +296,7 @@ static double borne(const bt_cell *cell, const shared *own, int k, double depth,
     int here = 0;
     if (!own->p[k].part || own->p[k].gap > depth) return 0;
     EACH_OF_FACE(o, cell->laws, own) for (int i = 0; i < 2; i++) {
-        if (!o->p[i].part || o->p[i].gap > depth) continue;
+        if (!o->p[i].part || o->manifold.p[i].gap > depth) continue; // where ice is crushed, its share is borne by none
         const double other = place_of(own, o, i);
         if (other < place) low = bt_max(low, other);
         else if (other > place) high = bt_min(high, other);
