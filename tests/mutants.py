@@ -504,7 +504,7 @@ MUTANTS = {
         ("is_deputy(laws, &all[i], k, world->par.slop))", "false)", "nothing bears a corner in a bay"),
         ("if (own->p[k].gap < depth[1]) to->late = bt_max(0, own->p[k].gap - own->face.gap);", ";",
          "points bear before they touch"),
-        ("if (!o->p[i].part || o->p[i].gap > depth) continue;", "if (!o->p[i].part) continue;",
+        ("if (!o->p[i].part || o->manifold.p[i].gap > depth) continue;", "if (!o->p[i].part) continue;",
          "points that are not reached take a share"),
     ]),
     "src/contact/law_pair.c": (

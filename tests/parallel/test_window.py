@@ -96,10 +96,11 @@ def test_what_is_recorded(alone):
     # The body keeps its place, within a stride (no more than two floes).
     front = x + 26 - body if name == "speed" else body - x
     assert np.all(front[50:] > w["ahead_m"] - 2) and np.all(front < w["ahead_m"] + 3)
-    # Every place that the front has reached was taken or missed; every floe that fell behind was renewed or kept, or
-    # waits. Laps are those through the field, which drifts along x.
+    # Every place that the front has reached was taken or missed, or its floe waits for it; every floe that fell behind
+    # was renewed or kept, or waits. Laps are those through the field, which drifts along x. Eight fields of these scenes
+    # have 0.01 to 0.05 n.
     places = w["laps"] * n
-    assert abs(w["renewed"] + w["missed"] - places) < 0.15 * n
+    assert abs(w["renewed"] + w["missed"] + w["waiting"] - places) < 0.08 * n
     assert abs(w["renewed"] + w["kept"] + w["waiting"] - places) < 0.15 * n
     # A step keeps the normal that it found, and floes turn and slide by up to s = V dt = 0.1 m meanwhile, which leaves
     # overlap of the order of s^2 / size: 0.01 at the body's speed, more where a floe is thrown aside faster. Eight
