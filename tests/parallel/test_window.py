@@ -97,8 +97,8 @@ def test_what_is_recorded(alone):
     front = x + 26 - body if name == "speed" else body - x
     assert np.all(front[50:] > w["ahead_m"] - 2) and np.all(front < w["ahead_m"] + 3)
     # Every place that the front has reached was taken or missed, or its floe waits for it; every floe that fell behind
-    # was renewed or kept, or waits. Laps are those through the field, which drifts along x. Eight fields of these scenes
-    # have 0.01 to 0.05 n.
+    # was renewed or kept, or waits. Laps are those through the field, which drifts along x. Eight fields of these
+    # scenes have 0.01 to 0.05 n.
     places = w["laps"] * n
     assert abs(w["renewed"] + w["missed"] + w["waiting"] - places) < 0.08 * n
     assert abs(w["renewed"] + w["kept"] + w["waiting"] - places) < 0.15 * n
