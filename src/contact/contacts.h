@@ -70,6 +70,9 @@ bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t
 /// straight line or a bay.
 bool bt_contacts_at_corner(const bt_world *world, const bt_pair *pair, uint32_t feature);
 
+/// Are these parts no farther apart than the margin, whether or not anything of them can be touched?
+bool bt_contacts_near(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin);
+
 /// Among the manifolds man [n], sorted by gids and parts, remove the duplicate points of bodies that are not convex and
 /// of shores: points also found by another part of the same pair of bodies, or by another piece of the shore with the
 /// same body. A manifold without a point left has n_points = 0.

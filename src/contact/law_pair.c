@@ -14,9 +14,7 @@
 bool bt_law_near(const bt_world *world, const bt_memory *memory)
 {
     const bt_idx a = bt_world_index(world, memory->a), b = bt_world_index(world, memory->b);
-    bt_manifold manifold;
-    return a >= 0 && b >= 0 &&
-           bt_contacts_parts(world, a, b, memory->part, BT_LAW_MEMORY * world->par.size, -1, &manifold, NULL);
+    return a >= 0 && b >= 0 && bt_contacts_near(world, a, b, memory->part, BT_LAW_MEMORY * world->par.size);
 }
 
 bt_idx bt_law_find(const bt_cell *cell, const bt_memory *names)

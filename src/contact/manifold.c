@@ -603,12 +603,28 @@ bool bt_contacts_at_corner(const bt_world *world, const bt_pair *pair, uint32_t 
     return a[0] * b[1] - a[1] * b[0] > STRAIGHT * bt_hypot(a[0], a[1]) * bt_hypot(b[0], b[1]);
 }
 
+/// Is each of the pair the only polygon of its outline?
+static bool are_whole(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2])
+{
+    return part[0] == 0 && part[1] == 0 && !bt_shore_holds(world, a) && !bt_shore_holds(world, b);
+}
+
+bool bt_contacts_near(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin)
+{
+    bt_manifold manifold;
+    bt_axes axes = BT_NO_AXES;
+    double gap;
+    if (are_whole(world, a, b, part)) return bodies_touch(world, a, b, margin, -1, &manifold, &axes, &gap);
+    parts_touch(world, a, b, part, margin, -1, &manifold, &axes, &gap); // perhaps nothing that counts is near
+    return gap <= margin;
+}
+
 bool bt_contacts_parts(const bt_world *world, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *manifold, bt_axes *axes)
 {
     bt_axes none = BT_NO_AXES, *known = axes ? axes : &none;
-    const bool whole = part[0] == 0 && part[1] == 0 && !bt_shore_holds(world, a) && !bt_shore_holds(world, b);
     double gap;
+    const bool whole = are_whole(world, a, b, part);
     const bool touch = whole ? bodies_touch(world, a, b, margin, reference_before, manifold, known, &gap)
                              : parts_touch(world, a, b, part, margin, reference_before, manifold, known, &gap);
     const double reach = gap + world->bodies.path[a] + world->bodies.path[b];

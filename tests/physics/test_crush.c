@@ -1055,6 +1055,42 @@ TEST(a_corner_beside_a_seam_bears_as_elsewhere)
         }
 }
 
+/// A corner that has crushed its way in slides over an oblique seam: the dent stays open, where the piece behind it has
+/// nothing on it any more that can be touched.
+TEST(a_dent_stays_open_past_an_oblique_seam)
+{
+    const double piece[][8] = {{0, -9, 6, -9, 6, -8.0774, 0, -0.2086}, {0, -0.2086, 6, -8.0774, 6, -8.0294, 0, 0.1317},
+                               {0, 0.1317, 6, -8.0294, 6, 9, 0, 9}, {0, -9, 6, -9, 6, 9, 0, 9}};
+    const double outline[] = {-0.5663, 0.4712,  -1.0319, 0.2794, -1.1875, -0.0542, -0.8493,
+                              -0.3720, -0.2974, -0.2848, -0.0142, 0.0741, -0.1495, 0.3706};
+    double end[2][2];
+    for (int whole = 0; whole < 2; whole++) {
+        bt_params p = params(2e-3);
+        p.slop = 1e-3, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        bt_world *w = bt_world_create(&p);
+        for (int i = whole ? 3 : 0; i < (whole ? 4 : 3); i++) {
+            double v[8];
+            memcpy(v, piece[i], sizeof v);
+            const bt_moments m = bt_shape_centre(4, v);
+            bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = m.cx, .y = m.cy});
+        }
+        bt_shore_create(w);
+        double v[14];
+        memcpy(v, outline, sizeof v);
+        const bt_moments at = bt_shape_centre(7, v);
+        const bt_gid floe = whole ? 1 : 3;
+        add_floe(w, 7, v, at.cx, at.cy, 0, 0.631, 0.1);
+        w->bodies.vel[bt_world_index(w, floe)].y = 0.403;
+        for (int s = 0; s < 500; s++) {
+            bt_world_step(w);
+            assert_true(w->stats.overlap < 2e-3);
+        }
+        end[whole][0] = pose(w, floe)->x, end[whole][1] = pose(w, floe)->y;
+        bt_world_free(w);
+    }
+    for (int i = 0; i < 2; i++) CHECK_CLOSE(end[0][i], end[1][i], 2e-3);
+}
+
 /// A tilted face that turns on a quay until it lies flush bears at its ends, not at the seams between them, and ends as
 /// on a quay in one piece. The second corner to come bears no share of the first, whose ice is gone.
 TEST(a_tilted_face_turns_about_its_ends)
