@@ -21,7 +21,7 @@
 /// the program that uses the library are back at the end. Blocks may be nested.
 ///
 /// It comes first in every public function, except those without such numbers (named in tests/plain_numbers.py), and in
-/// every OpenMP team: threads keep the environment in which they were created, maybe by a team of the program's own.
+/// every OpenMP team: a thread keeps the environment in which it was created, perhaps for a team of the program.
 /// So functions of the program that the library calls (forces, quantities) run with it, too. 10 ns where there is
 /// nothing to change, 0.3 µs where there is.
 #define BT_PLAIN_NUMBERS                                                                                               \
