@@ -395,7 +395,8 @@ static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margi
 // A contact left out here is found with the part that has the edge, or with the part on the other side of the cut.
 // Parts that are apart touch at their nearest features or not at all. Overlapping parts separate along the best axis
 // that counts, unless that is much farther than along the best of all: the middle one of three parts that share a
-// corner has edges of the outline only on its far side.
+// corner has edges of the outline only on its far side. An edge whose end a corner lies past is not the one it came
+// through (past_a_corner).
 //
 // The pieces of a shore (space/shore.h) are such parts of one outline: their edges and corners count where they lie on
 // its boundary.
@@ -524,6 +525,32 @@ static edge best_that_counts(const part_of_body *p, const part_of_body *q)
     return best;
 }
 
+/// Is vertex i a convex corner of the outline (bt_contacts_at_corner)?
+static bool is_corner(const part_of_body *part, int i)
+{
+    if (part->whole) return true;
+    if (part->face) {
+        const double *u = part->face[i].u, *w = part->face[i].w;
+        return u[0] * w[1] - u[1] * w[0] > STRAIGHT;
+    }
+    double a[2], b[2];
+    edges_at(part, i, a, b);
+    return a[0] * b[1] - a[1] * b[0] > STRAIGHT * bt_hypot(a[0], a[1]) * bt_hypot(b[0], b[1]);
+}
+
+/// Does the vertex of q deepest behind edge `side` of p lie past a corner at an end of it? Then it has not come through
+/// this edge, but through the next one.
+static bool past_a_corner(const part_of_body *p, const edge *side, const part_of_body *q)
+{
+    const int i = side->i, next = i + 1 < p->p.count ? i + 1 : 0;
+    double x[2], v[2], end[2];
+    world_vertex(&q->p, support(&q->p, side->nx, side->ny), x);
+    world_vertex(&p->p, i, v);
+    world_vertex(&p->p, next, end);
+    return (side->nx * (x[1] - v[1]) < side->ny * (x[0] - v[0]) && is_corner(p, i)) ||
+           (side->nx * (x[1] - end[1]) > side->ny * (x[0] - end[0]) && is_corner(p, next));
+}
+
 /// Contact at the nearest features of two separate parts, if both count.
 static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], bounds most,
                             bt_manifold *manifold)
@@ -581,10 +608,17 @@ static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint1
         }
         return nearest_contact(&p[0], &p[1], d, most, manifold);
     }
-    if (!(-sep <= bt_max(tie, -DETOUR * best))) return false;
-    clip_what_counts(&p[ref], &side[ref], &p[!ref], ref, d, most, manifold);
-    if (manifold->n_points == 0) deepest_point(&p[ref].p, &side[ref], &p[!ref].p, ref, d, manifold);
-    return true;
+    for (int k = 0; k < 2; k++) {
+        const bool from_b = k == 0 ? ref : !ref;
+        const part_of_body *from = &p[from_b], *to = &p[!from_b];
+        if (!(-side[from_b].s <= bt_max(tie, -DETOUR * best))) continue;
+        clip_what_counts(from, &side[from_b], to, from_b, d, most, manifold);
+        if (manifold->n_points > 0) return true;
+        if (-side[from_b].s > tie && past_a_corner(from, &side[from_b], to)) continue;
+        deepest_point(&from->p, &side[from_b], &to->p, from_b, d, manifold);
+        return true;
+    }
+    return false;
 }
 
 bool bt_contacts_at_corner(const bt_world *world, const bt_pair *pair, uint32_t feature)
@@ -592,15 +626,7 @@ bool bt_contacts_at_corner(const bt_world *world, const bt_pair *pair, uint32_t 
     if ((feature & 0x7ff00000u) == 0x7ff00000u) return true; // join_corners
     const bool in_b = (feature >> 31) == (feature & 1);
     const part_of_body part = part_of(world, in_b ? pair->b : pair->a, pair->part[in_b], 0, 0);
-    const int i = (int)((feature & 0xfffff) >> 1) % part.p.count;
-    if (part.whole) return true;
-    if (part.face) {
-        const double *u = part.face[i].u, *w = part.face[i].w;
-        return u[0] * w[1] - u[1] * w[0] > STRAIGHT;
-    }
-    double a[2], b[2];
-    edges_at(&part, i, a, b);
-    return a[0] * b[1] - a[1] * b[0] > STRAIGHT * bt_hypot(a[0], a[1]) * bt_hypot(b[0], b[1]);
+    return is_corner(&part, (int)((feature & 0xfffff) >> 1) % part.p.count);
 }
 
 /// Is each of the pair the only polygon of its outline?

@@ -812,6 +812,36 @@ TEST(a_corner_bears_with_all_parts_that_share_it)
         }
 }
 
+/// A corner comes through one part of a floe to the cut behind it. The part beyond has its outline elsewhere: it bears
+/// nothing there, and the floe turns on the corner as one without the cut.
+TEST(a_corner_that_reaches_a_cut)
+{
+    const bt_parts parts = {.n = 2, .count = {3, 3}, .n_vertices = 6, .corner = {1, 2, 3, 1, 3, 0}};
+    bt_pose end[2];
+    for (int cut = 0; cut < 2; cut++) {
+        bt_params p = params(2e-3);
+        p.slop = 1e-3, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 1;
+        bt_world *w = bt_world_create(&p);
+        double fixed[] = {0, 0, 2.49, -8.65, 9, 0, 6.4, 6.33}, v[] = {-0.99, -0.32, -0.018, -0.083, -0.255, 0.889,
+                                                                      -1.227, 0.652};
+        bt_moments m = bt_shape_centre(4, fixed);
+        bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = fixed, .x = m.cx, .y = m.cy});
+        m = bt_shape_centre(4, v);
+        bt_body_def d = scene_prism(4, v, sheet);
+        d.x = m.cx, d.y = m.cy, d.vx = 1.44, d.thickness = 0.1, d.parts = cut ? &parts : NULL;
+        bt_world_add(w, &d);
+        for (int s = 0; s < 500; s++) {
+            bt_world_step(w);
+            assert_true(w->stats.overlap < 2e-3);
+        }
+        end[cut] = *pose(w, 1);
+        bt_world_free(w);
+    }
+    CHECK_CLOSE(end[1].x, end[0].x, 0.01);
+    CHECK_CLOSE(end[1].y, end[0].y, 0.01);
+    CHECK_CLOSE(end[1].yaw, end[0].yaw, 0.01);
+}
+
 /// A quay whose face is x = 0, in rectangles from y to y, m.
 static void add_quay(bt_world *w, int n, const double (*from_to)[2])
 {
