@@ -15,7 +15,6 @@
 #include "partition/cut.h"
 
 #include <limits.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"

@@ -3,7 +3,6 @@
 #include "partition/division.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define TOLERANCE 0.01 // imbalance accepted from the cut

@@ -5,7 +5,6 @@
 // hold t. Both sides traverse the cells that they hold in the same order, so they make the same lists without
 // communication. Few of these bodies have a contact in a given step: after the detection the sender marks them (one
 // byte each), and only these are sent in the sweeps.
-#include <stdlib.h>
 #include <string.h>
 
 #include "partition/division.h"

@@ -19,9 +19,7 @@
 #include <limits.h>
 #include <metis.h>
 #include <signal.h>
-#include <stdlib.h>
 
-#include "base/inside.h"
 #include "bergtow/base.h"
 
 enum { SUM_MAX = 1 << 30 };

@@ -3,7 +3,6 @@
 //
 // Every owned body is sent, complete, to all ranks that hold its cell under the new map; ghosts are dropped first and
 // come back the same way. So after a migration every copy of a body is that of its owner.
-#include <stdlib.h>
 #include <string.h>
 
 #include "body/bodies.h"

@@ -12,8 +12,6 @@
 // (the greedy pass of Karypis & Kumar 1998).
 #include "partition/cut.h"
 
-#include <stdlib.h>
-
 #include "bergtow/base.h"
 
 enum {

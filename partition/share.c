@@ -2,8 +2,6 @@
 // Data that all ranks need from one: large bodies after the solve, islands across ranks, largest values; and the checks
 // of a division.
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"

@@ -7,8 +7,6 @@
 #include "base/process.h"
 #include "case/case_base.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 
 typedef struct {

@@ -5,8 +5,6 @@
 #include <hdf5_hl.h>
 #include <inttypes.h>
 #include <omp.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>

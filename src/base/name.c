@@ -3,7 +3,6 @@
 #include "base/name.h"
 
 #include <ctype.h>
-#include <stdio.h>
 #include <string.h>
 
 bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);

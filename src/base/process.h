@@ -5,7 +5,6 @@
 
 #include <sched.h>
 
-#include "bergtow/base.h"
 #include "bergtow/comm.h"
 
 // --- the launcher ----------------------------------------------------------------------------------------------------

@@ -3,8 +3,6 @@
 // hold no numbers, and reading skips them.
 //
 // The file is written under the given name, not a temporary one: that is up to the caller (output/checkpoint.h).
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 

@@ -2,9 +2,6 @@
 // A tree from the YAML events of libyaml. BT_TREE_DEPTH bounds the recursion, BT_TREE_NODES the memory.
 #include "base/tree.h"
 
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
 

@@ -3,8 +3,6 @@
 #ifndef BT_TREE_H
 #define BT_TREE_H
 
-#include <stddef.h>
-
 #include "bergtow/base.h"
 
 // --- slips -----------------------------------------------------------------------------------------------------------

@@ -4,7 +4,6 @@
 // and merges only maps of the first level.
 #include "case/case_base.h"
 
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 

@@ -16,9 +16,6 @@
 #include "base/largest.h"
 #include "case/schema.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct {

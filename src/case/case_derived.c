@@ -2,7 +2,6 @@
 // Numbers that follow from a case; see case_derived.h and bergtow/case.h.
 #include "case/case_derived.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "bergtow/outline.h"

@@ -6,9 +6,6 @@
 // kind of unit in the schema gives the exponent of a key (bt_units_froude), except for the keys in the table below.
 #include "bergtow/case.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"

@@ -2,8 +2,6 @@
 // The table of tow lines; see case/rope.h.
 #include "case/rope.h"
 
-#include <math.h>
-
 #include "bergtow/catenary.h"
 #include "base/elementary.h"
 #include "base/inside.h"

@@ -20,8 +20,6 @@
 #include "case/case_derived.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 static const char *const frames[] = {"basin", "geographic", NULL};

@@ -3,8 +3,6 @@
 #ifndef BT_SCHEMA_H
 #define BT_SCHEMA_H
 
-#include <stdio.h>
-
 #include "bergtow/case.h"
 #include "base/units.h"
 

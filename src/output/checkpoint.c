@@ -3,8 +3,6 @@
 #include "output/checkpoint.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 

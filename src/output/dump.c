@@ -7,8 +7,6 @@
 // solution. Sheets (contact/raft.h) are also contacts; their two components lie in a disc about a separate centre.
 #include "output/dump.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 

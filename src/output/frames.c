@@ -5,14 +5,10 @@
 // of its block between frames. Everything else passes through one buffer of 1 MB.
 #include "output/frames.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/shape.h"
-#include "output/xdmf.h"
 #include "base/elementary.h"
-#include "base/h5dataset.h"
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 

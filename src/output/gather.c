@@ -6,9 +6,6 @@
 // duplicate bodies are detected here.
 #include "output/gather.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 #include "base/inside.h"
 #include "output/observe.h"
 #include "partition/domain.h"

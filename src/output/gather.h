@@ -3,7 +3,6 @@
 #ifndef BT_GATHER_H
 #define BT_GATHER_H
 
-#include "bergtow/base.h"
 #include "bergtow/world.h"
 #include "output/frame.h"
 

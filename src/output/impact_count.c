@@ -2,9 +2,6 @@
 // Collisions in the window of a run and before it: numbers, the largest, the largest peaks; see impact_count.h.
 #include "output/impact_count.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"

@@ -3,8 +3,6 @@
 #include "output/impact_store.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/h5dataset.h"

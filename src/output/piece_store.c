@@ -2,7 +2,6 @@
 // Splits and pieces in result.h5; see piece_store.h.
 #include "output/piece_store.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"

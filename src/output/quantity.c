@@ -4,9 +4,6 @@
 #include "bergtow/quantity.h"
 
 #include <ctype.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/contact.h"

@@ -8,7 +8,6 @@
 // until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "output/record.h"
 
-#include <stdlib.h>
 #include <unistd.h>
 
 #include "output/checkpoint.h"

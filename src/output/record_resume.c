@@ -11,8 +11,6 @@
 // Rejected: truncating the unfinished file to the checkpoint's counts, for which it would have to be readable; a
 // separate file for each piece between two checkpoints, which every reader would have to join.
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/checksum.h"

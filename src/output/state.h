@@ -10,7 +10,6 @@
 #include "base/snapshot.h"
 #include "field/lead.h"
 #include "output/stall.h"
-#include "contact/cell_contacts.h"
 #include "loads/impact.h"
 
 /// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:

@@ -2,8 +2,6 @@
 // Parts of a run outside its world as named arrays: the ice field at time zero, its lead, and the stall detection.
 #include "output/state.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "partition/domain.h"

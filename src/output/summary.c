@@ -8,14 +8,10 @@
 // the mean does not.
 #include "output/summary.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"
 #include "base/inside.h"
-#include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_tow.h"
 #include "case/ice_bounds.h"

@@ -2,8 +2,6 @@
 // The summary as a table for readers; as JSON: summary_keys.c.
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "output/estimate_text.h"

@@ -19,9 +19,6 @@
 #include "base/elementary.h"
 #include "bergtow/outline.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 /// Limit of the factor on f1 in ice so dense that the front would run away; assumed.
 #define MAX_COMPACTION 10.0
 

@@ -20,9 +20,6 @@
 #include "base/elementary.h"
 #include "base/inside.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 enum { MAX_HEADINGS = 32, MAX_MOVES = 7 };
 #define UNITS 1e5 ///< units of cost in the least cost of a spacing
 #define THERE 0.75 ///< largest distance of a goal node from the goal, spacings

@@ -6,8 +6,6 @@
 #include "base/inside.h"
 #include "route/lattice.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define MAX_STATES 1.5e6 ///< of a lattice with the spacing chosen here

@@ -5,8 +5,6 @@
 #include "base/elementary.h"
 #include "geometry/polygons.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 // --- distances to no-go polygons, by buckets of their edges ----------------------------------------------------------

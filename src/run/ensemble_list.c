@@ -5,9 +5,6 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <jansson.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -19,7 +16,6 @@
 #include "field/field_kept.h"
 #include "output/checkpoint.h"
 #include "output/folder.h"
-#include "run/study.h"
 
 // --- the journal -----------------------------------------------------------------------------------------------------
 

@@ -3,7 +3,6 @@
 #ifndef BT_ENSEMBLE_LIST_H
 #define BT_ENSEMBLE_LIST_H
 
-#include "bergtow/base.h"
 #include "bergtow/ensemble.h"
 #include "run/ensemble_record.h"
 #include "run/study.h"

@@ -3,13 +3,10 @@
 #include "run/guard.h"
 
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
 
 #include "case/case_derived.h"
 #include "bergtow/forces.h"
 #include "output/observe.h"
-#include "bergtow/sum.h"
 #include "solve/islands.h"
 #include "space/cells.h"
 #include "partition/domain.h"

@@ -3,7 +3,6 @@
 #include "run/halt.h"
 
 #include <inttypes.h>
-#include <stdio.h>
 #include <unistd.h>
 
 #include "base/fileio.h"

@@ -6,9 +6,7 @@
 // and before the frame, so that all leave the loop after the same step; every other collective call is made with an
 // agreed status.
 #include <inttypes.h>
-#include <math.h>
 #include <omp.h>
-#include <stdlib.h>
 #include <time.h>
 
 #include "output/checkpoint.h"

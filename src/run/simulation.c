@@ -3,9 +3,6 @@
 // the interface: options, texts of errors, arrays by the ids of bodies.
 #include "bergtow/simulation.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
