@@ -14,8 +14,6 @@
 
 // --- processes -------------------------------------------------------------------------------------------------------
 
-// Processes that share the members of an ensemble with the process the user started.
-//
 // Members are independent, and a field of a few thousand floes keeps one core busy. Two processes of one thread each
 // need less time for them than one of two threads, and half of the processor time; on many cores the gain is a factor.
 // Several calls may work on one folder, for job arrays, so a call starts itself again. Rejected: members in threads of

@@ -341,8 +341,6 @@ bool bt_file_begins(const char *path, const char *text)
 
 // --- locks -----------------------------------------------------------------------------------------------------------
 
-// One process at a time in a result folder.
-
 /// Does the name still mean the open file? Its last holder may have removed it between opening and locking.
 static bool still_there(int fd, const char *path)
 {

@@ -13,8 +13,6 @@
 
 // --- chunks ----------------------------------------------------------------------------------------------------------
 
-// A chunk of numbers, shuffled and deflated so that HDF5's own filters can read it.
-//
 // Shuffling puts byte k of all numbers together, as one plane for each k. Planes differ: the low bytes of coordinates
 // are noise, which deflate searches in vain for most of its time; signs and exponents repeat. A zlib stream may change
 // its method midway: so each plane is stored, or coded by the frequencies of its bytes alone, or searched for repeats,

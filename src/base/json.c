@@ -141,8 +141,6 @@ void bt_json_free(bt_json *json)
 
 // --- tables of keys --------------------------------------------------------------------------------------------------
 
-// Writing JSON from a table of keys.
-
 /// Does `key` belong to the object of this name?
 static bool inside(const char *key, const char *object, size_t n) { return !strncmp(key, object, n) && key[n] == '.'; }
 

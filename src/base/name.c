@@ -49,8 +49,6 @@ bool bt_next_name(const char **names, char name[BT_LONGEST_KEY])
 
 // --- the closest word ------------------------------------------------------------------------------------------------
 
-// Edit distance between words and the nearest entry of a list.
-
 enum { LONGEST = 63 };
 
 static int min3(int a, int b, int c)

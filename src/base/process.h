@@ -36,8 +36,6 @@ double bt_memory_peak(void);
 
 // --- the cores -------------------------------------------------------------------------------------------------------
 
-// The cores that this process may use, and its share of those that several ranks use.
-
 /// The cores that this process was given, whichever of them OpenMP has bound this thread to. False if the system does
 /// not tell.
 bool bt_cores_given(cpu_set_t *cores);

@@ -105,8 +105,6 @@ static void follow(const bt_check *check)
 
 // ---- defaults of the frames ----
 
-// Defaults that depend on the frame of a case.
-//
 // In the table of keys, at_sea marks a default that is a model basin's. In the geographic frame such a number would
 // look like an answer: the key has no value there until the case gives it, or another key implies it (a programme the
 // speed, a named line its stiffness). If it still has none, and has an effect, the case is refused. Other defaults hold

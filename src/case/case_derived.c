@@ -14,8 +14,6 @@
 
 // --- shapes of the body ----------------------------------------------------------------------------------------------
 
-// Shapes of the towed body, and those that a program adds; see case_derived.h and bergtow/shape.h.
-
 const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1] = {BT_SHAPE_NAMES, "polygon", "none", NULL};
 static bt_shape_outline added[BT_MAX_ADDED_SHAPES];
 static int n_added;

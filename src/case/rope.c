@@ -8,8 +8,6 @@
 
 // --- a line with weight ----------------------------------------------------------------------------------------------
 
-// The elastic catenary; equations in bergtow/catenary.h.
-
 enum { MAX_STEPS = 200 }; // of Newton's method, which takes fewer than 40
 
 double bt_catenary_span(double length, double stiffness, double weight, double pull)

@@ -75,8 +75,6 @@ void bt_schema_release(const bt_key *keys, int n, void *base);
 
 // --- values ----------------------------------------------------------------------------------------------------------
 
-// Values of keys: text to member, and member to text.
-
 /// Bounds of a key in SI; ±infinity for a key without a range.
 typedef struct bt_range {
     double lo, hi;

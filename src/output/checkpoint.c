@@ -12,9 +12,6 @@
 
 // --- units and axes of saved arrays ----------------------------------------------------------------------------------
 
-// Descriptions, for readers, of the arrays of a checkpoint that no row of a saved member describes (state.c,
-// history.c).
-
 typedef struct {
     const char *name, *units, *meaning; ///< units: NULL = text
     const char *axes;                   ///< h5dataset.h

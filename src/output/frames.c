@@ -12,12 +12,6 @@
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 
-/// Write rows first to first + n − 1 from memory.
-static void write_copy(bt_slab *slab, int64_t first, int64_t n, const void *rows)
-{
-    if (n > 0) bt_slab_write(slab, first, n, rows);
-}
-
 typedef struct outlines {
     bt_slab vertices, offsets, thickness, area, topology;
     bool mirrored; ///< as drawn the vertices run clockwise
@@ -81,9 +75,9 @@ static void write_outlines(outlines *o, const bt_record_bodies *bodies, int64_t 
                            int64_t before, char *buffer)
 {
     const int64_t *offsets = bodies->offsets + from, v0 = offsets[0];
-    write_copy(&o->vertices, before, offsets[n] - v0, bodies->vertices + 2 * (v0 - bodies->offsets[0]));
-    write_copy(&o->thickness, first, n, bodies->thickness + from);
-    write_copy(&o->area, first, n, bodies->area + from);
+    bt_slab_write(&o->vertices, before, offsets[n] - v0, bodies->vertices + 2 * (v0 - bodies->offsets[0]));
+    bt_slab_write(&o->thickness, first, n, bodies->thickness + from);
+    bt_slab_write(&o->area, first, n, bodies->area + from);
     // Every rank writes the ends of its bodies; the first one also the 0 at the start.
     bt_rows rows = bt_rows_from(&o->offsets, first ? first + 1 : 0, buffer);
     if (!first) *(int64_t *)bt_rows_next(&rows) = 0;

@@ -8,8 +8,6 @@
 
 // --- names -----------------------------------------------------------------------------------------------------------
 
-// Names of the bodies of a world in the record.
-
 /// Data of the bodies for the recorder, besides their outlines.
 typedef struct bt_roster {
     bt_idx n_floes;         ///< generated or read, followed by those given by hand

@@ -15,8 +15,6 @@
 
 // --- registered quantities -------------------------------------------------------------------------------------------
 
-// Quantities registered besides the program's own.
-
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
 const char *const bt_role_names[BT_ROLE_KINDS] = {"", "balance", "force", "load", "diagnostic"};
 const char *const bt_applies_codes[BT_APPLIES_KINDS] = {

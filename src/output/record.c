@@ -103,16 +103,6 @@ static bt_status close_file(bt_record *record)
     return bt_h5_close(&record->h5);
 }
 
-bt_status bt_record_write_text(const bt_record *record, const char *name, const char *text, bt_errors *err)
-{
-    return bt_file_write(BT_PATH(record->dir, name), text, err);
-}
-
-bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors *err)
-{
-    return bt_file_remove(BT_PATH(record->dir, name), err);
-}
-
 /// Prepare the folder. A resumed run removes only the unfinished file.
 static bt_status prepare_dir(bt_record *record, const char *resolved, const char *digests, bool fresh,
                              bt_errors *err)
@@ -125,8 +115,8 @@ static bt_status prepare_dir(bt_record *record, const char *resolved, const char
         free(text);
     } else if (status == BT_OK) {
         record->replaces = true;
-        status = bt_record_remove(record, BT_RESULT_FILE ".tmp", err);
-        if (status == BT_OK) status = bt_record_remove(record, BT_CHECKPOINT_FILE ".tmp", err);
+        status = bt_file_remove(BT_PATH(record->dir, BT_RESULT_FILE ".tmp"), err);
+        if (status == BT_OK) status = bt_file_remove(BT_PATH(record->dir, BT_CHECKPOINT_FILE ".tmp"), err);
     }
     return status;
 }
@@ -333,7 +323,7 @@ static bt_status write_summary(const bt_record *record, const bt_run_totals *tot
     bt_run_totals all = *totals; // with the wall time so far
     all.call.end = totals->stepped > 0 ? bt_clock() - totals->stepped : 0;
     char *text = bt_summary_json(&record->summary, &record->history, record->c, &all, record->n_floes);
-    const bt_status status = bt_record_write_text(record, "summary.json", text, err);
+    const bt_status status = bt_file_write(BT_PATH(record->dir, "summary.json"), text, err);
     free(text);
     return status;
 }
@@ -356,7 +346,7 @@ bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_sna
     if (first && status == BT_OK)
         status = bt_checksum_publish(BT_PATH(record->dir, BT_RESULT_PART), BT_PATH(record->dir, BT_RESULT_FILE),
                                      BT_CHECKSUM_RESULT, err);
-    if (first && status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
+    if (first && status == BT_OK) status = bt_file_write(BT_PATH(record->dir, "frames.xdmf"), xdmf, err);
     if (first && status == BT_OK && last) status = bt_checkpoint_write(last, record->dir, BT_CHECKPOINT_FILE, err);
     if (first && status == BT_OK && totals) status = write_summary(record, totals, err);
     if (first && status == BT_OK && totals) bt_folder_settle(record->dir);

@@ -119,7 +119,7 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
          *wanted = bt_case_with_comments(resolved, digests, record->c->text);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        status = bt_record_write_text(record, CASE_FILE, wanted, err);
+        status = bt_file_write(path, wanted, err);
         if (status == BT_OK && (!read || !same_values(record->c, text))) // otherwise only its comments have been edited
             bt_errors_warn("warning: %s: was not the case that the run began with; it is rewritten from the "
                            "checkpoint", path);
@@ -196,7 +196,7 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err)
         if (status == BT_OK)
             status = bt_checksum_publish(copy, BT_PATH(record->dir, BT_RESULT_FILE), BT_CHECKSUM_RESULT, err);
         char *xdmf = bt_record_xdmf(record);
-        if (status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
+        if (status == BT_OK) status = bt_file_write(BT_PATH(record->dir, "frames.xdmf"), xdmf, err);
         free(xdmf);
     }
     return bt_comm_agree(record->comm, status);
@@ -374,6 +374,6 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
     if (status == BT_OK) status = record->h5.status;
     if (status == BT_OK && first) status = record_keep_case(record, err);
     // the summary is of an end that is no longer valid
-    if (status == BT_OK && first) status = bt_record_remove(record, "summary.json", err);
+    if (status == BT_OK && first) status = bt_file_remove(BT_PATH(record->dir, "summary.json"), err);
     return bt_comm_agree(record->comm, status);
 }

@@ -52,8 +52,6 @@ void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 
 // --- its check -------------------------------------------------------------------------------------------------------
 
-// Is the state in a checkpoint one that steps can leave? (private to state.c)
-
 /// Are the numbers of an open collision finite? Its corner is NaN if there is none.
 bool bt_state_open_finite(const bt_impact_open *o);
 

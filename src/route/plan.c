@@ -15,8 +15,6 @@ enum { TRIES = 4, ARRIVALS = 40, ROUNDS = 4, SWEEPS = 12 };
 
 // --- shortening ------------------------------------------------------------------------------------------------------
 
-// Line-of-sight shortening and a compass search over the corners of a path.
-//
 // A step is accepted if the cost of the whole path, with its swath and constraints, falls. Rejected: a spline from a
 // nonlinear programming solver, because the cost of ice has no useful gradient at the scale of floes; and shortening by
 // line of sight alone, which cuts through the ice that the search avoided.

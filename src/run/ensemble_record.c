@@ -16,8 +16,6 @@
 
 // --- notes of a member -----------------------------------------------------------------------------------------------
 
-// Warnings and reasons of members in ensemble.h5; the layout is in ensemble_record.h.
-
 static char *copied(const json_t *value)
 {
     const char *text = json_string_value(value);

@@ -18,9 +18,6 @@
 
 // --- contents of a folder --------------------------------------------------------------------------------------------
 
-// The point in a result folder from which a run can resume: its last checkpoint, a named one, or the case of a run
-// killed before its first.
-
 /// Warn the user about the checkpoint in use.
 static void report(const bt_snapshot *snap, const char *said)
 {

@@ -398,21 +398,6 @@ static int64_t count_outside(const run *running)
     return all;
 }
 
-/// Collective. Record how the field was divided among ranks.
-static void note_division(run *running)
-{
-    const bt_domain_stats stats = bt_domain_get_stats(running->w);
-    running->totals.divisions = stats.divisions;
-    running->totals.undivided_steps = stats.undivided;
-    running->totals.imbalance = stats.imbalance;
-    running->totals.worst_imbalance = stats.worst_imbalance;
-    running->totals.repartition_imbalance = stats.repartition_imbalance;
-    running->totals.worst_repartition_imbalance = stats.worst_repartition_imbalance;
-    running->totals.edge_cut = stats.cut;
-    running->totals.halo_share = stats.halo;
-    bt_comm_before(running->comm, stats.moved, &running->totals.moved_floes);
-}
-
 /// Collective. Peak memory of all ranks, and the bytes that a sweep reads per contact point.
 static void measure_memory(run *running)
 {
@@ -445,7 +430,9 @@ static void total_up(run *running)
     running->totals.window = running->w->window;
     running->totals.undisturbed = running->w->undisturbed;
     running->totals.splitting = running->w->splitting;
-    note_division(running);
+    bt_domain_stats *division = &running->totals.division;
+    *division = bt_domain_get_stats(running->w);
+    bt_comm_before(running->comm, division->moved, &division->moved);
 }
 
 /// Collective. Guards and deepest overlap of the state after the last step, which no further step checks. Contacts are

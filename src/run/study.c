@@ -219,8 +219,6 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err)
 
 // --- keys that only some members get ---------------------------------------------------------------------------------
 
-// Keys that only some members get; reasons in study.h.
-
 /// List all such keys, those of parameters first; the caller frees the list.
 static bt_study_setting *study_settings(const bt_study *study, int *n)
 {
@@ -348,8 +346,6 @@ bt_status bt_study_check_ice(const bt_study *study, bt_errors *err)
 }
 
 // --- files that a study names ----------------------------------------------------------------------------------------
-
-// The files that the cases of a study name; reasons in study.h.
 
 /// Take over a path. A file that cannot be read is skipped.
 static void add(bt_study_files *files, char *path)
