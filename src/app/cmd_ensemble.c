@@ -11,6 +11,7 @@
 #include "bergtow/ensemble.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
+#include "base/inside.h"
 
 // --- processes -------------------------------------------------------------------------------------------------------
 
@@ -164,8 +165,6 @@ int bt_cmd_ensemble(int argc, char **argv)
     if (status == BT_OK) status = bt_comm_agree(comm, bt_study_override(&study, opt.file.set, opt.file.n_set, &err));
     if (status == BT_OK) status = bt_ensemble_run(comm, &study, &opt.run, &err);
     bt_study_free(&study);
-    free(opt.file.set);
-    free(folder);
-    free(command_line);
+    BT_FREE(opt.file.set, folder, command_line);
     return bt_cmd_end(comm, status, &err);
 }

@@ -297,9 +297,7 @@ void bt_comm_errors(const bt_comm *comm, bt_errors *err)
         bt_errors_add(err, "%s", text);
         if (*code) bt_errors_code(err, code);
     }
-    free(mine);
-    free(texts);
-    free(counts);
+    BT_FREE(mine, texts, counts);
 }
 
 void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes)
@@ -525,9 +523,7 @@ bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx 
     free(out);
     free(gid_out);
     const bt_status status = put_in_order(from, count, n_take, gid_in, width, in, block, err);
-    free(in);
-    free(gid_in);
-    free(numbers);
+    BT_FREE(in, gid_in, numbers);
     return bt_comm_agree(comm, status);
 }
 

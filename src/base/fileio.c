@@ -321,10 +321,7 @@ bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
     return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
 }
 
-bool bt_file_there(const char *dir, const char *name)
-{
-    return access(BT_PATH(dir, name), F_OK) == 0;
-}
+bool bt_file_there(const char *dir, const char *name) { return access(BT_PATH(dir, name), F_OK) == 0; }
 
 bool bt_file_begins(const char *path, const char *text)
 {

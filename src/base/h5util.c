@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "base/fileio.h"
+#include "base/inside.h"
 
 // --- chunks ----------------------------------------------------------------------------------------------------------
 
@@ -39,9 +40,7 @@ void bt_deflater_free(bt_deflater *deflater)
     if (!deflater) return;
     deflateEnd(&deflater->whole);
     deflateEnd(&deflater->trial);
-    free(deflater->plane);
-    free(deflater->out);
-    free(deflater);
+    BT_FREE(deflater->plane, deflater->out, deflater);
 }
 
 static bt_deflater *create(void)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A tree from the YAML events of libyaml. BT_TREE_DEPTH bounds the recursion, BT_TREE_NODES the memory.
 #include "base/tree.h"
+#include "base/inside.h"
 
 #include <string.h>
 #include <yaml.h>
@@ -115,8 +116,7 @@ static int syntax_explain(const slip *syntax, char why[WHY])
 {
     const text_line here = line_of(syntax, syntax->line);
     if (memchr(here.begin, '\t', here.blank)) {
-        snprintf(why, WHY, "the line begins with a tab, but YAML is indented by spaces only; write two "
-                                     "spaces");
+        snprintf(why, WHY, "the line begins with a tab, but YAML is indented by spaces only; write two spaces");
         return syntax->line;
     }
     if (strstr(syntax->problem, "could not find expected ':'") && syntax->begun) {
@@ -147,11 +147,7 @@ void bt_tree_free(bt_node *node)
         if (node->key) free(node->key[i]);
         bt_tree_free(node->item[i]);
     }
-    free(node->item);
-    free(node->key);
-    free(node->key_line);
-    free(node->text);
-    free(node);
+    BT_FREE(node->item, node->key, node->key_line, node->text, node);
 }
 
 static void tell_syntax(const parser *yaml)

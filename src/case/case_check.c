@@ -223,8 +223,7 @@ static void check_floes_made(const bt_check *check)
         input->ice.y_min >= input->ice.y_max ||
         !bt_check_sound(check, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent "
                                "ice.size_spread ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 "
-                               "domain.length "
-                               "domain.width"))
+                               "domain.length domain.width"))
         return;
     const double n = bt_case_floes_made(input);
     if (n > BT_MAX_FLOES)

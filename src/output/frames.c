@@ -9,6 +9,8 @@
 
 #include "bergtow/shape.h"
 #include "base/elementary.h"
+#include "base/fileio.h"
+#include "base/inside.h"
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 
@@ -21,18 +23,15 @@ static outlines create_outlines(bt_frames *frames, const char *group, const char
                                 int64_t n, int64_t n_vertices)
 {
     bt_h5 *h5 = frames->h;
-    char path[64];
-#define NAMED(name) (snprintf(path, sizeof path, "%s/%s", group, name), path)
     outlines o = {
-        .vertices = bt_slab_fixed(h5, NAMED("vertices"), H5T_NATIVE_DOUBLE, n_vertices, 2, false),
-        .offsets = bt_slab_fixed(h5, NAMED("offsets"), H5T_NATIVE_INT64, n + 1, 0, false),
-        .thickness = bt_slab_fixed(h5, NAMED(height), H5T_NATIVE_DOUBLE, n, 0, false),
-        .area = bt_slab_fixed(h5, NAMED("area"), H5T_NATIVE_DOUBLE, n, 0, false),
+        .vertices = bt_slab_fixed(h5, BT_PATH(group, "vertices"), H5T_NATIVE_DOUBLE, n_vertices, 2, false),
+        .offsets = bt_slab_fixed(h5, BT_PATH(group, "offsets"), H5T_NATIVE_INT64, n + 1, 0, false),
+        .thickness = bt_slab_fixed(h5, BT_PATH(group, height), H5T_NATIVE_DOUBLE, n, 0, false),
+        .area = bt_slab_fixed(h5, BT_PATH(group, "area"), H5T_NATIVE_DOUBLE, n, 0, false),
         // Vertex numbers in XDMF have 32 bits here: enough for 2^31 vertices per block.
         .topology = bt_slab_fixed(h5, topology, H5T_NATIVE_INT32, n_vertices + 2 * n, 0, false),
         .mirrored = frames->axes.swapped,
     };
-#undef NAMED
     return o;
 }
 
@@ -396,9 +395,6 @@ void bt_frames_close(bt_frames *frames)
 {
     for (int k = 0; k < BT_FRAME_COLUMNS; k++)
         if (frames->column[k].h) bt_slab_close(&frames->column[k]);
-    free(frames->lines);
-    free(frames->vertices);
-    free(frames->n_vertices);
-    free(frames->times);
+    BT_FREE(frames->lines, frames->vertices, frames->n_vertices, frames->times);
     *frames = (bt_frames){0};
 }

@@ -18,6 +18,7 @@
 #include "output/record_parts.h"
 #include "output/summary_keys.h"
 #include "base/checksum.h"
+#include "base/inside.h"
 #include "output/xdmf.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
@@ -87,11 +88,7 @@ static void record_free(bt_record *record)
     bt_summary_free(&record->summary);
     bt_impact_count_free(&record->count);
     bt_history_free(&record->history);
-    free(record->dir);
-    free(record->series);
-    free(record->merged);
-    free(record->buffer);
-    free(record);
+    BT_FREE(record->dir, record->series, record->merged, record->buffer, record);
 }
 
 /// Close the file, and with it its datasets; returns the status of all writes to the file.

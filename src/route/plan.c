@@ -131,10 +131,7 @@ static bool take(const bt_planner *planner, bt_way *way, bt_way *tried)
 }
 
 /// First free way-point; one before it is tied to the given heading at the start.
-static int first_free(const bt_planner *planner)
-{
-    return isnan(planner->task.start_heading) ? 0 : 1;
-}
+static int first_free(const bt_planner *planner) { return isnan(planner->task.start_heading) ? 0 : 1; }
 
 static bool leave_out(const bt_planner *planner, bt_way *way, bt_way *tried)
 {

@@ -11,6 +11,7 @@
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/h5dataset.h"
+#include "base/inside.h"
 #include "case/warning.h"
 #include "output/checkpoint.h"
 
@@ -66,15 +67,9 @@ void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *
 
 void bt_member_notes_free(bt_member_notes *notes)
 {
-    for (int64_t i = 0; i < notes->n; i++) {
-        free(notes->code[i]);
-        free(notes->text[i]);
-        free(notes->values[i]);
-    }
-    free(notes->member);
-    free(notes->code);
-    free(notes->text);
-    free(notes->values);
+    for (int64_t i = 0; i < notes->n; i++)
+        BT_FREE(notes->code[i], notes->text[i], notes->values[i]);
+    BT_FREE(notes->member, notes->code, notes->text, notes->values);
     *notes = (bt_member_notes){0};
 }
 

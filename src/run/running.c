@@ -247,14 +247,7 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
 {
     *running = (run){.comm = comm, .c = input, .o = options, .reference_speed = bt_case_reference_speed(input),
                      .framed = -1, .failed = -1};
-    running->halt = (bt_halt){.steps = input->output.checkpoint_steps,
-                              .wall = input->output.checkpoint_wall,
-                              .max_wall = options->max_wall,
-                              .dir = options->dir,
-                              .stop_signal = options->stop_signal,
-                              .deaf = options->leave_signals,
-                              .first = comm->rank == 0,
-                              .started = begin->start};
+    running->halt = (bt_halt){.c = input, .o = options, .first = comm->rank == 0, .started = begin->start};
     running->until = begin->until;
     running->clocked = options->began > 0 ? options->began : begin->start;
     clock_part(running, &running->totals.call.program);

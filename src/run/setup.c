@@ -415,9 +415,7 @@ bt_track bt_setup_track(const bt_case *input, double size, double thickness, dou
 
 void bt_setup_track_free(bt_track *track)
 {
-    free((double *)track->time);
-    free((double *)track->x);
-    free((double *)track->y);
+    BT_FREE((double *)track->time, (double *)track->x, (double *)track->y);
     *track = (bt_track){0};
 }
 

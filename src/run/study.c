@@ -25,10 +25,8 @@ static void free_texts(char **text, int n)
 void bt_study_free(bt_study *study)
 {
     for (int i = 0; i < study->n_parameters; i++) {
-        free(study->parameter[i].name);
-        free(study->parameter[i].at);
-        free(study->parameter[i].source);
-        free(study->parameter[i].stratum);
+        BT_FREE(study->parameter[i].name, study->parameter[i].at, study->parameter[i].source,
+                study->parameter[i].stratum);
         free_texts(study->parameter[i].value, study->parameter[i].n);
     }
     for (int i = 0; i < study->n_variants; i++) {
@@ -39,11 +37,7 @@ void bt_study_free(bt_study *study)
     free(study->variant);
     free_texts(study->set, study->n_set);
     free_texts(study->set_at, study->n_set);
-    free(study->path);
-    free(study->text);
-    free(study->title);
-    free(study->base_name);
-    free(study->base);
+    BT_FREE(study->path, study->text, study->title, study->base_name, study->base);
     *study = (bt_study){0};
 }
 
