@@ -5,9 +5,6 @@
 // most of the contacts, behind it most of the moving floes. Then the split is across the shorter side.
 #include "partition/cut.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 #include "base/inside.h"
 #include "bergtow/base.h"
 

@@ -15,7 +15,6 @@
 #include "partition/cut.h"
 
 #include <limits.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"
@@ -36,12 +35,7 @@ typedef struct owned {
 
 static void owned_free(owned *o)
 {
-    free(o->start);
-    free(o->to);
-    free(o->of);
-    free(o->edge);
-    free(o->weight);
-    free(o->at);
+    BT_FREE(o->start, o->to, o->of, o->edge, o->weight, o->at);
 }
 
 // The graph of the vertices of `graph` mapped by of [graph->n] onto n vertices: weights and edges summed, loops
@@ -80,9 +74,7 @@ static owned mapped(const bt_graph *graph, int n, int *of)
         for (int e = o.start[c]; e < n_to; e++) slot[o.to[e]] = -1;
     }
     o.start[n] = n_to;
-    free(first);
-    free(member);
-    free(slot);
+    BT_FREE(first, member, slot);
     o.g = (bt_graph){n, o.start, o.to, o.edge, o.weight, (const double(*)[2])o.at, NULL};
     return o;
 }
@@ -231,9 +223,7 @@ static bool labels_before(const bt_graph *graph, const bt_graph *whole, const in
         else count[part[c]]++;
     }
     for (int p = 0; good && p < n_parts; p++) good = count[p] > 0;
-    free(most);
-    free(link);
-    free(count);
+    BT_FREE(most, link, count);
     return good;
 }
 
@@ -289,9 +279,7 @@ static void relabel(const bt_graph *graph, int n_parts, const int *before, int *
         name[p] = next++;
     }
     for (int v = 0; v < graph->n; v++) part[v] = name[part[v]];
-    free(o);
-    free(name);
-    free(taken);
+    BT_FREE(o, name, taken);
 }
 
 // Label the contracted graph c; whole: the original graph.

@@ -2,8 +2,7 @@
 // The map of the cells: owners, holders of the bodies of a cell, and renewal of the map.
 #include "partition/division.h"
 
-#include <math.h>
-#include <stdlib.h>
+#include "base/inside.h"
 #include <string.h>
 
 #define TOLERANCE 0.01 // imbalance accepted from the cut
@@ -196,8 +195,7 @@ static void cut_map(bt_world *world)
                 cut += domain->owner[p] != domain->owner[to[i]] ? edge[i] : 0;
             }
         domain->stats.cut = all ? (double)cut / (double)all : 0;
-        void *arrays[] = {start, to, group, edge, at};
-        for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+        BT_FREE(start, to, group, edge, at);
     }
     free(work);
     MPI_Bcast(domain->owner, n, MPI_INT, 0, domain->comm->mpi);

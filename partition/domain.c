@@ -6,8 +6,6 @@
 #include "partition/domain.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "partition/division.h"

@@ -4,7 +4,6 @@
 #define BERGTOW_DOMAIN_H
 
 #include "bergtow/comm.h"
-#include "space/exchange.h"
 #include "bergtow/world.h"
 #include "space/exchange.h"
 #include "space/phases.h"

@@ -5,11 +5,11 @@
 // hold t. Both sides traverse the cells that they hold in the same order, so they make the same lists without
 // communication. Few of these bodies have a contact in a given step: after the detection the sender marks them (one
 // byte each), and only these are sent in the sweeps.
-#include <stdlib.h>
 #include <string.h>
 
 #include "partition/division.h"
 #include "partition/domain.h"
+#include "base/inside.h"
 
 enum { TAG_FLAGS = 10, TAG_CELLS = 11, TAG_VELOCITIES = 20 };
 
@@ -17,15 +17,10 @@ void bt_halo_free(bt_domain *domain)
 {
     for (int k = 0; k < domain->n_links; k++) {
         bt_link *link = &domain->link[k];
-        for (int p = 0; p < BT_PHASES; p++) {
-            free(link->send[p]);
-            free(link->receive[p]);
-            free(link->send_now[p]);
-            free(link->receive_now[p]);
-        }
-        void *arrays[] = {link->out,       link->in,           link->flags_out, link->flags_in,
-                          link->tell_send, link->tell_receive, link->tell_out,  link->tell_in};
-        for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+        for (int p = 0; p < BT_PHASES; p++)
+            BT_FREE(link->send[p], link->receive[p], link->send_now[p], link->receive_now[p]);
+        BT_FREE(link->out, link->in, link->flags_out, link->flags_in);
+        BT_FREE(link->tell_send, link->tell_receive, link->tell_out, link->tell_in);
     }
     free(domain->link);
     free(domain->request);
@@ -203,6 +198,15 @@ void bt_domain_connect(bt_world *world)
     bt_domain_check(world);
 }
 
+/// Begin to receive numbers from the other end of a link, and to send it some, where there are any.
+static void begin_exchange(bt_domain *domain, const bt_link *link, MPI_Datatype type, int tag, void *in, bt_idx n_in,
+                           const void *out, bt_idx n_out)
+{
+    MPI_Request *request = domain->request;
+    if (n_in) MPI_Irecv(in, n_in, type, link->rank, tag, domain->comm->mpi, &request[domain->n_requests++]);
+    if (n_out) MPI_Isend(out, n_out, type, link->rank, tag, domain->comm->mpi, &request[domain->n_requests++]);
+}
+
 static void wait_all(bt_domain *domain)
 {
     const double t0 = bt_clock();
@@ -218,12 +222,8 @@ void bt_domain_tell_cells(bt_world *world, const double *value, bt_take_cell *ta
     for (int k = 0; k < domain->n_links; k++) {
         bt_link *link = &domain->link[k];
         for (bt_idx i = 0; i < link->n_tell_send; i++) link->tell_out[i] = value[link->tell_send[i]];
-        if (link->n_tell_receive)
-            MPI_Irecv(link->tell_in, link->n_tell_receive, MPI_DOUBLE, link->rank, TAG_CELLS, domain->comm->mpi,
-                      &domain->request[domain->n_requests++]);
-        if (link->n_tell_send)
-            MPI_Isend(link->tell_out, link->n_tell_send, MPI_DOUBLE, link->rank, TAG_CELLS, domain->comm->mpi,
-                      &domain->request[domain->n_requests++]);
+        begin_exchange(domain, link, MPI_DOUBLE, TAG_CELLS, link->tell_in, link->n_tell_receive, link->tell_out,
+                       link->n_tell_send);
     }
     wait_all(domain);
     for (int k = 0; k < domain->n_links; k++) {
@@ -256,12 +256,8 @@ void bt_domain_select(bt_world *world, bt_touch *touch)
                 if (now) link->send_now[p][link->n_send_now[p]++] = link->send[p][i];
             }
         }
-        if (link->n_flags_in)
-            MPI_Irecv(link->flags_in, link->n_flags_in, MPI_BYTE, link->rank, TAG_FLAGS, domain->comm->mpi,
-                      &domain->request[domain->n_requests++]);
-        if (link->n_flags_out)
-            MPI_Isend(link->flags_out, link->n_flags_out, MPI_BYTE, link->rank, TAG_FLAGS, domain->comm->mpi,
-                      &domain->request[domain->n_requests++]);
+        begin_exchange(domain, link, MPI_BYTE, TAG_FLAGS, link->flags_in, link->n_flags_in, link->flags_out,
+                       link->n_flags_out);
     }
     wait_all(domain);
     for (int k = 0; k < domain->n_links; k++) {
@@ -300,16 +296,11 @@ void bt_domain_send(bt_world *world, int phase, bt_vel *v)
     for (int k = 0; k < domain->n_links; k++) {
         bt_link *link = &domain->link[k];
         const bt_idx n_in = link->n_receive_now[phase], n_out = link->n_send_now[phase];
-        if (n_in)
-            MPI_Irecv(link->in, 3 * n_in, MPI_DOUBLE, link->rank, TAG_VELOCITIES + phase, domain->comm->mpi,
-                      &domain->request[domain->n_requests++]);
         for (bt_idx i = 0; i < n_out; i++) {
             const bt_vel *x = &v[link->send_now[phase][i]];
             link->out[3 * i] = x->x, link->out[3 * i + 1] = x->y, link->out[3 * i + 2] = x->w;
         }
-        if (n_out)
-            MPI_Isend(link->out, 3 * n_out, MPI_DOUBLE, link->rank, TAG_VELOCITIES + phase, domain->comm->mpi,
-                      &domain->request[domain->n_requests++]);
+        begin_exchange(domain, link, MPI_DOUBLE, TAG_VELOCITIES + phase, link->in, 3 * n_in, link->out, 3 * n_out);
     }
 }
 

@@ -19,10 +19,9 @@
 #include <limits.h>
 #include <metis.h>
 #include <signal.h>
-#include <stdlib.h>
 
-#include "base/inside.h"
 #include "bergtow/base.h"
+#include "base/inside.h"
 
 enum { SUM_MAX = 1 << 30 };
 
@@ -33,10 +32,7 @@ static int64_t divisor_of(int64_t sum, int64_t n)
     return sum / room + 1;
 }
 
-static idx_t scaled(int64_t weight, int64_t divisor)
-{
-    return (idx_t)(weight / divisor + (weight % divisor != 0));
-}
+static idx_t scaled(int64_t weight, int64_t divisor) { return (idx_t)(weight / divisor + (weight % divisor != 0)); }
 
 static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t kinds, idx_t *weight, idx_t *edge, idx_t n_parts,
                       real_t *balance, idx_t *part)
@@ -94,10 +90,7 @@ bool bt_cut_by_metis(const bt_graph *graph, int n_parts, double tolerance, int *
         edge[e] = graph->edge[e] ? scaled(graph->edge[e], edge_divisor) : 1; // METIS wants edges > 0
     }
     int status = call_metis(n, start, to, kinds, weight, edge, n_parts, balance, part);
-    free(start);
-    free(to);
-    free(weight);
-    free(edge);
+    BT_FREE(start, to, weight, edge);
 
     bool good = status == METIS_OK;
     int *count = bt_alloc((size_t)n_parts, sizeof *count);

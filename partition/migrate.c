@@ -3,12 +3,12 @@
 //
 // Every owned body is sent, complete, to all ranks that hold its cell under the new map; ghosts are dropped first and
 // come back the same way. So after a migration every copy of a body is that of its owner.
-#include <stdlib.h>
 #include <string.h>
 
 #include "body/bodies.h"
 #include "partition/division.h"
 #include "partition/domain.h"
+#include "base/inside.h"
 
 /// Bytes to send to every rank.
 typedef struct {
@@ -36,14 +36,12 @@ static void add(parcels *outgoing, int rank, const void *data, size_t n)
 static void free_parcels(parcels *outgoing)
 {
     for (int r = 0; r < outgoing->size; r++) free(outgoing->data[r]);
-    free(outgoing->data);
-    free(outgoing->n);
-    free(outgoing->cap);
+    BT_FREE(outgoing->data, outgoing->n, outgoing->cap);
 }
 
 enum { PIECE = 1 << 30 };
 
-/// Collective. Exchange parcels; returns the bytes for this rank from all others, to be freed by the caller.
+/// Collective. Exchange and release parcels; returns the bytes for this rank from all others, for the caller to free.
 static char *deliver(const bt_comm *comm, parcels *outgoing, int tag, size_t *n_in)
 {
     uint64_t *out = bt_alloc((size_t)comm->size, sizeof *out), *in = bt_alloc((size_t)comm->size, sizeof *in);
@@ -70,9 +68,8 @@ static char *deliver(const bt_comm *comm, parcels *outgoing, int tag, size_t *n_
             MPI_Isend(outgoing->data[r] + done, (int)(out[r] - done < PIECE ? out[r] - done : PIECE), MPI_BYTE, r, tag,
                       comm->mpi, &request[n++]);
     bt_comm_wait(n, request);
-    free(request);
-    free(out);
-    free(in);
+    BT_FREE(request, out, in);
+    free_parcels(outgoing);
     return all;
 }
 
@@ -175,7 +172,6 @@ static void move_bodies(bt_world *world)
     free(keep);
     size_t n_in;
     char *in = deliver(domain->comm, &outgoing, 1, &n_in);
-    free_parcels(&outgoing);
     unpack(bodies, in, n_in);
     free(in);
     shrink(bodies);
@@ -259,7 +255,6 @@ void bt_domain_around(const bt_world *world, const bool *needs, const int rings[
     ask_around(world, needs, rings, &wishes);
     size_t n_in;
     wish *asked = (wish *)deliver(domain->comm, &wishes, 3, &n_in);
-    free_parcels(&wishes);
     bool *got = bt_alloc((size_t)cells->n, sizeof *got); // by rank 0
     for (size_t j = 0; j < n_in / sizeof *asked; j++) {
         const bt_idx k = bt_cells_at(cells, asked[j].cell[0], asked[j].cell[1]);
@@ -271,7 +266,6 @@ void bt_domain_around(const bt_world *world, const bool *needs, const int rings[
     pack_near_large(world, got, reach, &outgoing);
     free(got);
     char *in = deliver(domain->comm, &outgoing, 3, &n_in);
-    free_parcels(&outgoing);
     unpack(copies, in, n_in);
     free(in);
 }
@@ -300,7 +294,6 @@ void bt_domain_share(const bt_world *world, double *x, int width)
     }
     size_t n_in;
     char *in = deliver(domain->comm, &outgoing, 4, &n_in);
-    free_parcels(&outgoing);
     for (size_t at = 0; at < n_in; at += sizeof(bt_gid) + bytes) {
         bt_gid gid;
         memcpy(&gid, in + at, sizeof gid);
@@ -345,7 +338,6 @@ bt_memory *bt_domain_migrate(bt_world *world, bt_memory *memory, int64_t *n)
     move_bodies(world);
     size_t n_in;
     char *in = deliver(domain->comm, &outgoing, 2, &n_in);
-    free_parcels(&outgoing);
     const int64_t more = (int64_t)(n_in / sizeof *memory);
     memory = bt_realloc(memory, (size_t)(*n + more) + 1, sizeof *memory);
     if (more) memcpy(memory + *n, in, n_in);

@@ -12,9 +12,8 @@
 // (the greedy pass of Karypis & Kumar 1998).
 #include "partition/cut.h"
 
-#include <stdlib.h>
-
 #include "bergtow/base.h"
+#include "base/inside.h"
 
 enum {
     ENDS_TRIED = 32, // light parts tried as the end of one path
@@ -229,13 +228,6 @@ void bt_cut_refine(const bt_graph *graph, int n_parts, bt_cut_work share, int64_
     for (int v = graph->n - 1; v >= 0; v--) list_add(&lists, v);
     balance(&lists);
     lower_cut(&lists);
-    free(lists.load);
-    free(lists.count);
-    free(lists.head);
-    free(lists.next);
-    free(lists.prev);
-    free(lists.from);
-    free(lists.queue);
-    free(lists.link);
-    free(lists.stuck);
+    BT_FREE(lists.load, lists.count, lists.head, lists.next, lists.prev, lists.from, lists.queue, lists.link,
+            lists.stuck);
 }

@@ -2,8 +2,6 @@
 // Data that all ranks need from one: large bodies after the solve, islands across ranks, largest values; and the checks
 // of a division.
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"
@@ -152,9 +150,7 @@ void bt_domain_join_names(const bt_world *world, bt_gid *name)
         const size_t k = find(names, m, name[i]);
         if (k < m) name[i] = names[root(up, k)];
     }
-    free(all);
-    free(names);
-    free(up);
+    BT_FREE(all, names, up);
 }
 
 typedef struct { bt_gid name; bt_sum sum; } named_sum;

@@ -1052,8 +1052,8 @@ MUTANTS = {
     "src/run/halt.c": (["cli/test_faults.py::test_a_signal_brings_one_checkpoint",
                         "cli/test_resume.py::test_by_wall_time",
                         "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint", "cli/test_resume.py"], [
-        ("if (halt->wall > 0 && now - halt->last >= halt->wall) bits |= save;", "", "no checkpoint by the clock"),
-        ("if (halt->steps > 0 && step % halt->steps == 0) bits |= save;", "", "no checkpoint by steps"),
+        ("now - halt->last >= halt->c->output.checkpoint_wall", "false", "no checkpoint by the clock"),
+        ("step % halt->c->output.checkpoint_steps == 0", "false", "no checkpoint by steps"),
         ("        halt->saves_seen = saves_asked;\n        bits", "        bits",
          "a checkpoint at every step after a signal"),
     ]),

@@ -6,11 +6,13 @@
 #ifndef BERGTOW_BASE_H
 #define BERGTOW_BASE_H
 
+// Standard headers of what is declared and handed out below, FILE and free() too: who includes this one has them.
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #ifdef __cplusplus // declarations have the linkage of C
 #define BT_BEGIN_C extern "C" {

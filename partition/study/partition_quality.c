@@ -17,9 +17,6 @@
 //   sent             floe velocities a part sends in one sweep if every floe is touched in each colour it can be:
 //                    own or ghost floes of each cell, times the other parts that hold them
 //   moved            share of the work that changes its part when the berg has moved by one cell
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/base.h"

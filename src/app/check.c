@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Shared by the checks of a case and of a study: refusals, warnings, and the ice with which a run would begin.
 #include <math.h>
-#include <stdlib.h>
 
 #include "app/cmd_check.h"
 #include "bergtow/comm.h"

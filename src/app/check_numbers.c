@@ -4,9 +4,6 @@
 // A row is a call of number(), flag() or word(): the key in the JSON object of its group, the label of the line that
 // it begins (NULL: it continues the line), how it is printed, and the value. To add a number, add its row.
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "app/cmd_check.h"

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 // bergtow check: validates a case and prints the numbers that follow from it. For a study: cmd_check_study.c.
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 
-#include "app/cmd.h"
 #include "app/cmd_check.h"
 #include "case/case_base.h"
 

@@ -7,14 +7,13 @@
 #include "app/cmd_check.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
+#include "base/inside.h"
 #include "base/largest.h"
 #include "base/units.h"
 #include "case/schema.h"
 #include "run/study.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum {
@@ -79,9 +78,7 @@ static void tell_faults(faults *found, const bt_study *study, bt_errors *err)
         char *where = bt_text_end(&text);
         bt_errors_add(err, "%s (%s)", found->list[k].text, where);
         bt_member_free(&member);
-        free(where);
-        free(found->list[k].text);
-        free(found->list[k].code);
+        BT_FREE(where, found->list[k].text, found->list[k].code);
     }
     free(found->list);
 }

@@ -3,8 +3,6 @@
 #include <errno.h>
 #include <signal.h>
 #include <spawn.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -13,11 +11,10 @@
 #include "bergtow/ensemble.h"
 #include "bergtow/run.h"
 #include "app/cmd.h"
+#include "base/inside.h"
 
 // --- processes -------------------------------------------------------------------------------------------------------
 
-// Processes that share the members of an ensemble with the process the user started.
-//
 // Members are independent, and a field of a few thousand floes keeps one core busy. Two processes of one thread each
 // need less time for them than one of two threads, and half of the processor time; on many cores the gain is a factor.
 // Several calls may work on one folder, for job arrays, so a call starts itself again. Rejected: members in threads of
@@ -168,8 +165,6 @@ int bt_cmd_ensemble(int argc, char **argv)
     if (status == BT_OK) status = bt_comm_agree(comm, bt_study_override(&study, opt.file.set, opt.file.n_set, &err));
     if (status == BT_OK) status = bt_ensemble_run(comm, &study, &opt.run, &err);
     bt_study_free(&study);
-    free(opt.file.set);
-    free(folder);
-    free(command_line);
+    BT_FREE(opt.file.set, folder, command_line);
     return bt_cmd_end(comm, status, &err);
 }

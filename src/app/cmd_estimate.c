@@ -9,9 +9,6 @@
 #include "output/estimate_text.h"
 #include "run/setup.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-
 typedef struct {
     bt_cmd_case file;
     bool json;

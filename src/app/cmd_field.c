@@ -7,8 +7,6 @@
 #include "case/case_derived.h"
 #include "case/cost.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 

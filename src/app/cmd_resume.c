@@ -4,11 +4,10 @@
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/process.h"
 #include "case/case_base.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 
 typedef struct {
@@ -126,9 +125,7 @@ int bt_cmd_diff(int argc, char **argv)
     if (difference) printf("%s\n", difference);
     else if (f.n == 2 && status == BT_OK) puts("the states are the same");
     const bool differs = difference != NULL;
-    free(difference);
-    free(f.path[0]);
-    free(f.path[1]);
+    BT_FREE(difference, f.path[0], f.path[1]);
     const int code = bt_cmd_end(bt_comm_world(), status, &err);
     return code == BT_OK && differs ? 1 : code;
 }

@@ -2,11 +2,10 @@
 // bergtow run: run a case and write a result folder.
 #include "bergtow/run.h"
 #include "app/cmd.h"
+#include "base/inside.h"
 #include "base/process.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
@@ -89,8 +88,6 @@ int bt_cmd_run(int argc, char **argv)
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = bt_run(comm, &input, &opt.run, &err);
     bt_case_free(&input);
-    free(opt.file.set);
-    free(folder);
-    free(command_line);
+    BT_FREE(opt.file.set, folder, command_line);
     return bt_cmd_end(comm, status, &err);
 }

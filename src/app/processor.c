@@ -6,7 +6,6 @@
 // the first instruction that it does not know, with SIGILL and no message.
 #include "app/cmd.h"
 
-#include <stddef.h>
 #include <string.h>
 #include <unistd.h>
 

@@ -4,8 +4,6 @@
 #include "base/inside.h"
 
 #include <locale.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -198,11 +196,8 @@ void bt_errors_move(bt_errors *to, bt_errors *from)
 
 void bt_errors_free(bt_errors *err)
 {
-    for (size_t i = 0; i < err->n; i++) {
-        free(err->text[i]);
-        free(err->note[i].code);
-        free(err->note[i].values);
-    }
+    for (size_t i = 0; i < err->n; i++)
+        BT_FREE(err->text[i], err->note[i].code, err->note[i].values);
     free(err->text);
     free(err->note);
     *err = (bt_errors){0};

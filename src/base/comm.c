@@ -9,8 +9,6 @@
 
 #include <ctype.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -256,6 +254,16 @@ bt_status bt_comm_agree(const bt_comm *comm, bt_status status)
     return worst < N ? order[(int)worst] : (bt_status)(uint32_t)(worst - N);
 }
 
+static int running_sum(int size, const int *counts, int *starts)
+{
+    int all = 0;
+    for (int k = 0; k < size; k++) {
+        starts[k] = all;
+        all += counts[k];
+    }
+    return all;
+}
+
 static bool has(const bt_errors *err, const char *text)
 {
     for (size_t i = 0; i < err->n; i++)
@@ -278,10 +286,7 @@ void bt_comm_errors(const bt_comm *comm, bt_errors *err)
     MPI_Gather(&n, 1, MPI_INT, counts, 1, MPI_INT, 0, comm->mpi);
     if (comm->rank == 0) {
         starts = counts + comm->size;
-        for (int k = 0; k < comm->size; k++) {
-            starts[k] = all;
-            all += counts[k];
-        }
+        all = running_sum(comm->size, counts, starts);
         texts = bt_alloc((size_t)all, 1);
     }
     MPI_Gatherv(mine, n, MPI_CHAR, texts, counts, starts, MPI_CHAR, 0, comm->mpi);
@@ -292,9 +297,7 @@ void bt_comm_errors(const bt_comm *comm, bt_errors *err)
         bt_errors_add(err, "%s", text);
         if (*code) bt_errors_code(err, code);
     }
-    free(mine);
-    free(texts);
-    free(counts);
+    BT_FREE(mine, texts, counts);
 }
 
 void bt_comm_bcast(const bt_comm *comm, void *data, size_t bytes)
@@ -486,16 +489,6 @@ static bt_status put_in_order(int64_t from, int64_t count, int64_t n, const bt_g
     return wrong ? BT_ERR_NUMERIC : BT_OK;
 }
 
-static int running_sum(int size, const int *counts, int *starts)
-{
-    int all = 0;
-    for (int k = 0; k < size; k++) {
-        starts[k] = all;
-        all += counts[k];
-    }
-    return all;
-}
-
 bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
                               const double *rows, double *block, bt_errors *err)
 {
@@ -530,9 +523,7 @@ bt_status bt_comm_rows_by_gid(const bt_comm *comm, const int64_t *first, bt_idx 
     free(out);
     free(gid_out);
     const bt_status status = put_in_order(from, count, n_take, gid_in, width, in, block, err);
-    free(in);
-    free(gid_in);
-    free(numbers);
+    BT_FREE(in, gid_in, numbers);
     return bt_comm_agree(comm, status);
 }
 

@@ -3,8 +3,6 @@
 // then the Taylor series, which on so short an interval needs one or two terms more than the best polynomial.
 #include "base/elementary.h"
 
-#include <stdint.h>
-
 #include "bergtow/base.h"
 
 // pi/2 = half_pi[0] + [1] + [2]: 33 bits each, so that their products with whole numbers below 2^20 are exact

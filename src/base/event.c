@@ -5,8 +5,6 @@
 #include "base/inside.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 const char *const bt_event_names[BT_EVENT_KINDS] = {
     [BT_EVENT_LINE_BROKEN] = "line_broken",

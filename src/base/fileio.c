@@ -5,8 +5,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/fs.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
@@ -323,10 +321,7 @@ bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
     return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
 }
 
-bool bt_file_there(const char *dir, const char *name)
-{
-    return access(BT_PATH(dir, name), F_OK) == 0;
-}
+bool bt_file_there(const char *dir, const char *name) { return access(BT_PATH(dir, name), F_OK) == 0; }
 
 bool bt_file_begins(const char *path, const char *text)
 {
@@ -342,8 +337,6 @@ bool bt_file_begins(const char *path, const char *text)
 }
 
 // --- locks -----------------------------------------------------------------------------------------------------------
-
-// One process at a time in a result folder.
 
 /// Does the name still mean the open file? Its last holder may have removed it between opening and locking.
 static bool still_there(int fd, const char *path)

@@ -86,8 +86,6 @@ char *bt_file_folder(const char *path);
 
 // --- locks -----------------------------------------------------------------------------------------------------------
 
-// One process at a time in a result folder.
-
 /// Take the lock dir/run.lock, which names host and process; the system releases it when the process ends, in whatever
 /// way. Returns a descriptor for bt_lock_drop; −1 with a message if another process holds it or it cannot be made.
 /// *busy (may be NULL): another process holds it, so that a later attempt may succeed. On a file system without locks

@@ -5,8 +5,6 @@
 #include <hdf5_hl.h>
 #include <inttypes.h>
 #include <omp.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -15,8 +13,6 @@
 #include "revision.h"
 
 // --- units and axes --------------------------------------------------------------------------------------------------
-
-// Description of datasets for programs that do not know bergtow.
 
 enum { MAX_AXES = 3, PATH = 200 };
 
@@ -119,8 +115,6 @@ void bt_h5_describe_file(bt_h5 *h5, const char *title)
 
 // --- slabs -----------------------------------------------------------------------------------------------------------
 
-// A dataset to which each rank writes its own rows.
-//
 // On one rank, rows go through HDF5, in chunks of at most 256 kB, shuffled and deflated. On several, only rank 0 has
 // the file open in HDF5: it lays out the datasets (space allocated when a dataset is made or grows, no fill values) and
 // tells the others where the rows lie; every rank then writes its rows there with pwrite, without compression.
@@ -257,8 +251,6 @@ void bt_rows_end(bt_rows *rows)
 }
 
 // --- provenance ------------------------------------------------------------------------------------------------------
-
-// Where a file comes from: version, build, machine, command and time, as attributes of its root.
 
 const char *bt_provenance_revision(void) { return BT_REVISION; }
 

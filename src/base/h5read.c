@@ -2,9 +2,6 @@
 // Reading back a file of this program, protected by a checksum, with one way to fail.
 #include "base/h5read.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/h5util.h"

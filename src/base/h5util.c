@@ -4,19 +4,16 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
 #include "base/fileio.h"
+#include "base/inside.h"
 
 // --- chunks ----------------------------------------------------------------------------------------------------------
 
-// A chunk of numbers, shuffled and deflated so that HDF5's own filters can read it.
-//
 // Shuffling puts byte k of all numbers together, as one plane for each k. Planes differ: the low bytes of coordinates
 // are noise, which deflate searches in vain for most of its time; signs and exponents repeat. A zlib stream may change
 // its method midway: so each plane is stored, or coded by the frequencies of its bytes alone, or searched for repeats,
@@ -43,9 +40,7 @@ void bt_deflater_free(bt_deflater *deflater)
     if (!deflater) return;
     deflateEnd(&deflater->whole);
     deflateEnd(&deflater->trial);
-    free(deflater->plane);
-    free(deflater->out);
-    free(deflater);
+    BT_FREE(deflater->plane, deflater->out, deflater);
 }
 
 static bt_deflater *create(void)

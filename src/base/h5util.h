@@ -5,7 +5,6 @@
 
 #include <hdf5.h>
 
-#include "bergtow/base.h"
 #include "bergtow/comm.h"
 
 // --- chunks ----------------------------------------------------------------------------------------------------------
@@ -90,8 +89,6 @@ uint64_t bt_h5_address(bt_h5 *h5, hid_t dataset, bool frames, hsize_t frame, hsi
 void bt_h5_write_raw(bt_h5 *h5, uint64_t address, size_t bytes, const void *data);
 
 // --- the file driver -------------------------------------------------------------------------------------------------
-
-// An HDF5 file driver: it keeps the system's first error, lets no write fail, and leaves the file whole after each.
 
 /// Select the driver in a file access property list. *errnum is set to the errno value of the first failed operation on
 /// the file, and must live until the file is closed. Returns a negative value on failure.

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdlib.h>
 
 /// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
 /// parallel loop.
@@ -43,6 +44,13 @@ void bt_leave_by(void (*by)(int code));
     do {                                                                                                               \
         if ((n) == (cap)) (list) = bt_realloc(list, (size_t)((cap) = (cap) ? 2 * (cap) : (first)), sizeof *(list));    \
     } while (0)
+
+/// Free several pieces of memory, each of which may be NULL; all are named before the first is freed.
+#define BT_FREE(...) bt_free_all(sizeof((void *[]){__VA_ARGS__}) / sizeof(void *), (void *[]){__VA_ARGS__})
+static inline void bt_free_all(size_t n, void *const *list)
+{
+    for (size_t i = 0; i < n; i++) free(list[i]);
+}
 
 // Order of doubles, for qsort.
 

@@ -7,9 +7,6 @@
 #include "base/json.h"
 
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"
@@ -143,8 +140,6 @@ void bt_json_free(bt_json *json)
 }
 
 // --- tables of keys --------------------------------------------------------------------------------------------------
-
-// Writing JSON from a table of keys.
 
 /// Does `key` belong to the object of this name?
 static bool inside(const char *key, const char *object, size_t n) { return !strncmp(key, object, n) && key[n] == '.'; }

@@ -3,7 +3,6 @@
 #include "base/name.h"
 
 #include <ctype.h>
-#include <stdio.h>
 #include <string.h>
 
 bool (*bt_series_may_be)(const char *name, int more, bt_errors *err);
@@ -49,8 +48,6 @@ bool bt_next_name(const char **names, char name[BT_LONGEST_KEY])
 }
 
 // --- the closest word ------------------------------------------------------------------------------------------------
-
-// Edit distance between words and the nearest entry of a list.
 
 enum { LONGEST = 63 };
 

@@ -36,8 +36,6 @@ size_t bt_utf8_length(const unsigned char *s);
 
 // --- the closest word ------------------------------------------------------------------------------------------------
 
-// The known word closest to a mistyped one, for "did you mean".
-
 /// Edit distance with insertions, deletions, substitutions and swaps of neighbours (optimal string alignment).
 /// Words longer than 63 bytes, and those whose lengths alone put them `enough` or more apart, are at distance 64.
 int bt_suggest_distance(const char *a, const char *b, int enough);

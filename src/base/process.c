@@ -3,8 +3,6 @@
 #include "base/process.h"
 
 #include <omp.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <time.h>
@@ -14,8 +12,6 @@
 
 // --- the launcher ----------------------------------------------------------------------------------------------------
 
-// Was this process started by a launcher of parallel programs? The environment tells.
-//
 // MPI itself gives no answer before MPI_Init, and MPI_Init without a launcher wastes half a second at each call of the
 // program (Open MPI 4.1). The process management interface of a launcher fixes the variables that it sets: PMI 1 and 2
 // (Hydra of MPICH and Intel MPI, srun --mpi=pmi2, Cray), PMIx (PRRTE, srun --mpi=pmix), or its own names.
@@ -118,8 +114,6 @@ double bt_memory_peak(void)
 
 // --- the cores -------------------------------------------------------------------------------------------------------
 
-// The cores that this process may use, and its share of those that several ranks use.
-//
 // A launcher binds each rank to its own cores (mpirun --map-by slot:PE=4, srun -c 4 with task affinity), or gives all
 // ranks of a node the same cores (mpirun --bind-to none, a container, a job's cgroup). The number of cores of the
 // machine tells neither: a job may have only a few of them.

@@ -5,7 +5,6 @@
 
 #include <sched.h>
 
-#include "bergtow/base.h"
 #include "bergtow/comm.h"
 
 // --- the launcher ----------------------------------------------------------------------------------------------------
@@ -36,8 +35,6 @@ void bt_memory_forget_peak(void);
 double bt_memory_peak(void);
 
 // --- the cores -------------------------------------------------------------------------------------------------------
-
-// The cores that this process may use, and its share of those that several ranks use.
 
 /// The cores that this process was given, whichever of them OpenMP has bound this thread to. False if the system does
 /// not tell.

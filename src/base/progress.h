@@ -3,8 +3,6 @@
 #ifndef BT_PROGRESS_H
 #define BT_PROGRESS_H
 
-#include <stdio.h>
-
 #include "bergtow/base.h"
 
 /// Set by the caller before bt_progress_start. Zeroed memory means: stderr, the monotonic clock, not quiet.

@@ -6,7 +6,6 @@
 #define BT_RNG_H
 
 #include <Random123/philox.h>
-#include <math.h>
 
 #include "bergtow/base.h"
 #include "base/elementary.h"

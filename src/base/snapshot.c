@@ -4,9 +4,6 @@
 #include "base/inside.h"
 
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 size_t bt_item_size(bt_item_type type)

@@ -3,11 +3,10 @@
 // hold no numbers, and reading skips them.
 //
 // The file is written under the given name, not a temporary one: that is up to the caller (output/checkpoint.h).
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "base/fileio.h"
 #include "base/h5dataset.h"
 #include "base/h5read.h"
 #include "base/h5util.h"
@@ -61,8 +60,7 @@ static void put_rows(bt_snapshot *snap, int64_t n, const void *rows)
     struct bt_snapshot_file *file = snap->file;
     const bt_item *item = &snap->item[snap->n - 1];
     const hsize_t size[] = {(hsize_t)item->n, (hsize_t)item->width};
-    char name[160];
-    snprintf(name, sizeof name, "/%s", item->name);
+    const char *name = BT_BESIDE("/", item->name);
     if (item->type == BT_ITEM_TEXT) {
         bt_h5_write_text(&file->h, name, rows);
     } else if (n == item->n) {
@@ -85,8 +83,7 @@ static void end_array(bt_snapshot *snap, int n)
     file->dataset = -1;
     const char *units, *axes, *text = meaning_of(file, item, &units, &axes);
     if (!text) return;
-    char name[160];
-    snprintf(name, sizeof name, "/%s", item->name);
+    const char *name = BT_BESIDE("/", item->name);
     if (units) bt_h5_units(&file->h, name, units);
     bt_h5_attr_text(&file->h, name, "long_name", text);
 }
@@ -106,11 +103,9 @@ void bt_snapshot_end(bt_snapshot *snap, bt_errors *err)
     end_array(snap, snap->n);
     // The axes last: a coordinate such as /history/time may come after the arrays that use it.
     for (int k = 0; k < snap->n; k++) {
-        char name[160];
         const char *units, *axes;
         if (snap->item[k].type == BT_ITEM_TEXT || !meaning_of(file, &snap->item[k], &units, &axes)) continue;
-        snprintf(name, sizeof name, "/%s", snap->item[k].name);
-        bt_h5_axes(&file->h, name, axes);
+        bt_h5_axes(&file->h, BT_BESIDE("/", snap->item[k].name), axes);
     }
     file->status = bt_h5_close(&file->h);
     if (file->status == BT_OK) file->status = bt_checksum_write(file->path, BT_CHECKSUM_CHECKPOINT, err);

@@ -31,9 +31,6 @@
 #include "base/elementary.h"
 #include "base/inside.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 #define BATCHES 96
 #define FEW 2
 #define WAVES 3

@@ -2,8 +2,6 @@
 // Tables of a velocity in time: strict reading of CSV, and linear interpolation.
 #include "base/table.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A tree from the YAML events of libyaml. BT_TREE_DEPTH bounds the recursion, BT_TREE_NODES the memory.
 #include "base/tree.h"
+#include "base/inside.h"
 
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
 
@@ -15,6 +13,16 @@
 // Causes of YAML syntax errors. libyaml names the place where the text can no longer be read, often the line after the
 // slip: a word without its colon is a text that continues on the next line, until a colon there is out of place.
 
+/// An error as libyaml reports it; lines count from 1.
+typedef struct {
+    const char *text; ///< the whole input, n bytes
+    size_t n;
+    const char *problem;
+    int line, begun; ///< of the problem; where the unfinished construct began, 0 = none
+} slip;
+
+enum { WHY = 240 };
+
 typedef struct {
     const char *begin;
     size_t n;     // without the line end and blanks before it
@@ -22,7 +30,7 @@ typedef struct {
 } text_line;
 
 /// Line of this number, from 1; empty beyond the end.
-static text_line line_of(const bt_syntax *syntax, int number)
+static text_line line_of(const slip *syntax, int number)
 {
     const char *end = syntax->text + syntax->n, *p = syntax->text;
     for (int i = 1; i < number && p < end; i++) {
@@ -69,13 +77,13 @@ static int colon_missing(const text_line *line, int number, char *why)
     if (!n || strchr("-[]{},\"'#", *text)) return 0; // no key begins with these
     with_colon(text, n, right);
     if (word < n && text[word] == ':')
-        snprintf(why, BT_SYNTAX_WHY, "a space is missing after the colon; write %s", right);
-    else snprintf(why, BT_SYNTAX_WHY, "a colon is missing after the key; write %s", right);
+        snprintf(why, WHY, "a space is missing after the colon; write %s", right);
+    else snprintf(why, WHY, "a colon is missing after the key; write %s", right);
     return number;
 }
 
 /// Explain a misplaced colon: the lines before lack one, this line has two, or it is indented below a value.
-static int colon_out_of_place(const bt_syntax *syntax, char *why)
+static int colon_out_of_place(const slip *syntax, char *why)
 {
     const text_line here = line_of(syntax, syntax->line);
     int first = 0, above = syntax->line - 1;
@@ -92,24 +100,23 @@ static int colon_out_of_place(const bt_syntax *syntax, char *why)
     }
     const size_t colon = key_end(&here, 0);
     if (colon < here.n && key_end(&here, colon + 1) < here.n) {
-        snprintf(why, BT_SYNTAX_WHY,
+        snprintf(why, WHY,
                  "two keys on one line; write the second below the first, put both in { } with a comma between them, "
                  "or put a text with a colon in quotes");
         return syntax->line;
     }
     if (!above || here.blank <= line.blank) return 0;
-    snprintf(why, BT_SYNTAX_WHY,
+    snprintf(why, WHY,
              "indented deeper than line %d, whose key has a value already; indent both lines alike", above);
     return syntax->line;
 }
 
 /// Find the slip behind the error. Returns its line, with the remedy in why; 0 if it is none of the known slips.
-static int syntax_explain(const bt_syntax *syntax, char why[BT_SYNTAX_WHY])
+static int syntax_explain(const slip *syntax, char why[WHY])
 {
     const text_line here = line_of(syntax, syntax->line);
     if (memchr(here.begin, '\t', here.blank)) {
-        snprintf(why, BT_SYNTAX_WHY, "the line begins with a tab, but YAML is indented by spaces only; write two "
-                                     "spaces");
+        snprintf(why, WHY, "the line begins with a tab, but YAML is indented by spaces only; write two spaces");
         return syntax->line;
     }
     if (strstr(syntax->problem, "could not find expected ':'") && syntax->begun) {
@@ -140,18 +147,14 @@ void bt_tree_free(bt_node *node)
         if (node->key) free(node->key[i]);
         bt_tree_free(node->item[i]);
     }
-    free(node->item);
-    free(node->key);
-    free(node->key_line);
-    free(node->text);
-    free(node);
+    BT_FREE(node->item, node->key, node->key_line, node->text, node);
 }
 
 static void tell_syntax(const parser *yaml)
 {
     const yaml_parser_t *y = &yaml->yaml;
-    char why[BT_SYNTAX_WHY];
-    const bt_syntax syntax = {.text = yaml->text,
+    char why[WHY];
+    const slip syntax = {.text = yaml->text,
                               .n = yaml->n,
                               .problem = y->problem ? y->problem : "",
                               .line = (int)y->problem_mark.line + 1,

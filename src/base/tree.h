@@ -3,24 +3,7 @@
 #ifndef BT_TREE_H
 #define BT_TREE_H
 
-#include <stddef.h>
-
 #include "bergtow/base.h"
-
-// --- slips -----------------------------------------------------------------------------------------------------------
-
-// Causes of YAML syntax errors, in terms of the text that was typed.
-
-/// An error as libyaml reports it; lines count from 1.
-typedef struct bt_syntax {
-    const char *text; ///< the whole input, n bytes
-    size_t n;
-    const char *problem;
-    int line;  ///< of the problem
-    int begun; ///< line where the unfinished construct began, 0 = none
-} bt_syntax;
-
-enum { BT_SYNTAX_WHY = 240 };
 
 typedef enum { BT_NODE_SCALAR, BT_NODE_LIST, BT_NODE_MAP } bt_node_kind;
 

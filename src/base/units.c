@@ -9,8 +9,6 @@
 
 #include <ctype.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 // The first unit of a kind is the SI one. ft: the international foot, 0.3048 m; tf: 1000 kg under standard gravity.

@@ -4,8 +4,6 @@
 #include "case/case_derived.h"
 #include "case/warning.h"
 
-#include <math.h>
-
 #include "bergtow/shape.h"
 #include "base/elementary.h"
 #include "case/case_tow.h"

@@ -4,11 +4,11 @@
 // and merges only maps of the first level.
 #include "case/case_base.h"
 
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #include "base/fileio.h"
+#include "base/inside.h"
 #include "base/largest.h"
 
 const bt_key bt_base_key = {
@@ -138,10 +138,7 @@ static bt_status read_base(bt_case_files *files, const bt_node *value, int line,
         path = text = NULL;
         status = parse(files, err);
     }
-    free(folder);
-    free(path);
-    free(absolute);
-    free(text);
+    BT_FREE(folder, path, absolute, text);
     return status;
 }
 

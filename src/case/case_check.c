@@ -16,9 +16,6 @@
 #include "base/largest.h"
 #include "case/schema.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
@@ -108,8 +105,6 @@ static void follow(const bt_check *check)
 
 // ---- defaults of the frames ----
 
-// Defaults that depend on the frame of a case.
-//
 // In the table of keys, at_sea marks a default that is a model basin's. In the geographic frame such a number would
 // look like an answer: the key has no value there until the case gives it, or another key implies it (a programme the
 // speed, a named line its stiffness). If it still has none, and has an effect, the case is refused. Other defaults hold
@@ -228,8 +223,7 @@ static void check_floes_made(const bt_check *check)
         input->ice.y_min >= input->ice.y_max ||
         !bt_check_sound(check, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent "
                                "ice.size_spread ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 "
-                               "domain.length "
-                               "domain.width"))
+                               "domain.length domain.width"))
         return;
     const double n = bt_case_floes_made(input);
     if (n > BT_MAX_FLOES)

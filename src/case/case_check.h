@@ -75,8 +75,6 @@ void bt_case_check_window(const bt_check *check, int n, const double *v);
 
 // --- constraints -----------------------------------------------------------------------------------------------------
 
-// Constraints between keys, and keys that have no effect because of the value of another key.
-
 /// Refuse values that break a limit, and keys without effect that stand in the same file as the key that makes them
 /// useless, or are set beside it. All defaults must be set.
 void bt_case_check_constraints(const bt_check *check);

@@ -2,7 +2,6 @@
 // Numbers that follow from a case; see case_derived.h and bergtow/case.h.
 #include "case/case_derived.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "bergtow/outline.h"
@@ -14,8 +13,6 @@
 #include "geometry/box.h"
 
 // --- shapes of the body ----------------------------------------------------------------------------------------------
-
-// Shapes of the towed body, and those that a program adds; see case_derived.h and bergtow/shape.h.
 
 const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1] = {BT_SHAPE_NAMES, "polygon", "none", NULL};
 static bt_shape_outline added[BT_MAX_ADDED_SHAPES];

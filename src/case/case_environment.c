@@ -4,7 +4,6 @@
 #include "case/case_tow.h"
 #include "case/warning.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "bergtow/shape.h"

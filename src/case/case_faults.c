@@ -2,8 +2,6 @@
 // How checks of a case report faults: where a key stands, whether it was given, whether it was refused already.
 #include "case/case_faults.h"
 
-#include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/name.h"

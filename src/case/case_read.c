@@ -13,8 +13,6 @@
 #include "base/tree.h"
 
 #include <ctype.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
@@ -459,9 +457,6 @@ void bt_case_free(bt_case *input)
     for (bt_idx i = 0; i < input->n_floes; i++) bt_schema_release(bt_floe_keys, bt_n_floe_keys, &input->floes[i]);
     bt_table_free(&input->water.table);
     bt_table_free(&input->air.table);
-    free(input->floes);
-    free(input->path);
-    free(input->text);
-    free(input->floes_path);
+    BT_FREE(input->floes, input->path, input->text, input->floes_path);
     *input = (bt_case){0};
 }

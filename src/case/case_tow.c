@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The tow of a case: defaults that follow from other keys, checks, and where its path leads.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 #include "geometry/path.h"
 #include "bergtow/catenary.h"

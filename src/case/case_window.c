@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Case keys of the moving window (domain.ends: moving): defaults that follow from other keys, and checks of what the
 // window cannot follow or carry along.
-#include <math.h>
-#include <stdio.h>
 
 #include "case/case_check.h"
 #include "base/elementary.h"

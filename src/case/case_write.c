@@ -6,7 +6,6 @@
 #include "case/case_base.h"
 #include "case/schema.h"
 
-#include <stdio.h>
 #include <string.h>
 
 // Open the sections of a dotted name that the previous name is not in; returns the last part of the name.

@@ -10,9 +10,6 @@
 //
 // Limits: a value against a number or against another key, and combinations that are refused.
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"

@@ -2,9 +2,6 @@
 // Cost of a run, estimated before it starts.
 #include "case/cost.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <unistd.h>
 
 #include "bergtow/shape.h"

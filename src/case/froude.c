@@ -6,9 +6,6 @@
 // kind of unit in the schema gives the exponent of a key (bt_units_froude), except for the keys in the table below.
 #include "bergtow/case.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"
@@ -161,8 +158,7 @@ char *bt_case_scaled_text(const bt_case *twin, double ratio)
         "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn "
         "1/sqrt(L); masses,\n"
         "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; fracture toughness "
-        "L^(3/2); densities, angles "
-        "and ratios as they were.\n"
+        "L^(3/2); densities, angles and ratios as they were.\n"
         "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full "
         "scale:\n"
         "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that "
@@ -170,10 +166,8 @@ char *bt_case_scaled_text(const bt_case *twin, double ratio)
         "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are "
         "those of full scale, and\n"
         "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
-        "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the "
-        "stiffness.\n"
-        "%s"
-        "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4 and "
+        "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the stiffness.\n"
+        "%s# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4 and "
         "ice.size_law is not lognormal.\n"
         "# Otherwise rounding changes the shaken field into another of the same statistics (not so with "
         "ice.shake: 0).\n"

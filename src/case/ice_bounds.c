@@ -7,9 +7,6 @@
 #include "case/ice_bounds.h"
 #include "case/warning.h"
 
-#include <math.h>
-#include <stdio.h>
-
 #include "bergtow/shape.h"
 #include "base/elementary.h"
 #include "base/largest.h"

@@ -3,7 +3,6 @@
 #ifndef BT_ICE_BOUNDS_H
 #define BT_ICE_BOUNDS_H
 
-#include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 

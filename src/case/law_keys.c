@@ -2,8 +2,6 @@
 // Keys that a program adds; see bergtow/law_key.h.
 #include "bergtow/law_key.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"

@@ -2,15 +2,11 @@
 // The table of tow lines; see case/rope.h.
 #include "case/rope.h"
 
-#include <math.h>
-
 #include "bergtow/catenary.h"
 #include "base/elementary.h"
 #include "base/inside.h"
 
 // --- a line with weight ----------------------------------------------------------------------------------------------
-
-// The elastic catenary; equations in bergtow/catenary.h.
 
 enum { MAX_STEPS = 200 }; // of Newton's method, which takes fewer than 40
 

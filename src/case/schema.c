@@ -20,8 +20,6 @@
 #include "case/case_derived.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 static const char *const frames[] = {"basin", "geographic", NULL};
@@ -42,30 +40,25 @@ static const char *const tilts[] = {"none", "slope", "geostrophic", "dynamic", N
 static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 
 #define AT(member) .offset = offsetof(bt_case, member)
-#define REAL(key, member, kind, preset_, range_, doc_)                                                                 \
-    {                                                                                                                  \
-        .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
-        .doc = doc_                                                                                                    \
-    }
 /// A key with the default of a model basin; `sea`: how to give its value in the geographic frame, which has no default.
 #define BASIN(key, member, kind, preset_, range_, sea, doc_)                                                           \
     {                                                                                                                  \
         .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
         .at_sea = sea, .doc = doc_                                                                                     \
     }
+#define REAL(key, member, kind, preset_, range_, doc_) BASIN(key, member, kind, preset_, range_, NULL, doc_)
 #define BASIN_CHOICE(key, member, names, preset_, sea, doc_)                                                           \
     {                                                                                                                  \
         .name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, AT(member), .at_sea = sea,            \
         .doc = doc_                                                                                                    \
     }
+#define CHOICE(key, member, names, preset_, doc_) BASIN_CHOICE(key, member, names, preset_, NULL, doc_)
 #define INT(key, member, preset_, range_, doc_) \
     {.name = key, .type = BT_KEY_INT, .preset = preset_, .range = range_, AT(member), .doc = doc_}
 #define BOOL(key, member, preset_, doc_) {.name = key, .type = BT_KEY_BOOL, .preset = preset_, AT(member), .doc = doc_}
 #define TEXT(key, member, preset_, doc_) {.name = key, .type = BT_KEY_TEXT, .preset = preset_, AT(member), .doc = doc_}
 #define PATH(key, member, doc_) \
     {.name = key, .type = BT_KEY_TEXT, .preset = "none", AT(member), .file = true, .doc = doc_}
-#define CHOICE(key, member, names, preset_, doc_) \
-    {.name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, AT(member), .doc = doc_}
 
 // Ranges guard against slips of units and against values that have no meaning in the model; they are wide on purpose.
 #define ANYWHERE "[-1e7, 1e7]"

@@ -3,8 +3,6 @@
 #ifndef BT_SCHEMA_H
 #define BT_SCHEMA_H
 
-#include <stdio.h>
-
 #include "bergtow/case.h"
 #include "base/units.h"
 
@@ -76,8 +74,6 @@ void bt_schema_preset(const bt_key *keys, int n, void *base);
 void bt_schema_release(const bt_key *keys, int n, void *base);
 
 // --- values ----------------------------------------------------------------------------------------------------------
-
-// Values of keys: text to member, and member to text.
 
 /// Bounds of a key in SI; ±infinity for a key without a range.
 typedef struct bt_range {

@@ -2,9 +2,6 @@
 // Constants and moments of the size laws; see size_law.h.
 #include "case/size_law.h"
 
-#include <math.h>
-#include <stdio.h>
-
 #include "base/elementary.h"
 
 #define LEAST_SHARE 1e-3 // of draws within the limits of a law

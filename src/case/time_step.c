@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "case/time_step.h"
 
-#include "case/case_derived.h"
 #include "case/warning.h"
 
 bt_time_step bt_time_step_of(const bt_case *input, double floes, double size, const bt_track *track)

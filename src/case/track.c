@@ -3,9 +3,6 @@
 #include "case/track.h"
 #include "case/warning.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 #include "base/elementary.h"
 #include "case/case_derived.h"
 #include "bergtow/shape.h"

@@ -8,7 +8,6 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 static void *member_of(const bt_key *key, void *base) { return (char *)base + key->offset; }

@@ -2,10 +2,6 @@
 // Warnings with codes and values; the table is in warning.h.
 #include "case/warning.h"
 
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/name.h"

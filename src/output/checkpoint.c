@@ -3,8 +3,6 @@
 #include "output/checkpoint.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -13,9 +11,6 @@
 #include "base/snapshot.h"
 
 // --- units and axes of saved arrays ----------------------------------------------------------------------------------
-
-// Descriptions, for readers, of the arrays of a checkpoint that no row of a saved member describes (state.c,
-// history.c).
 
 typedef struct {
     const char *name, *units, *meaning; ///< units: NULL = text

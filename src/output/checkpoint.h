@@ -106,8 +106,6 @@ bt_status bt_checkpoint_compare(const char *a, const char *b, char **difference,
 
 // --- units and axes of saved arrays ----------------------------------------------------------------------------------
 
-// Descriptions of the arrays of a checkpoint that no row of a saved member describes, for readers of the file.
-
 /// Meaning of an array "group/name", its units (NULL: text) and axes; NULL if it has no description.
 const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes);
 

@@ -7,8 +7,6 @@
 // solution. Sheets (contact/raft.h) are also contacts; their two components lie in a disc about a separate centre.
 #include "output/dump.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -382,8 +380,7 @@ bt_status bt_solver_dump(const bt_world *world, const char *path, bt_errors *err
         .ends = rafts ? x.ends : NULL, .places = &places, .title = "bergtow",
         .description = "contact problem of one time step of broken sea ice, 2-D, with its solution"};
     const bt_status status = bt_fclib_write(path, &out, err);
-    void *const arrays[] = {rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc, x.ends,
-                            (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    BT_FREE(rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc, x.ends);
+    BT_FREE((void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose);
     return status;
 }

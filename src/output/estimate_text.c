@@ -4,8 +4,6 @@
 #include "base/units.h"
 
 #include <math.h>
-#include <stdio.h>
-
 
 /// Concentrations of the curves: 0 to 0.98 in hundredths, with a point just above and just below the two thresholds of
 /// Lichey and Hellmer, so that the steps remain sharp.

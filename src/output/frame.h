@@ -3,8 +3,6 @@
 #ifndef BT_FRAME_H
 #define BT_FRAME_H
 
-#include <stddef.h>
-
 #include "bergtow/comm.h"
 #include "bergtow/field.h"
 #include "bergtow/world.h"

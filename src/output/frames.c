@@ -5,22 +5,14 @@
 // of its block between frames. Everything else passes through one buffer of 1 MB.
 #include "output/frames.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/shape.h"
-#include "output/xdmf.h"
 #include "base/elementary.h"
-#include "base/h5dataset.h"
+#include "base/fileio.h"
+#include "base/inside.h"
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
-
-/// Write rows first to first + n − 1 from memory.
-static void write_copy(bt_slab *slab, int64_t first, int64_t n, const void *rows)
-{
-    if (n > 0) bt_slab_write(slab, first, n, rows);
-}
 
 typedef struct outlines {
     bt_slab vertices, offsets, thickness, area, topology;
@@ -31,18 +23,15 @@ static outlines create_outlines(bt_frames *frames, const char *group, const char
                                 int64_t n, int64_t n_vertices)
 {
     bt_h5 *h5 = frames->h;
-    char path[64];
-#define NAMED(name) (snprintf(path, sizeof path, "%s/%s", group, name), path)
     outlines o = {
-        .vertices = bt_slab_fixed(h5, NAMED("vertices"), H5T_NATIVE_DOUBLE, n_vertices, 2, false),
-        .offsets = bt_slab_fixed(h5, NAMED("offsets"), H5T_NATIVE_INT64, n + 1, 0, false),
-        .thickness = bt_slab_fixed(h5, NAMED(height), H5T_NATIVE_DOUBLE, n, 0, false),
-        .area = bt_slab_fixed(h5, NAMED("area"), H5T_NATIVE_DOUBLE, n, 0, false),
+        .vertices = bt_slab_fixed(h5, BT_PATH(group, "vertices"), H5T_NATIVE_DOUBLE, n_vertices, 2, false),
+        .offsets = bt_slab_fixed(h5, BT_PATH(group, "offsets"), H5T_NATIVE_INT64, n + 1, 0, false),
+        .thickness = bt_slab_fixed(h5, BT_PATH(group, height), H5T_NATIVE_DOUBLE, n, 0, false),
+        .area = bt_slab_fixed(h5, BT_PATH(group, "area"), H5T_NATIVE_DOUBLE, n, 0, false),
         // Vertex numbers in XDMF have 32 bits here: enough for 2^31 vertices per block.
         .topology = bt_slab_fixed(h5, topology, H5T_NATIVE_INT32, n_vertices + 2 * n, 0, false),
         .mirrored = frames->axes.swapped,
     };
-#undef NAMED
     return o;
 }
 
@@ -85,9 +74,9 @@ static void write_outlines(outlines *o, const bt_record_bodies *bodies, int64_t 
                            int64_t before, char *buffer)
 {
     const int64_t *offsets = bodies->offsets + from, v0 = offsets[0];
-    write_copy(&o->vertices, before, offsets[n] - v0, bodies->vertices + 2 * (v0 - bodies->offsets[0]));
-    write_copy(&o->thickness, first, n, bodies->thickness + from);
-    write_copy(&o->area, first, n, bodies->area + from);
+    bt_slab_write(&o->vertices, before, offsets[n] - v0, bodies->vertices + 2 * (v0 - bodies->offsets[0]));
+    bt_slab_write(&o->thickness, first, n, bodies->thickness + from);
+    bt_slab_write(&o->area, first, n, bodies->area + from);
     // Every rank writes the ends of its bodies; the first one also the 0 at the start.
     bt_rows rows = bt_rows_from(&o->offsets, first ? first + 1 : 0, buffer);
     if (!first) *(int64_t *)bt_rows_next(&rows) = 0;
@@ -406,9 +395,6 @@ void bt_frames_close(bt_frames *frames)
 {
     for (int k = 0; k < BT_FRAME_COLUMNS; k++)
         if (frames->column[k].h) bt_slab_close(&frames->column[k]);
-    free(frames->lines);
-    free(frames->vertices);
-    free(frames->n_vertices);
-    free(frames->times);
+    BT_FREE(frames->lines, frames->vertices, frames->n_vertices, frames->times);
     *frames = (bt_frames){0};
 }

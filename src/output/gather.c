@@ -6,9 +6,6 @@
 // duplicate bodies are detected here.
 #include "output/gather.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 #include "base/inside.h"
 #include "output/observe.h"
 #include "partition/domain.h"
@@ -48,9 +45,7 @@ static list make_list(const bt_comm *comm, const bt_world *world, const bt_roste
 
 static void free_list(list *block)
 {
-    free(block->row);
-    free(block->body);
-    free(block->first);
+    BT_FREE(block->row, block->body, block->first);
 }
 
 /// Outline of a body in its own frame; returns the number of vertices.
@@ -153,11 +148,8 @@ bt_status bt_gather_bodies(const bt_comm *comm, const bt_world *world, const bt_
 
 void bt_gather_free(bt_record_bodies *bodies)
 {
-    free((void *)bodies->offsets);
-    free((void *)bodies->vertices);
-    free((void *)bodies->thickness);
-    free((void *)bodies->area);
-    free((void *)bodies->fixed);
+    BT_FREE((void *)bodies->offsets, (void *)bodies->vertices, (void *)bodies->thickness, (void *)bodies->area,
+            (void *)bodies->fixed);
     *bodies = (bt_record_bodies){0};
 }
 

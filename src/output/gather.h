@@ -3,13 +3,10 @@
 #ifndef BT_GATHER_H
 #define BT_GATHER_H
 
-#include "bergtow/base.h"
 #include "bergtow/world.h"
 #include "output/frame.h"
 
 // --- names -----------------------------------------------------------------------------------------------------------
-
-// Names of the bodies of a world in the record.
 
 /// Data of the bodies for the recorder, besides their outlines.
 typedef struct bt_roster {

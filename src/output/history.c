@@ -4,8 +4,6 @@
 #include "case/cost.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 _Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
 

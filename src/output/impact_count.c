@@ -2,9 +2,6 @@
 // Collisions in the window of a run and before it: numbers, the largest, the largest peaks; see impact_count.h.
 #include "output/impact_count.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/inside.h"
@@ -87,8 +84,6 @@ void bt_impact_count_add(bt_impact_count *count, const bt_impact *impact)
 
 // --- in the summary --------------------------------------------------------------------------------------------------
 
-// Collisions as numbers for scripts and readers: their number, the largest, how often a peak is exceeded.
-//
 // Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times, at the rate k/T. The table
 // has the ranks 1, 2, 5, 10, ..., without fits or interpolation. A rate near 1/T rests on a single peak.
 

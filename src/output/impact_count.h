@@ -52,8 +52,6 @@ void bt_impact_count_peaks(const bt_impact_count *count, double *peaks);
 
 // --- in the summary --------------------------------------------------------------------------------------------------
 
-// Collisions and quasi-static loads in the summary (private to it).
-
 /// Write an array of ranks, each with its peak and how often that is reached or exceeded.
 void bt_impacts_exceedance(bt_json *json, const char *key, const bt_impact_count *count);
 /// Print two lines of the table; nothing if `count` is NULL. at_least: the loads are lower bounds.

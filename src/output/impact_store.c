@@ -2,12 +2,11 @@
 // Datasets of collisions and panels; one table names the columns of a collision.
 #include "output/impact_store.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/fileio.h"
 #include "base/h5dataset.h"
+#include "base/inside.h"
 
 #define CHUNK 256 // rows of collisions in a chunk: 2 kB per column
 #define PIECE 8192 // rows read back at once
@@ -65,9 +64,7 @@ static void create_panels(bt_impact_store *store, const bt_panels *panels, bool 
               "middle of each panel, frame of the towed body");
     bt_h5_put(h5, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal, "panel xy", "1",
               "outward normal at the middle of each panel");
-    free(start);
-    free(middle);
-    free(normal);
+    BT_FREE(start, middle, normal);
     if (!series) return;
     store->force = bt_h5_growing(h5, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n},
                                  false);
@@ -87,20 +84,18 @@ void bt_impact_store_create(bt_impact_store *store, bt_h5 *h5, const bt_impacts 
         .n_panels = impacts->panels.n};
     bt_panel_blocks_init(&store->blocks, store->n_panels);
     bt_h5_group(h5, "/impacts");
-    char text[160], path[64];
+    char text[160];
     bt_impact_describe(&impacts->rule, text);
     bt_h5_attr_text(h5, "/impacts", "conversion", text);
     bt_h5_attr_text(h5, "/impacts", "description", "collisions with the towed body in the order in which they ended");
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
-        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+        const char *path = BT_PATH("/impacts", columns[k].name);
         store->column[k] = bt_h5_growing(h5, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
                                          (hsize_t[]){CHUNK, 1}, false);
         bt_h5_describe(h5, path, NULL, columns[k].units, columns[k].description);
     }
-    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) { // when their time is there
-        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-        bt_h5_axes(h5, path, "time");
-    }
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) // when their time is there
+        bt_h5_axes(h5, BT_PATH("/impacts", columns[k].name), "time");
     store->sum = bt_alloc(3 * (size_t)store->n_panels, sizeof *store->sum);
     create_panels(store, &impacts->panels, input->output.panels);
 }
@@ -256,9 +251,7 @@ void bt_impact_store_totals(bt_impact_store *store, const bt_impact_count *c, co
                   of_normals[k].text);
     bt_h5_put(h5, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count, "panel", "1",
               "collisions in the window");
-    free(x);
-    free(count);
-    free(before);
+    BT_FREE(x, count, before);
 }
 
 static const bt_state_row state_rows[] = {
@@ -302,9 +295,7 @@ static void load_rows(bt_impact_store *store, bt_h5_reader *old, int64_t n)
     for (int64_t first = 0; first < n && old->status == BT_OK; first += PIECE) {
         store->n_rows = n - first < PIECE ? n - first : PIECE;
         for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
-            char path[64];
-            snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-            bt_h5_read(old, path, H5T_NATIVE_DOUBLE, first, store->n_rows, 1, x);
+            bt_h5_read(old, BT_PATH("/impacts", columns[k].name), H5T_NATIVE_DOUBLE, first, store->n_rows, 1, x);
             put_column(store->rows, store->n_rows, k, x);
         }
         if (old->status == BT_OK && rows_sound(store)) {
@@ -370,10 +361,7 @@ void bt_impact_store_load(bt_impact_store *store, bt_snapshot *from, bt_h5_reade
 void bt_impact_store_close(bt_impact_store *store)
 {
     if (!store->h) return;
-    free(store->rows);
-    free(store->forces);
-    free(store->normals);
-    free(store->sum);
+    BT_FREE(store->rows, store->forces, store->normals, store->sum);
     bt_panel_blocks_free(&store->blocks);
     *store = (bt_impact_store){0};
 }

@@ -10,7 +10,6 @@
 #include "output/observe.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "bergtow/forces.h"
 #include "loads/impact.h"

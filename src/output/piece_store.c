@@ -2,7 +2,6 @@
 // Splits and pieces in result.h5; see piece_store.h.
 #include "output/piece_store.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"
@@ -158,10 +157,7 @@ static void write_paraview(const bt_piece_store *store, const bt_piece_row *rows
     for (size_t i = 0; i < cells; i++) id[i] = (int32_t)(store->roster->n_floes + (int64_t)rows[i].piece);
     bt_h5_write(store->h, NAMED("_id"), H5T_NATIVE_INT32, cells, 0, id);
 #undef NAMED
-    free(topology);
-    free(id);
-    free(points);
-    free(value);
+    BT_FREE(topology, id, points, value);
 }
 
 void bt_piece_store_frame(bt_piece_store *store, const bt_piece_row *rows, int64_t n)

@@ -4,9 +4,6 @@
 #include "bergtow/quantity.h"
 
 #include <ctype.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/contact.h"
@@ -17,8 +14,6 @@
 #include "output/sample.h"
 
 // --- registered quantities -------------------------------------------------------------------------------------------
-
-// Quantities registered besides the program's own.
 
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
 const char *const bt_role_names[BT_ROLE_KINDS] = {"", "balance", "force", "load", "diagnostic"};

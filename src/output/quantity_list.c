@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The registry as text and JSON: all names come from the tables.
 
-#include <stdio.h>
-
 #include "case/warning.h"
 #include "output/estimate_text.h"
 #include "output/summary_keys.h"

@@ -8,7 +8,6 @@
 // until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "output/record.h"
 
-#include <stdlib.h>
 #include <unistd.h>
 
 #include "output/checkpoint.h"
@@ -19,6 +18,7 @@
 #include "output/record_parts.h"
 #include "output/summary_keys.h"
 #include "base/checksum.h"
+#include "base/inside.h"
 #include "output/xdmf.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
@@ -88,11 +88,7 @@ static void record_free(bt_record *record)
     bt_summary_free(&record->summary);
     bt_impact_count_free(&record->count);
     bt_history_free(&record->history);
-    free(record->dir);
-    free(record->series);
-    free(record->merged);
-    free(record->buffer);
-    free(record);
+    BT_FREE(record->dir, record->series, record->merged, record->buffer, record);
 }
 
 /// Close the file, and with it its datasets; returns the status of all writes to the file.
@@ -102,16 +98,6 @@ static bt_status close_file(bt_record *record)
     bt_impact_store_close(&record->impacts);
     bt_piece_store_close(&record->pieces);
     return bt_h5_close(&record->h5);
-}
-
-bt_status bt_record_write_text(const bt_record *record, const char *name, const char *text, bt_errors *err)
-{
-    return bt_file_write(BT_PATH(record->dir, name), text, err);
-}
-
-bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors *err)
-{
-    return bt_file_remove(BT_PATH(record->dir, name), err);
 }
 
 /// Prepare the folder. A resumed run removes only the unfinished file.
@@ -126,8 +112,8 @@ static bt_status prepare_dir(bt_record *record, const char *resolved, const char
         free(text);
     } else if (status == BT_OK) {
         record->replaces = true;
-        status = bt_record_remove(record, BT_RESULT_FILE ".tmp", err);
-        if (status == BT_OK) status = bt_record_remove(record, BT_CHECKPOINT_FILE ".tmp", err);
+        status = bt_file_remove(BT_PATH(record->dir, BT_RESULT_FILE ".tmp"), err);
+        if (status == BT_OK) status = bt_file_remove(BT_PATH(record->dir, BT_CHECKPOINT_FILE ".tmp"), err);
     }
     return status;
 }
@@ -334,7 +320,7 @@ static bt_status write_summary(const bt_record *record, const bt_run_totals *tot
     bt_run_totals all = *totals; // with the wall time so far
     all.call.end = totals->stepped > 0 ? bt_clock() - totals->stepped : 0;
     char *text = bt_summary_json(&record->summary, &record->history, record->c, &all, record->n_floes);
-    const bt_status status = bt_record_write_text(record, "summary.json", text, err);
+    const bt_status status = bt_file_write(BT_PATH(record->dir, "summary.json"), text, err);
     free(text);
     return status;
 }
@@ -357,7 +343,7 @@ bt_status bt_record_close(bt_record *record, const bt_run_totals *totals, bt_sna
     if (first && status == BT_OK)
         status = bt_checksum_publish(BT_PATH(record->dir, BT_RESULT_PART), BT_PATH(record->dir, BT_RESULT_FILE),
                                      BT_CHECKSUM_RESULT, err);
-    if (first && status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
+    if (first && status == BT_OK) status = bt_file_write(BT_PATH(record->dir, "frames.xdmf"), xdmf, err);
     if (first && status == BT_OK && last) status = bt_checkpoint_write(last, record->dir, BT_CHECKPOINT_FILE, err);
     if (first && status == BT_OK && totals) status = write_summary(record, totals, err);
     if (first && status == BT_OK && totals) bt_folder_settle(record->dir);

@@ -3,7 +3,6 @@
 #ifndef BERGTOW_RECORD_H
 #define BERGTOW_RECORD_H
 
-#include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 #include "bergtow/event.h"

@@ -55,9 +55,6 @@ bt_status bt_record_add_frame(bt_record *record, double time, const bt_frame_row
 /// Text of frames.xdmf for the frames so far; the caller frees it.
 char *bt_record_xdmf(const bt_record *record);
 
-/// Remove a file of the folder, if it exists.
-bt_status bt_record_remove(const bt_record *record, const char *name, bt_errors *err);
-
 /// Merge the next step of an entry: m from the previous steps, x of this step.
 static inline double bt_record_merge(bt_keep keep, double m, double x)
 {
@@ -71,8 +68,5 @@ static inline double bt_record_merged(bt_keep keep, double m, int64_t n)
 }
 
 #define BT_RECORD_IDENTITY "about/run" // in a checkpoint
-
-/// Write a text file of the folder.
-bt_status bt_record_write_text(const bt_record *record, const char *name, const char *text, bt_errors *err);
 
 #endif

@@ -10,14 +10,12 @@
 // The copy costs a write of the whole file per checkpoint (nothing if the file system copies by reference).
 // Rejected: truncating the unfinished file to the checkpoint's counts, for which it would have to be readable; a
 // separate file for each piece between two checkpoints, which every reader would have to join.
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/h5dataset.h"
+#include "base/inside.h"
 #include "case/case_files.h"
 #include "output/record_parts.h"
 
@@ -121,15 +119,12 @@ static bt_status record_keep_case(const bt_record *record, bt_errors *err)
          *wanted = bt_case_with_comments(resolved, digests, record->c->text);
     bt_status status = BT_OK;
     if (!read || strcmp(text, wanted) != 0) {
-        status = bt_record_write_text(record, CASE_FILE, wanted, err);
+        status = bt_file_write(path, wanted, err);
         if (status == BT_OK && (!read || !same_values(record->c, text))) // otherwise only its comments have been edited
             bt_errors_warn("warning: %s: was not the case that the run began with; it is rewritten from the "
                            "checkpoint", path);
     }
-    free(text);
-    free(resolved);
-    free(digests);
-    free(wanted);
+    BT_FREE(text, resolved, digests, wanted);
     return status;
 }
 
@@ -151,11 +146,7 @@ static char *law_series(void)
 }
 
 /// By name: a resumed program may have its series in another order.
-static const char *merged_name(int k, char name[BT_HISTORY_NAME])
-{
-    snprintf(name, BT_HISTORY_NAME, "merged/%s", bt_series(k)->name);
-    return name;
-}
+#define MERGED(k) BT_PATH("merged", bt_series(k)->name)
 
 bt_status bt_record_save(bt_record *record, int64_t n_frames, bt_snapshot *snap, bt_errors *err)
 {
@@ -176,7 +167,7 @@ bt_status bt_record_save(bt_record *record, int64_t n_frames, bt_snapshot *snap,
     bt_snapshot_add_int(snap, "record/merged_steps", record->n_merged);
     // Between two entries the sum is finished: its last value would only make equal states look different.
     for (int k = 0; k < record->n_series && record->n_merged > 0; k++)
-        bt_snapshot_add(snap, merged_name(k, name), BT_ITEM_F64, 1, 1, &record->merged[k]);
+        bt_snapshot_add(snap, MERGED(k), BT_ITEM_F64, 1, 1, &record->merged[k]);
     char *of_laws = law_series();
     if (*of_laws) bt_snapshot_add_text(snap, LAW_SERIES, of_laws);
     free(of_laws);
@@ -198,7 +189,7 @@ bt_status bt_record_publish(bt_record *record, bt_errors *err)
         if (status == BT_OK)
             status = bt_checksum_publish(copy, BT_PATH(record->dir, BT_RESULT_FILE), BT_CHECKSUM_RESULT, err);
         char *xdmf = bt_record_xdmf(record);
-        if (status == BT_OK) status = bt_record_write_text(record, "frames.xdmf", xdmf, err);
+        if (status == BT_OK) status = bt_file_write(BT_PATH(record->dir, "frames.xdmf"), xdmf, err);
         free(xdmf);
     }
     return bt_comm_agree(record->comm, status);
@@ -266,10 +257,9 @@ static void load_history(bt_history *history, bt_snapshot *snap, int64_t n)
 /// Load the present entry.
 static void load_merged(bt_record *record, bt_snapshot *snap)
 {
-    char name[BT_HISTORY_NAME];
     for (int k = 0; k < record->n_series; k++) {
-        if (may_lack(k) && !bt_snapshot_find(snap, merged_name(k, name))) record->merged[k] = 0;
-        else bt_snapshot_take(snap, merged_name(k, name), BT_ITEM_F64, 1, 1, &record->merged[k]);
+        if (may_lack(k) && !bt_snapshot_find(snap, MERGED(k))) record->merged[k] = 0;
+        else bt_snapshot_take(snap, MERGED(k), BT_ITEM_F64, 1, 1, &record->merged[k]);
     }
 }
 
@@ -322,10 +312,7 @@ static bt_status load_frames(bt_record *record, bt_h5_reader *old, int64_t n, bt
         if (status == BT_OK) status = bt_record_add_frame(record, time, block, &line, pieces, n_pieces);
         free(pieces);
     }
-    free(blocks);
-    free(rows);
-    free(block);
-    free(gid);
+    BT_FREE(blocks, rows, block, gid);
     return status;
 }
 
@@ -376,6 +363,6 @@ bt_status bt_record_load(bt_record *record, bt_snapshot *snap, const bt_events *
     if (status == BT_OK) status = record->h5.status;
     if (status == BT_OK && first) status = record_keep_case(record, err);
     // the summary is of an end that is no longer valid
-    if (status == BT_OK && first) status = bt_record_remove(record, "summary.json", err);
+    if (status == BT_OK && first) status = bt_file_remove(BT_PATH(record->dir, "summary.json"), err);
     return bt_comm_agree(record->comm, status);
 }

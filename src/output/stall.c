@@ -2,8 +2,6 @@
 // Windows in which the towed body stood still; see output/stall.h.
 #include "output/stall.h"
 
-#include <math.h>
-
 #include "tow/tow.h"
 #include "bergtow/world.h"
 #include "base/elementary.h"

@@ -3,9 +3,6 @@
 #include "output/state.h"
 
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/contact.h"
@@ -17,6 +14,7 @@
 #include "step/splitting.h"
 #include "step/window.h"
 #include "partition/domain.h"
+#include "base/inside.h"
 
 #define ADDED_LAWS "contacts/added_laws"
 #define ADDED_FORCES "forces/added_laws"
@@ -321,9 +319,7 @@ static bt_status save_bodies(const bt_world *world, const bt_comm *comm, bt_snap
             save_columns(snap, "bodies", &in_row, 1, all, width * sizeof *all, count);
         free(all);
     }
-    free(first);
-    free(body);
-    free(gid);
+    BT_FREE(first, body, gid);
     return status;
 }
 

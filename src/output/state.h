@@ -10,7 +10,6 @@
 #include "base/snapshot.h"
 #include "field/lead.h"
 #include "output/stall.h"
-#include "contact/cell_contacts.h"
 #include "loads/impact.h"
 
 /// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:
@@ -52,8 +51,6 @@ void bt_state_load_stall(bt_stall *stall, bt_snapshot *snap);
 #define BT_N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
 
 // --- its check -------------------------------------------------------------------------------------------------------
-
-// Is the state in a checkpoint one that steps can leave? (private to state.c)
 
 /// Are the numbers of an open collision finite? Its corner is NaN if there is none.
 bool bt_state_open_finite(const bt_impact_open *o);

@@ -9,10 +9,7 @@
 #include "output/state.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 
-#include "bergtow/contact.h"
 #include "contact/law.h"
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"

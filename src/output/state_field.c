@@ -2,12 +2,11 @@
 // Parts of a run outside its world as named arrays: the ice field at time zero, its lead, and the stall detection.
 #include "output/state.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "partition/domain.h"
 #include "step/splitting.h"
+#include "base/inside.h"
 
 #define STALL(type, member, units, check, meaning) \
     BT_STATE_ONE(bt_stall, #member, type, member, units, check, meaning)
@@ -141,12 +140,7 @@ static bt_status save_outlines(const bt_world *world, const bt_comm *comm, bt_gi
                    2 * sizeof *all * (size_t)(offset[g + 1] - offset[g]));
         bt_snapshot_put(snap, offset[end] - offset[from], packed);
     }
-    free(mine);
-    free(all);
-    free(packed);
-    free(gid);
-    free(first);
-    free(split);
+    BT_FREE(mine, all, packed, gid, first, split);
     return status;
 }
 

@@ -3,17 +3,13 @@
 #include "output/steady.h"
 #include "base/units.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-
 #include "geometry/path.h"
 #include "case/case_tow.h"
 #include "case/track.h"
 #include "case/warning.h"
 #include "base/inside.h"
 #include "base/elementary.h"
-#include "output/summary.h"
+#include "step/window.h"
 
 const char *const bt_verdict_names[] = {"steady", "not steady", "too short"};
 

@@ -8,14 +8,10 @@
 // the mean does not.
 #include "output/summary.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"
 #include "base/inside.h"
-#include "case/arch.h"
 #include "case/case_check.h"
 #include "case/case_tow.h"
 #include "case/ice_bounds.h"
@@ -28,18 +24,7 @@
 
 // --- the moving window -----------------------------------------------------------------------------------------------
 
-// Results of the moving window, and warnings if its ice differs from that of a long domain.
-
 #define SHARE_LIMIT 0.01 // share of kept or missed floes above which there is a warning
-
-void bt_summary_window_print(const bt_window *window)
-{
-    if (!window) return;
-    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept; %lld floes found no place, "
-           "%lld wait to enter\n",
-           bt_window_laps(window), (long long)window->renewed, (long long)window->kept, (long long)window->missed,
-           (long long)window->waiting);
-}
 
 void bt_summary_window_warn_laps(bt_errors *warnings, double laps)
 {
@@ -81,7 +66,6 @@ static void summary_window_warn(bt_errors *warnings, const bt_window *window)
 #define MOMENTUM_LIMIT 1e-9
 /// Overlap above this fraction of the mean floe size is reported.
 #define OVERLAP_LIMIT 0.01
-/// Crush above this fraction of it is reported: outlines do not change, and deeply overlapping floes separate sideways.
 
 static bt_mean mean_over(const bt_summary *summary, const bt_history *history, bt_column k)
 {

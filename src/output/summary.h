@@ -44,11 +44,6 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
 double bt_summary_held_against(const bt_summary *summary);
 void bt_summary_free(bt_summary *summary);
 
-// --- the moving window -----------------------------------------------------------------------------------------------
-
-// The moving window in the summary: table, warnings. Nothing without a window (NULL).
-
-void bt_summary_window_print(const bt_window *window);
 /// Warn of a moving window that travels, or will travel, this many times its length through the ice.
 void bt_summary_window_warn_laps(bt_errors *warnings, double laps);
 

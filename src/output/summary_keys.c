@@ -5,7 +5,6 @@
 #include <assert.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "output/estimate_text.h"
@@ -224,20 +223,20 @@ static const bt_json_key rows[] = {
     MACHINE("wall_time_s", wall_time, "s", "wall time of the run"),
     MACHINE("ranks", ranks, "1", "MPI ranks"),
     MACHINE("threads", threads, "1", "threads of a rank"),
-    MACHINE("divisions", divisions, "1", "times the field was repartitioned among the ranks in the last call"),
-    MACHINE("undivided_steps", undivided_steps, "1",
+    MACHINE("divisions", division.divisions, "1", "times the field was repartitioned among the ranks in the last call"),
+    MACHINE("undivided_steps", division.undivided, "1",
         "steps of the last call that one rank computed alone because that was estimated to be faster"),
-    MACHINE("moved_floes", moved_floes, "1", "floes moved to another rank by repartitions in the last call"),
-    MACHINE("imbalance", imbalance, "1",
+    MACHINE("moved_floes", division.moved, "1", "floes moved to another rank by repartitions in the last call"),
+    MACHINE("imbalance", division.imbalance, "1",
         "work of the busiest rank over the mean, less 1, with the busiest in the sweeps and the busiest in the rest of "
         "the steps; mean of the checks of the last call; NaN without one"),
-    MACHINE("worst_imbalance", worst_imbalance, "1", "largest imbalance at a check of the last call"),
-    MACHINE("repartition_imbalance", repartition_imbalance, "1",
+    MACHINE("worst_imbalance", division.worst_imbalance, "1", "largest imbalance at a check of the last call"),
+    MACHINE("repartition_imbalance", division.repartition_imbalance, "1",
         "imbalance just after a repartition, mean of those after the first"),
-    MACHINE("worst_repartition_imbalance", worst_repartition_imbalance, "1",
+    MACHINE("worst_repartition_imbalance", division.worst_repartition_imbalance, "1",
         "largest imbalance just after a repartition"),
-    MACHINE("edge_cut", edge_cut, "1", "fraction of the edges between cells that the partition cuts"),
-    MACHINE("halo_share", halo_share, "1", "copies of bodies on other ranks / bodies owned"),
+    MACHINE("edge_cut", division.cut, "1", "fraction of the edges between cells that the partition cuts"),
+    MACHINE("halo_share", division.halo, "1", "copies of bodies on other ranks / bodies owned"),
     MACHINE_OF("memory_per_floe_b", memory_per_floe, "byte", "peak resident memory of all ranks for each floe"),
     MACHINE("sweep_bytes_per_contact", sweep_bytes_per_contact, "byte",
         "batches and velocities that a sweep goes through for a contact point, in the last step"),
@@ -544,14 +543,11 @@ bt_status bt_summary_check_added(bt_errors *err)
 
 static bt_meaning meaning_of(const bt_json_key *key)
 {
-    if (!key) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = "", .kind = ""};
-    return (bt_meaning){.known = true,
-                        .machine = key->machine,
-                        .units = key->units,
-                        .description = key->description,
-                        .estimate = "",
-                        .label = "",
-                        .kind = ""};
+    bt_meaning meaning = {.units = "", .description = "", .estimate = "", .label = "", .kind = ""};
+    if (!key) return meaning;
+    meaning.known = true, meaning.machine = key->machine;
+    meaning.units = key->units, meaning.description = key->description;
+    return meaning;
 }
 
 /// A key "estimates.NAME.key", or one of the conditions.
@@ -573,12 +569,8 @@ bt_meaning bt_summary_meaning(const char *key)
 {
     for (int k = 0; k < bt_n_added(); k++)
         if (!strcmp(bt_added(k)->summary, key))
-            return (bt_meaning){.known = true,
-                                .units = bt_added(k)->units,
-                                .description = bt_added(k)->description,
-                                .estimate = "",
-                                .label = "",
-                                .kind = ""};
+            return meaning_of(
+                &(bt_json_key){.units = bt_added(k)->units, .description = bt_added(k)->description});
     if (!strncmp(key, "estimates.", 10)) return meaning_of_estimate(key + 10);
     const char *dot = strrchr(key, '.');
     if (!strncmp(key, "window.series.", 14))

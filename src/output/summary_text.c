@@ -2,8 +2,6 @@
 // The summary as a table for readers; as JSON: summary_keys.c.
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "output/estimate_text.h"
@@ -167,6 +165,15 @@ static void print_splits(const bt_splitting *splitting, int64_t n_steps)
            (long long)totals->refused_reserve, (long long)totals->deferred);
 }
 
+static void print_window(const bt_window *window)
+{
+    if (!window) return;
+    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept; %lld floes found no place, "
+           "%lld wait to enter\n",
+           bt_window_laps(window), (long long)window->renewed, (long long)window->kept, (long long)window->missed,
+           (long long)window->waiting);
+}
+
 void bt_summary_print(const bt_summary *summary, const bt_history *history, const bt_case *input,
                       const bt_run_totals *totals, bt_idx n_floes)
 {
@@ -214,7 +221,7 @@ void bt_summary_print(const bt_summary *summary, const bt_history *history, cons
         free(line);
     }
     if (totals->splitting) print_splits(totals->splitting, totals->n_steps);
-    bt_summary_window_print(totals->window);
+    print_window(totals->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", totals->wall_time, totals->ranks,
            totals->threads);
     if (isfinite(summary->ns_per_floe_step)) printf(", %.4g ns per floe and step", summary->ns_per_floe_step);

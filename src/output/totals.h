@@ -8,6 +8,7 @@
 #include "bergtow/world.h"
 #include "field/lead.h"
 #include "output/stall.h"
+#include "partition/domain.h"
 
 /// Parts of the wall time of a call: X(name, of what).
 #define BT_CALL_PARTS(X)                                                                                               \
@@ -48,9 +49,7 @@ typedef struct bt_run_totals {
     bt_phases phases, shared; ///< shared: the part in passes shared by several threads
     bt_call call;                ///< `end` is that of the summary's own time
     double stepped;              ///< bt_clock after the last step of this call
-    // costs of the division among ranks (domain.h); 0 for one rank
-    int64_t divisions, undivided_steps, moved_floes;
-    double imbalance, worst_imbalance, repartition_imbalance, worst_repartition_imbalance, edge_cut, halo_share;
+    bt_domain_stats division;    ///< its costs, of all ranks; 0 for one
     double memory;               ///< peak resident memory of all ranks, B
     /// bytes read by a sweep per contact point of the last step: batches and velocities, B; NaN without contacts
     double sweep_bytes_per_contact;

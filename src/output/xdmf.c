@@ -17,14 +17,11 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 
 #include "field/map_crs.h"
 
 // --- axes ------------------------------------------------------------------------------------------------------------
 
-// Axes of drawings of the world; reasons in xdmf.h.
-//
 // Drawing programs hold coordinates in single precision, 24 bits. At a northing of 8,676 km the resolution is then 1 m,
 // and floes of 0.4 m have no area. So the origin is the middle of the domain, rounded towards 0 to the least power of
 // ten that is no less than the domain: 0, 0 for most cases, and never farther from the ice than ten domains, where the

@@ -9,8 +9,6 @@
 #include "base/elementary.h"
 #include "base/inside.h"
 
-#include <math.h>
-
 /// a modulo 2π, 0 <= a < 2π; 0 for values that rounding puts just below 2π.
 static double turn_of(double a)
 {

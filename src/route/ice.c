@@ -17,10 +17,8 @@
 #include "route/ice.h"
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "bergtow/outline.h"
-
-#include <math.h>
-#include <stdlib.h>
 
 /// Limit of the factor on f1 in ice so dense that the front would run away; assumed.
 #define MAX_COMPACTION 10.0
@@ -209,9 +207,7 @@ void bt_route_ice_make(bt_route_ice *ice, const bt_route_task *task)
             }
         average(sums, known, nx, ny, half, ice->mean[f]);
     }
-    free(v);
-    free(sums);
-    free(known);
+    BT_FREE(v, sums, known);
     ice->n_speeds = task->n_speeds;
     ice->load = bt_alloc(cells * (size_t)task->n_speeds, sizeof(float));
     ice->line = bt_alloc(cells * (size_t)task->n_speeds, sizeof(float));

@@ -20,9 +20,6 @@
 #include "base/elementary.h"
 #include "base/inside.h"
 
-#include <math.h>
-#include <stdlib.h>
-
 enum { MAX_HEADINGS = 32, MAX_MOVES = 7 };
 #define UNITS 1e5 ///< units of cost in the least cost of a spacing
 #define THERE 0.75 ///< largest distance of a goal node from the goal, spacings
@@ -291,10 +288,7 @@ void bt_lattice_free(bt_lattice *lattice)
     free(lattice);
 }
 
-double bt_lattice_spacing(const bt_lattice *lattice)
-{
-    return lattice->h;
-}
+double bt_lattice_spacing(const bt_lattice *lattice) { return lattice->h; }
 
 // --- the open list: a 4-ary heap, for the sake of the cache ---------------------------------------------------------
 
@@ -308,10 +302,7 @@ typedef struct heap {
     size_t n, cap;
 } heap;
 
-static bool before(entry a, entry b)
-{
-    return a.bound != b.bound ? a.bound < b.bound : a.state < b.state;
-}
+static bool before(entry a, entry b) { return a.bound != b.bound ? a.bound < b.bound : a.state < b.state; }
 
 static void push(heap *queue, entry e)
 {
@@ -614,21 +605,12 @@ bool bt_lattice_search(bt_lattice *lattice, const double goal[4], int objective,
             follow(&state, e.state, way);
         } else look(&state, e.state, i, j, k);
     }
-    free(state.cost);
-    free(state.from);
-    free(state.by);
-    free(state.done);
-    free(state.time);
-    free(state.steps);
-    free(state.open.e);
+    BT_FREE(state.cost, state.from, state.by, state.done, state.time, state.steps, state.open.e);
     return found;
 }
 
 void bt_lattice_way_free(bt_lattice_way *way)
 {
-    free(way->point);
-    free(way->leg);
-    free(way->node);
-    free(way->node_leg);
+    BT_FREE(way->point, way->leg, way->node, way->node_leg);
     *way = (bt_lattice_way){0};
 }

@@ -6,8 +6,6 @@
 #include "base/inside.h"
 #include "route/lattice.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define MAX_STATES 1.5e6 ///< of a lattice with the spacing chosen here
@@ -17,8 +15,6 @@ enum { TRIES = 4, ARRIVALS = 40, ROUNDS = 4, SWEEPS = 12 };
 
 // --- shortening ------------------------------------------------------------------------------------------------------
 
-// Line-of-sight shortening and a compass search over the corners of a path.
-//
 // A step is accepted if the cost of the whole path, with its swath and constraints, falls. Rejected: a spline from a
 // nonlinear programming solver, because the cost of ice has no useful gradient at the scale of floes; and shortening by
 // line of sight alone, which cuts through the ice that the search avoided.
@@ -135,10 +131,7 @@ static bool take(const bt_planner *planner, bt_way *way, bt_way *tried)
 }
 
 /// First free way-point; one before it is tied to the given heading at the start.
-static int first_free(const bt_planner *planner)
-{
-    return isnan(planner->task.start_heading) ? 0 : 1;
-}
+static int first_free(const bt_planner *planner) { return isnan(planner->task.start_heading) ? 0 : 1; }
 
 static bool leave_out(const bt_planner *planner, bt_way *way, bt_way *tried)
 {

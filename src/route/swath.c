@@ -3,20 +3,16 @@
 #include "route/swath.h"
 
 #include "base/elementary.h"
+#include "base/inside.h"
 #include "geometry/polygons.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 // --- distances to no-go polygons, by buckets of their edges ----------------------------------------------------------
 
 #define FINE 1e-3 ///< finest length / no_go.need
 
-static int clamped(double x, int n)
-{
-    return x < 0 ? 0 : x >= n ? n - 1 : (int)x;
-}
+static int clamped(double x, int n) { return x < 0 ? 0 : x >= n ? n - 1 : (int)x; }
 
 /// For each bucket b within `far` of edge k: count the edge in first[b + 1], or list it at next[b].
 static void spread(bt_no_go *no_go, int64_t k, int64_t *next)
@@ -62,9 +58,7 @@ void bt_no_go_make(bt_no_go *no_go, const bt_route_task *task)
 
 void bt_no_go_free(bt_no_go *no_go)
 {
-    free(no_go->edge);
-    free(no_go->first);
-    free(no_go->list);
+    BT_FREE(no_go->edge, no_go->first, no_go->list);
 }
 
 double bt_no_go_to_edge(const bt_no_go *no_go, int64_t k, double x, double y)
@@ -197,10 +191,7 @@ static int slice(const bt_planner *planner, const bt_leg *leg, double s, double 
     return made;
 }
 
-static int slices(const bt_planner *planner, double length)
-{
-    return (int)ceil(length / planner->ice.cell + 1e-9);
-}
+static int slices(const bt_planner *planner, double length) { return (int)ceil(length / planner->ice.cell + 1e-9); }
 
 void bt_swath_load(const bt_planner *planner, const bt_leg *leg, double length, double *sums)
 {
@@ -409,9 +400,7 @@ static void clip_floes(const bt_planner *planner, bt_route *route)
             }
         }
     }
-    free(box);
-    free(w[0]);
-    free(w[1]);
+    BT_FREE(box, w[0], w[1]);
 }
 
 void bt_swath_report(const bt_planner *planner, bt_route *route)

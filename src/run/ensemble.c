@@ -5,10 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <math.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -72,7 +69,7 @@ static void settle_failed(bt_ensemble *ensemble, bt_entry *entry, bt_status stat
 static bool may_take_suspects(bt_ensemble *ensemble)
 {
     if (ensemble->alone >= 0) return true;
-    const int fd = bt_member_open(ensemble->o->dir, "suspects.lock", O_RDWR | O_CREAT);
+    const int fd = bt_file_descriptor(BT_PATH(ensemble->o->dir, "suspects.lock"), O_RDWR | O_CREAT);
     if (fd < 0) return true; // better unprotected than never
     if (bt_member_take_lock(fd, false)) ensemble->alone = fd;
     else close(fd);
@@ -94,7 +91,7 @@ static bool lock_member(bt_ensemble *ensemble, bt_entry *entry)
     bt_status status = bt_file_make_dir(entry->folder, &why);
     entry->busy = false;
     ensemble->run_lock = -1;
-    ensemble->lock = status == BT_OK ? bt_member_open(entry->folder, "lock", O_RDWR | O_CREAT) : -1;
+    ensemble->lock = status == BT_OK ? bt_file_descriptor(BT_PATH(entry->folder, "lock"), O_RDWR | O_CREAT) : -1;
     if (status == BT_OK && ensemble->lock < 0)
         status = bt_file_fail(entry->folder, "make a lock in the folder", errno, &why);
     if (status == BT_OK && bt_member_take_lock(ensemble->lock, false) &&
@@ -183,7 +180,7 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
                          "%s: its process died in each of %d attempts; run the case alone to see why", entry->m.name,
                          entry->attempts);
     if (first) {
-        if (entry->attempts == 0) bt_member_forget_attempts(entry->folder);
+        if (entry->attempts == 0) unlink(BT_PATH(entry->folder, "attempts"));
         if (entry->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(entry->folder);
         if (entry->attempts > 0) gather(ensemble, false); // its process may die again; the file should show its state
         bt_ensemble_journal(ensemble, BT_EVENT_START, &entry->m, 0, 0);
@@ -211,7 +208,7 @@ static bt_status run_member(bt_ensemble *ensemble, bt_entry *entry)
     bt_comm_errors(ensemble->group, &why);
     if (first) {
         const double wall = bt_clock() - t0;
-        bt_member_forget_attempts(entry->folder);
+        unlink(BT_PATH(entry->folder, "attempts"));
         entry->paused = status == BT_OK && ensemble->o->max_steps > 0 && !bt_member_is_whole(entry->folder, n_steps);
         if (status == BT_OK && !entry->paused) {
             status = bt_member_record_write(&ensemble->records, entry->index, entry->m.name, entry->folder, &why);

@@ -26,9 +26,6 @@
 // alone.
 #include <inttypes.h>
 #include <jansson.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -43,6 +40,7 @@
 #include "bergtow/quantity.h"
 #include "output/folder.h"
 #include "output/summary_keys.h"
+#include "base/inside.h"
 #include "base/units.h"
 
 static const char *const series[] = {"time", "ice_resistance", "tow_force"};
@@ -147,11 +145,10 @@ static hsize_t read_column(bt_h5 *h5, const char *folder, const char *group, con
 {
     *out = NULL;
     const char *path = BT_PATH(folder, "result.h5");
-    char name[64];
-    snprintf(name, sizeof name, "%s/%s", group, column_name);
     hsize_t n = 0;
     int errnum = 0;
-    const hid_t file = bt_h5_open_file(path, &errnum), set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
+    const hid_t file = bt_h5_open_file(path, &errnum),
+                set = file >= 0 ? H5Dopen2(file, BT_PATH(group, column_name), H5P_DEFAULT) : -1;
     if (set >= 0) {
         const hid_t space = H5Dget_space(set);
         hsize_t dims[H5S_MAX_RANK] = {0};
@@ -242,8 +239,7 @@ static void write_events(bt_h5 *h5, const table *t, const char *dir)
         bt_h5_put(h5, "/events/value", H5T_NATIVE_DOUBLE, n, 0, value, "event", NULL,
                   "tension N (line_broken), speed of the body m/s (adrift), distance along the path m (waypoint)");
     }
-    void *arrays[] = {member, time, value, subject, kind};
-    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
+    BT_FREE(member, time, value, subject, kind);
     bt_events_free(&all);
 }
 
@@ -334,11 +330,8 @@ static void release(table *t)
     }
     bt_member_notes_free(&t->warnings);
     bt_member_notes_free(&t->reasons);
-    for (int k = 0; k < t->n_columns; k++) {
-        free(t->column[k].name);
-        free(t->column[k].key);
-        free(t->column[k].value);
-    }
+    for (int k = 0; k < t->n_columns; k++)
+        BT_FREE(t->column[k].name, t->column[k].key, t->column[k].value);
     free(t->column);
 }
 

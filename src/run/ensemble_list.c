@@ -5,9 +5,6 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <jansson.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -19,11 +16,8 @@
 #include "field/field_kept.h"
 #include "output/checkpoint.h"
 #include "output/folder.h"
-#include "run/study.h"
 
 // --- the journal -----------------------------------------------------------------------------------------------------
-
-// The journal of an ensemble; reasons in bergtow/ensemble.h.
 
 #define JOURNAL "journal.jsonl"
 
@@ -48,7 +42,7 @@ void bt_ensemble_journal(const bt_ensemble *ensemble, bt_member_event event, con
                            "%s, \"exit_code\": %d}\n",
                            (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event_name[event], member->name,
                            (long)getpid(), took, code);
-    const int fd = bt_member_open(ensemble->o->dir, JOURNAL, O_WRONLY | O_CREAT | O_APPEND);
+    const int fd = bt_file_descriptor(BT_PATH(ensemble->o->dir, JOURNAL), O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
     if (write(fd, line, (size_t)n) == n) fsync(fd);
     close(fd);
@@ -58,7 +52,7 @@ void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *
 {
     bool *ended = bt_alloc((size_t)n, sizeof *ended);
     // Line by line: a journal may be longer than bt_file_read allows.
-    const int fd = bt_member_open(dir, JOURNAL, O_RDONLY);
+    const int fd = bt_file_descriptor(BT_PATH(dir, JOURNAL), O_RDONLY);
     FILE *f = fd < 0 ? NULL : fdopen(fd, "r");
     char *line = NULL;
     size_t room = 0;
@@ -161,7 +155,7 @@ static int check_member(bt_ensemble *ensemble, bt_entry *entry, bt_errors *warni
     bt_errors why = {0};
     bt_status status = bt_member_record_check(&ensemble->records, entry->index, entry->m.name, entry->folder, &why);
     if (status == BT_ERR_CASE) {
-        const int fd = bt_member_open(entry->folder, "lock", O_RDWR | O_CREAT);
+        const int fd = bt_file_descriptor(BT_PATH(entry->folder, "lock"), O_RDWR | O_CREAT);
         bool busy = false; // with a single run, as by `bergtow resume`
         const int run =
             fd >= 0 && bt_member_take_lock(fd, false) ? bt_lock_take(entry->folder, &busy, NULL) : -1;
@@ -296,8 +290,6 @@ void bt_ensemble_count_settled(bt_ensemble *ensemble)
 }
 
 // --- the report ------------------------------------------------------------------------------------------------------
-
-// Messages of an ensemble while it works and at its end.
 
 /// Remaining wall time, s; infinite without a limit.
 double bt_ensemble_wall_left(const bt_ensemble *ensemble)

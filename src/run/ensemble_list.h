@@ -3,7 +3,6 @@
 #ifndef BT_ENSEMBLE_LIST_H
 #define BT_ENSEMBLE_LIST_H
 
-#include "bergtow/base.h"
 #include "bergtow/ensemble.h"
 #include "run/ensemble_record.h"
 #include "run/study.h"
@@ -14,9 +13,6 @@
 
 /// Result folder of a member of the ensemble in dir; the caller frees it.
 char *bt_member_folder(const char *dir, const bt_member *member);
-
-/// Open folder/name; −1 and errno.
-int bt_member_open(const char *folder, const char *name, int flags);
 
 /// Lock an open file (wait: until it is free): the system releases the lock when the file is closed or the process
 /// ends, however it ends.
@@ -31,7 +27,6 @@ bool bt_member_held(const char *folder);
 /// Starts of a member without an end since its last progress: a member that has written a checkpoint is not hopeless.
 int bt_member_attempts(const char *folder);
 void bt_member_note_attempt(const char *folder);
-void bt_member_forget_attempts(const char *folder);
 
 /// Record a failure in the folder, or beside it if no file can be made there. Errors: BT_ERR_IO if both fail.
 bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err);
@@ -120,8 +115,6 @@ bt_status bt_ensemble_tell_end(bt_ensemble *ensemble, bt_status status, bt_error
 void bt_journal_strike_ended(const char *dir, int64_t repeats, int64_t n, bool *lacking);
 
 // --- the folder ------------------------------------------------------------------------------------------------------
-
-// The folder of an ensemble: the study that it holds, and the files that the study names.
 
 /// Make the folder with its resolved study and the files that the study names. BT_ERR_CASE: it belongs to another
 /// study, or a file has changed. digest: of the resolved study that the folder keeps. Called by one process only.

@@ -4,8 +4,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,11 +18,6 @@ char *bt_member_folder(const char *dir, const bt_member *member)
     return bt_text_of("%s/members/%s", dir, member->name);
 }
 
-int bt_member_open(const char *folder, const char *name, int flags)
-{
-    return bt_file_descriptor(BT_PATH(folder, name), flags);
-}
-
 bool bt_member_take_lock(int fd, bool wait)
 {
     struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
@@ -35,7 +28,7 @@ bool bt_member_take_lock(int fd, bool wait)
 
 int bt_ensemble_take_lock(const char *dir, bool wait, bt_errors *err)
 {
-    const int fd = bt_member_open(dir, "lock", O_RDWR | O_CREAT);
+    const int fd = bt_file_descriptor(BT_PATH(dir, "lock"), O_RDWR | O_CREAT);
     if (fd < 0) {
         bt_file_fail(dir, "open the lock in the folder", errno, err);
     } else if (!bt_member_take_lock(fd, wait)) {
@@ -51,7 +44,7 @@ int bt_ensemble_take_lock(const char *dir, bool wait, bt_errors *err)
 
 bool bt_member_held(const char *folder)
 {
-    const int fd = bt_member_open(folder, "lock", O_RDWR);
+    const int fd = bt_file_descriptor(BT_PATH(folder, "lock"), O_RDWR);
     if (fd < 0) return false;
     struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
     const bool held = fcntl(fd, F_OFD_GETLK, &l) == 0 && l.l_type != F_UNLCK;
@@ -74,15 +67,10 @@ int bt_member_attempts(const char *folder)
 
 void bt_member_note_attempt(const char *folder)
 {
-    const int fd = bt_member_open(folder, "attempts", O_WRONLY | O_CREAT | O_APPEND);
+    const int fd = bt_file_descriptor(BT_PATH(folder, "attempts"), O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
     if (write(fd, ".", 1) == 1) fsync(fd);
     close(fd);
-}
-
-void bt_member_forget_attempts(const char *folder)
-{
-    unlink(BT_PATH(folder, "attempts"));
 }
 
 // --- failures --------------------------------------------------------------------------------------------------------

@@ -3,9 +3,6 @@
 #include "run/ensemble_record.h"
 
 #include <inttypes.h>
-#include <jansson.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -14,12 +11,11 @@
 #include "base/checksum.h"
 #include "base/fileio.h"
 #include "base/h5dataset.h"
+#include "base/inside.h"
 #include "case/warning.h"
 #include "output/checkpoint.h"
 
 // --- notes of a member -----------------------------------------------------------------------------------------------
-
-// Warnings and reasons of members in ensemble.h5; the layout is in ensemble_record.h.
 
 static char *copied(const json_t *value)
 {
@@ -71,15 +67,9 @@ void bt_member_notes_write(bt_h5 *h5, const bt_member_notes *notes, const char *
 
 void bt_member_notes_free(bt_member_notes *notes)
 {
-    for (int64_t i = 0; i < notes->n; i++) {
-        free(notes->code[i]);
-        free(notes->text[i]);
-        free(notes->values[i]);
-    }
-    free(notes->member);
-    free(notes->code);
-    free(notes->text);
-    free(notes->values);
+    for (int64_t i = 0; i < notes->n; i++)
+        BT_FREE(notes->code[i], notes->text[i], notes->values[i]);
+    BT_FREE(notes->member, notes->code, notes->text, notes->values);
     *notes = (bt_member_notes){0};
 }
 

@@ -18,7 +18,6 @@
 
 #include <jansson.h>
 
-#include "bergtow/base.h"
 #include "bergtow/study.h"
 #include "base/h5util.h"
 

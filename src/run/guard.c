@@ -3,13 +3,10 @@
 #include "run/guard.h"
 
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
 
 #include "case/case_derived.h"
 #include "bergtow/forces.h"
 #include "output/observe.h"
-#include "bergtow/sum.h"
 #include "solve/islands.h"
 #include "space/cells.h"
 #include "partition/domain.h"
@@ -104,18 +101,11 @@ static double driven_energy(const bt_case *input, const bt_world *world, const b
 void bt_guard_begin(bt_guard *guard, const bt_case *input, const bt_world *world, const bt_roster *roster)
 {
     *guard = (bt_guard){
+        .c = input,
         .overlap = input->guard.overlap * roster->mean_size,
         .energy = input->guard.energy * driven_energy(input, world, roster),
-        .unconverged = input->guard.unconverged,
         .most_locked = input->guard.no_solution > 0 ? (int64_t)(input->guard.no_solution * (double)bt_case_steps(input))
                                                     : -1,
-        .escape_x = input->guard.escape && input->domain.ends == BT_BOUND_WALL,
-        .escape_y = input->guard.escape && input->domain.sides == BT_BOUND_WALL,
-        .open_x = input->domain.ends == BT_BOUND_OPEN,
-        .open_y = input->domain.sides == BT_BOUND_OPEN,
-        .low = {input->domain.x0, input->domain.y0},
-        .high = {input->domain.x0 + input->domain.length, input->domain.y0 + input->domain.width},
-        .closing = {input->domain.ends_closing, input->domain.sides_closing},
         .n_floes = roster->n_floes + roster->n_kept,
         .size = roster->mean_size,
         .in_a_row = guard->in_a_row,
@@ -132,14 +122,16 @@ typedef struct { double low[2], high[2]; bool wall[2], open[2]; double depth; } 
 
 static range range_of(const bt_guard *guard, const bt_world *world)
 {
-    const double time = (double)world->step * world->par.dt;
-    range limits = {.wall = {guard->escape_x, guard->escape_y}, .open = {guard->open_x, guard->open_y},
-                    .depth = WALL_SIZES * world->par.size};
-    for (int k = 0; k < 2; k++) {
-        limits.low[k] = guard->low[k] + guard->closing[k] * time;
-        limits.high[k] = guard->high[k] - guard->closing[k] * time;
-    }
-    return limits;
+    const bt_case *c = guard->c;
+    const double time = (double)world->step * world->par.dt,
+                 closed[2] = {c->domain.ends_closing * time, c->domain.sides_closing * time};
+    return (range){
+        .low = {c->domain.x0 + closed[0], c->domain.y0 + closed[1]},
+        .high = {c->domain.x0 + c->domain.length - closed[0], c->domain.y0 + c->domain.width - closed[1]},
+        .wall = {c->guard.escape && c->domain.ends == BT_BOUND_WALL,
+                 c->guard.escape && c->domain.sides == BT_BOUND_WALL},
+        .open = {c->domain.ends == BT_BOUND_OPEN, c->domain.sides == BT_BOUND_OPEN},
+        .depth = WALL_SIZES * world->par.size};
 }
 
 /// Is a place beyond a wall? A body that has left by an open edge may move around behind the walls of the other edges:
@@ -276,12 +268,11 @@ bt_status bt_guard_check(bt_guard *guard, bt_world *world, const bt_sample *samp
                       "a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
                       world->step, sample->kinetic_energy, guard->energy);
     }
-    if (guard->unconverged > 0 && guard->in_a_row >= guard->unconverged) {
+    if (guard->c->guard.unconverged > 0 && guard->in_a_row >= guard->c->guard.unconverged) {
         sound = false;
         bt_errors_add(
             err,
-            "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
-            "%s",
+            "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); %s",
             world->step, guard->in_a_row,
             sample->locked != 0
             ? "in the last, bodies are locked between others that cannot give way: " BT_LOCKED_REMEDY

@@ -49,12 +49,8 @@
 typedef struct bt_guard {
     double overlap;         ///< m
     double energy;          ///< J; state: a program's forces may have changed by the time of a checkpoint
-    int64_t unconverged;
+    const bt_case *c;
     int64_t most_locked;    ///< steps, −1 = no limit
-    bool escape_x, escape_y;///< there are walls, and they are checked
-    bool open_x, open_y;    ///< open edges
-    double low[2], high[2]; ///< of the domain at time zero, m
-    double closing[2];      ///< inward speed of the walls, m/s
     bt_gid n_floes;
     double size;            ///< mean floe size, m
     int64_t in_a_row;       ///< state: steps in a row that did not converge

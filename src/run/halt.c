@@ -3,7 +3,6 @@
 #include "run/halt.h"
 
 #include <inttypes.h>
-#include <stdio.h>
 #include <unistd.h>
 
 #include "base/fileio.h"
@@ -50,7 +49,7 @@ void bt_halt_begin(bt_halt *halt)
 {
     halt->last = bt_clock();
     halt->looked = 0;
-    if (!halt->deaf && users++ == 0) {
+    if (!halt->o->leave_signals && users++ == 0) {
         stop_signal = 0;
         bt_halt_catch(on_stop, on_save, before_all);
     }
@@ -59,28 +58,28 @@ void bt_halt_begin(bt_halt *halt)
 
 void bt_halt_end(bt_halt *halt)
 {
-    if (halt->deaf) return;
-    if (halt->stop_signal && stop_signal) *halt->stop_signal = stop_signal;
+    if (halt->o->leave_signals) return;
+    if (halt->o->stop_signal && stop_signal) *halt->o->stop_signal = stop_signal;
     if (--users == 0) bt_halt_let_go(before_all);
 }
 
 uint64_t bt_halt_look(bt_halt *halt, int64_t step)
 {
     uint64_t bits = 0;
-    if (!halt->deaf && stop_signal) bits |= UINT64_C(1) << stop_signal;
-    else if (halt->stop_signal && *halt->stop_signal) bits |= UINT64_C(1) << *halt->stop_signal;
-    if (!halt->deaf && halt->saves_seen != saves_asked) {
+    if (!halt->o->leave_signals && stop_signal) bits |= UINT64_C(1) << stop_signal;
+    else if (halt->o->stop_signal && *halt->o->stop_signal) bits |= UINT64_C(1) << *halt->o->stop_signal;
+    if (!halt->o->leave_signals && halt->saves_seen != saves_asked) {
         halt->saves_seen = saves_asked;
         bits |= save;
     }
     if (!halt->first) return bits;
     const double now = bt_clock();
-    if (halt->steps > 0 && step % halt->steps == 0) bits |= save;
-    if (halt->wall > 0 && now - halt->last >= halt->wall) bits |= save;
-    if (halt->max_wall > 0 && now - halt->started >= halt->max_wall) bits |= by_clock;
-    if (halt->dir && now - halt->looked >= LOOK_SECONDS) {
+    if (halt->c->output.checkpoint_steps > 0 && step % halt->c->output.checkpoint_steps == 0) bits |= save;
+    if (halt->c->output.checkpoint_wall > 0 && now - halt->last >= halt->c->output.checkpoint_wall) bits |= save;
+    if (halt->o->max_wall > 0 && now - halt->started >= halt->o->max_wall) bits |= by_clock;
+    if (halt->o->dir && now - halt->looked >= LOOK_SECONDS) {
         halt->looked = now;
-        if (bt_file_there(halt->dir, STOP_FILE)) bits |= by_file;
+        if (bt_file_there(halt->o->dir, STOP_FILE)) bits |= by_file;
     }
     return bits;
 }
@@ -92,8 +91,8 @@ void bt_halt_describe(const bt_halt *halt, uint64_t bits, int64_t step, char out
     const uint64_t signals = bits & (by_file - 2);
     if (signals) snprintf(out, 96, "signal %d after step %" PRId64, __builtin_ctzll(signals), step);
     else if (bits & by_file) snprintf(out, 96, "the file %s after step %" PRId64, STOP_FILE, step);
-    else snprintf(out, 96, "the limit of %g s of wall time after step %" PRId64, halt->max_wall, step);
-    if (bits & by_file && halt->first) unlink(BT_PATH(halt->dir, STOP_FILE));
+    else snprintf(out, 96, "the limit of %g s of wall time after step %" PRId64, halt->o->max_wall, step);
+    if (bits & by_file && halt->first) unlink(BT_PATH(halt->o->dir, STOP_FILE));
 }
 
 void bt_halt_block(sigset_t *before)

@@ -14,19 +14,14 @@
 #ifndef BT_HALT_H
 #define BT_HALT_H
 
-#include <signal.h>
-
-#include "bergtow/base.h"
+#include "bergtow/run.h"
 
 enum { BT_N_CAUGHT = 5 };
 
 typedef struct bt_halt {
-    int64_t steps;          ///< between checkpoints, 0 = none
-    double wall, max_wall;  ///< s between checkpoints, until the stop; 0 = none
+    const bt_case *c;       ///< when it asks for checkpoints
+    const bt_run_options *o;///< folder, longest wall time, what becomes of signals
     double started;         ///< bt_clock when the call began
-    const char *dir;        ///< NULL = none
-    volatile sig_atomic_t *stop_signal; ///< set by the caller (bergtow/run.h), or NULL
-    bool deaf;              ///< signals are left to the caller: none is caught
     bool first;             ///< this is rank 0
     // state
     double last, looked;    ///< bt_clock of the last checkpoint, of the last test for the stop file

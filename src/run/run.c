@@ -3,8 +3,6 @@
 #include "bergtow/run.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/checksum.h"
@@ -19,9 +17,6 @@
 #include "run/run_parts.h"
 
 // --- contents of a folder --------------------------------------------------------------------------------------------
-
-// The point in a result folder from which a run can resume: its last checkpoint, a named one, or the case of a run
-// killed before its first.
 
 /// Warn the user about the checkpoint in use.
 static void report(const bt_snapshot *snap, const char *said)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The state of a run besides that of its world, and the order of steps in writing and loading a checkpoint.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 

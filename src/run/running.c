@@ -6,9 +6,7 @@
 // and before the frame, so that all leave the loop after the same step; every other collective call is made with an
 // agreed status.
 #include <inttypes.h>
-#include <math.h>
 #include <omp.h>
-#include <stdlib.h>
 #include <time.h>
 
 #include "output/checkpoint.h"
@@ -249,14 +247,7 @@ bt_status bt_running_begin(bt_running *running, const bt_comm *comm, const bt_ca
 {
     *running = (run){.comm = comm, .c = input, .o = options, .reference_speed = bt_case_reference_speed(input),
                      .framed = -1, .failed = -1};
-    running->halt = (bt_halt){.steps = input->output.checkpoint_steps,
-                              .wall = input->output.checkpoint_wall,
-                              .max_wall = options->max_wall,
-                              .dir = options->dir,
-                              .stop_signal = options->stop_signal,
-                              .deaf = options->leave_signals,
-                              .first = comm->rank == 0,
-                              .started = begin->start};
+    running->halt = (bt_halt){.c = input, .o = options, .first = comm->rank == 0, .started = begin->start};
     running->until = begin->until;
     running->clocked = options->began > 0 ? options->began : begin->start;
     clock_part(running, &running->totals.call.program);
@@ -400,21 +391,6 @@ static int64_t count_outside(const run *running)
     return all;
 }
 
-/// Collective. Record how the field was divided among ranks.
-static void note_division(run *running)
-{
-    const bt_domain_stats stats = bt_domain_get_stats(running->w);
-    running->totals.divisions = stats.divisions;
-    running->totals.undivided_steps = stats.undivided;
-    running->totals.imbalance = stats.imbalance;
-    running->totals.worst_imbalance = stats.worst_imbalance;
-    running->totals.repartition_imbalance = stats.repartition_imbalance;
-    running->totals.worst_repartition_imbalance = stats.worst_repartition_imbalance;
-    running->totals.edge_cut = stats.cut;
-    running->totals.halo_share = stats.halo;
-    bt_comm_before(running->comm, stats.moved, &running->totals.moved_floes);
-}
-
 /// Collective. Peak memory of all ranks, and the bytes that a sweep reads per contact point.
 static void measure_memory(run *running)
 {
@@ -447,7 +423,9 @@ static void total_up(run *running)
     running->totals.window = running->w->window;
     running->totals.undisturbed = running->w->undisturbed;
     running->totals.splitting = running->w->splitting;
-    note_division(running);
+    bt_domain_stats *division = &running->totals.division;
+    *division = bt_domain_get_stats(running->w);
+    bt_comm_before(running->comm, division->moved, &division->moved);
 }
 
 /// Collective. Guards and deepest overlap of the state after the last step, which no further step checks. Contacts are

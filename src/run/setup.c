@@ -3,8 +3,6 @@
 #include "run/setup.h"
 #include "base/inside.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "force/drift.h"
@@ -12,7 +10,6 @@
 #include "force/exposure.h"
 #include "force/forces.h"
 #include "loads/impact.h"
-#include "tow/tow.h"
 #include "step/window.h"
 #include "contact/law.h"
 #include "geometry/polygons.h"
@@ -20,7 +17,6 @@
 #include "step/splitting.h"
 #include "case/arch.h"
 #include "case/case_tow.h"
-#include "case/case_derived.h"
 #include "base/elementary.h"
 
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
@@ -419,9 +415,7 @@ bt_track bt_setup_track(const bt_case *input, double size, double thickness, dou
 
 void bt_setup_track_free(bt_track *track)
 {
-    free((double *)track->time);
-    free((double *)track->x);
-    free((double *)track->y);
+    BT_FREE((double *)track->time, (double *)track->x, (double *)track->y);
     *track = (bt_track){0};
 }
 

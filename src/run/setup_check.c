@@ -3,9 +3,6 @@
 // meet on prescribed paths, and domains without room.
 #include "run/setup.h"
 
-#include <math.h>
-#include <stdio.h>
-
 #include "body/bodies.h"
 #include "case/case_derived.h"
 #include "case/case_tow.h"

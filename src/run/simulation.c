@@ -3,9 +3,6 @@
 // the interface: options, texts of errors, arrays by the ids of bodies.
 #include "bergtow/simulation.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -113,12 +110,7 @@ static void release(bt_simulation *sim)
 {
     bt_lock_drop(sim->dir, sim->m.lock);
     bt_case_free(&sim->c);
-    free(sim->dir);
-    free(sim->from);
-    free(sim->command_line);
-    free(sim->why);
-    free(sim->moved);
-    free(sim);
+    BT_FREE(sim->dir, sim->from, sim->command_line, sim->why, sim->moved, sim);
 }
 
 static bt_simulation *simulation_of(const bt_simulation_options *options)

@@ -3,8 +3,6 @@
 #include "bergtow/study.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -27,10 +25,8 @@ static void free_texts(char **text, int n)
 void bt_study_free(bt_study *study)
 {
     for (int i = 0; i < study->n_parameters; i++) {
-        free(study->parameter[i].name);
-        free(study->parameter[i].at);
-        free(study->parameter[i].source);
-        free(study->parameter[i].stratum);
+        BT_FREE(study->parameter[i].name, study->parameter[i].at, study->parameter[i].source,
+                study->parameter[i].stratum);
         free_texts(study->parameter[i].value, study->parameter[i].n);
     }
     for (int i = 0; i < study->n_variants; i++) {
@@ -41,11 +37,7 @@ void bt_study_free(bt_study *study)
     free(study->variant);
     free_texts(study->set, study->n_set);
     free_texts(study->set_at, study->n_set);
-    free(study->path);
-    free(study->text);
-    free(study->title);
-    free(study->base_name);
-    free(study->base);
+    BT_FREE(study->path, study->text, study->title, study->base_name, study->base);
     *study = (bt_study){0};
 }
 
@@ -221,8 +213,6 @@ char *bt_study_resolved(const bt_study *study, bt_errors *err)
 
 // --- keys that only some members get ---------------------------------------------------------------------------------
 
-// Keys that only some members get; reasons in study.h.
-
 /// List all such keys, those of parameters first; the caller frees the list.
 static bt_study_setting *study_settings(const bt_study *study, int *n)
 {
@@ -350,8 +340,6 @@ bt_status bt_study_check_ice(const bt_study *study, bt_errors *err)
 }
 
 // --- files that a study names ----------------------------------------------------------------------------------------
-
-// The files that the cases of a study name; reasons in study.h.
 
 /// Take over a path. A file that cannot be read is skipped.
 static void add(bt_study_files *files, char *path)

@@ -3,13 +3,10 @@
 #include "run/study.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/fileio.h"
 #include "base/inside.h"
-#include "base/name.h"
 #include "base/tree.h"
 #include "case/case_base.h"
 #include "case/schema.h"

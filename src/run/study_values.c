@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Values of a study: single values, lists, ranges with the distribution to draw from, and the values of a condition.
 #include <inttypes.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/elementary.h"
