@@ -139,10 +139,7 @@ class Forces:
         self._owner.update(dict.fromkeys(self.functions, self))
 
     def _register(self, name: str) -> None:
-        if name not in self._callbacks:
-            callback = _library.APPLIED_FORCE(lambda a, user: Forces._call(name, a))
-        else:
-            callback = self._callbacks[name]
+        callback = self._callbacks.get(name) or _library.APPLIED_FORCE(lambda a, user: Forces._call(name, a))
         function = self.functions[name]
         doc = ((function.__doc__ or "").strip().splitlines() or [""])[0].rstrip(".")
         self._apply(name, callback, doc if len(doc) >= 8 else f"force {name} of a Python program")

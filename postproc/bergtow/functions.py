@@ -65,10 +65,6 @@ def _words(options: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _forced(replace: bool) -> list[str]:
-    return ["--force"] * replace
-
-
 def _perform(command: str, *words: str | os.PathLike[str]) -> None:
     from . import cli  # imported here because cli needs the functions of this module
     from .cli import missing_packages
@@ -117,10 +113,14 @@ class Picture:
         return self._data("png")
 
 
-def _picture(command: str, options: Mapping[str, Any], *arguments: str | os.PathLike[str]) -> Picture:
-    picture = Picture(lambda path: _call(command, *arguments, "-o", path, "--force", *_words(options)))
+def _drawn(draw: Callable[[Path], Any]) -> Picture:
+    picture = Picture(draw)
     picture._repr_png_()  # errors in drawing show up now
     return picture
+
+
+def _picture(command: str, options: Mapping[str, Any], *arguments: str | os.PathLike[str]) -> Picture:
+    return _drawn(lambda path: _call(command, *arguments, "-o", path, "--force", *_words(options)))
 
 
 def plot_force(run: Of, **options: Any) -> Picture:
@@ -185,7 +185,7 @@ def report(of: Of, file: str | os.PathLike[str] | None = None, *, replace: bool 
     .pdf; by default report.html in the folder. replace: overwrite a file even if it is not a report of bergtow.
     options: those of bergtow report, such as client="...", size=20."""
     path = Path(file) if file is not None else Path(_folder(of)) / "report.html"
-    _call("report", _folder(of), "-o", path, *_forced(replace), *_words(options))
+    _call("report", _folder(of), "-o", path, *["--force"] * replace, *_words(options))
     return path
 
 
@@ -205,9 +205,7 @@ class Outlines:
             with tempfile.TemporaryDirectory() as there:
                 _call("outlines", self.map, "-o", Path(there) / "x.geojson", "--picture", path, "--force",
                       *self._options)
-        drawn = Picture(draw)
-        drawn._repr_png_()
-        return drawn
+        return _drawn(draw)
 
     def __repr__(self) -> str:
         return f"<bergtow.Outlines {self.file}>"
@@ -233,7 +231,7 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
     words = _words(known)
     with tempfile.TemporaryDirectory() as there:
         record = Path(there) / "record.json"
-        text = _call("outlines", map, "-o", file, "--record", record, *_forced(replace), *words)
+        text = _call("outlines", map, "-o", file, "--record", record, *["--force"] * replace, *words)
         text = text.replace(f"{record}\n", "")
         return Outlines(map, file, json.loads(record.read_text(encoding="utf-8")), text, words)
 
@@ -242,13 +240,13 @@ def export(run: Of, file: str | os.PathLike[str], *, replace: bool = False, **op
     """Write floes, tracks and loads of a run for use on a map, and return the file's path. run: a folder or Result.
     file: .gpkg, .geojson or .shp (all but .geojson need GDAL), or .csv or .nc for trajectories. options: those of
     `bergtow export`, such as time=600, layer="tracks", start="2027-03-01"."""
-    _call("export", _folder(run), "-o", file, *_forced(replace), *_words(options))
+    _call("export", _folder(run), "-o", file, *["--force"] * replace, *_words(options))
     return Path(file)
 
 
 def _found(command: str, file: str | os.PathLike[str], out: str | os.PathLike[str], replace: bool,
            options: Mapping[str, Any], name: str | None = None) -> dict[str, Any]:
-    _perform(command, file, "-o", out, *_forced(replace), *_words(options))
+    _perform(command, file, "-o", out, *["--force"] * replace, *_words(options))
     return json.loads((Path(out) / f"{name or command}.json").read_text(encoding="utf-8"))
 
 

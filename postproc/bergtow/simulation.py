@@ -107,22 +107,17 @@ class Simulation:
             with held():
                 getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o))
                 self._address = address
-            self._look(case)
+            self._case = case
+            self._resolved = _library.take_text(self._library.bt_simulation_case(address))
+            towed = self._library.bt_simulation_towed(address)
+            self.has_towed: bool = towed >= 0
+            self._towed = towed if self.has_towed else None
+            self.n_bodies: int = self._library.bt_simulation_bodies(address)
+            self.dt: float = self._library.bt_simulation_dt(address)
         except BaseException:
             self.drop()
             self._forces.release()
             raise
-
-    def _look(self, case: Case | None) -> None:
-        """Read the properties that stay constant."""
-        address = self._s
-        self._case = case
-        self._resolved = _library.take_text(self._library.bt_simulation_case(address))
-        towed = self._library.bt_simulation_towed(address)
-        self.has_towed: bool = towed >= 0
-        self._towed = towed if self.has_towed else None
-        self.n_bodies: int = self._library.bt_simulation_bodies(address)
-        self.dt: float = self._library.bt_simulation_dt(address)
 
     @property
     def _s(self) -> c_void_p:

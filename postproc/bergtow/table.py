@@ -34,6 +34,12 @@ def change(x):
     return "–" if x is None else f"{100 * x:+.1f} %"
 
 
+def span(values, text="{:.3g}".format, key=None):
+    """"5 to 17": the least and the largest of some values; one of them if they are equal."""
+    low, high = min(values, key=key), max(values, key=key)
+    return text(low) if low == high else f"{text(low)} to {text(high)}"
+
+
 class Table(NamedTuple):
     """A head and rows of texts; by: the column whose equal cells are merged on a page."""
     head: list

@@ -19,10 +19,14 @@ PRESSED = changed(TOW, domain={"length": 15, "width": 8, "ends_closing": 0.15}, 
                   ice__rafting={"kappa": 5}, run__duration=15)
 
 
+def area_of(p):
+    return rafted.areas(p[None], np.array([len(p)]))[0]
+
+
 @pytest.mark.parametrize("shift, area", [((1, 0.5), 1.5), ((3, 0), 0), ((0, 0), 4), ((-1.5, -1.5), 0.25)])
 def test_two_squares(shift, area):
     found = rafted.overlaps([SQUARE, SQUARE + shift])
-    assert len(found) == (area > 0) and np.isclose(sum(map(rafted.area, found)), area, atol=1e-12)
+    assert len(found) == (area > 0) and np.isclose(sum(map(area_of, found)), area, atol=1e-12)
 
 
 def polygons(n, seed):
@@ -44,7 +48,7 @@ def test_many_at_a_time_are_what_shapely_finds(monkeypatch):
     shapes = [shapely.Polygon(p) for p in some]
     areas = [a.intersection(b).area for k, a in enumerate(shapes) for b in shapes[k + 1:]
              if a.intersection(b).area > rafted.LEAST * min(a.area, b.area)]
-    found = [rafted.area(p) for p in rafted.overlaps(some)]
+    found = [area_of(p) for p in rafted.overlaps(some)]
     assert len(areas) > 1000 and np.allclose(found, areas, rtol=1e-6, atol=1e-8)
 
 
@@ -61,7 +65,7 @@ def test_a_run(tmp_path):
     outlines = [placed(v[o[i]:o[i + 1]], pose[i]) for i in range(len(pose))]
     longest = max(map(len, outlines))  # others are filled up, as in Run.polygon_array
     found = rafted.overlaps([[*p, *[p[-1]] * (longest - len(p))] for p in outlines])
-    total = sum(map(rafted.area, found))
+    total = sum(map(area_of, found))
     assert np.isclose(total, r.summary["rafted_area_m2"], rtol=0.05), (total, r.summary["rafted_area_m2"])
     with Reader(r.dir) as reader:
         figure = plot_field.draw(reader)

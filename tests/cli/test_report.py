@@ -437,8 +437,9 @@ def test_floes_over_each_other_are_shown(chrome, tmp_path, monkeypatch):
     seek(chrome, last)
     chrome.find_element("id", "replay-fit").click()
     assert len(over) > 3
-    assert js(chrome, "return bergtow.overlap") == pytest.approx(sum(map(rafted.area, over)), rel=0.01)
-    middle = max(over, key=rafted.area).mean(axis=0)
+    areas = [rafted.areas(p[None], np.array([len(p)]))[0] for p in over]
+    assert js(chrome, "return bergtow.overlap") == pytest.approx(sum(areas), rel=0.01)
+    middle = over[np.argmax(areas)].mean(axis=0)
     shade = js(chrome, """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth;
         const [x, y] = bergtow.screen(0), p = bergtow.pose(0), m = bergtow.metre;
         const at = [x + m * (arguments[0] - p[0]), y - m * (arguments[1] - p[1])];

@@ -15,10 +15,10 @@ Trajectories: discrete sampling geometry of CF-1.8, in the classic NetCDF format
 import argparse
 import csv
 import datetime
-import math
 import re
 import shutil
 import tempfile
+from collections import namedtuple
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,10 +74,6 @@ class Place:
     def degrees(self):
         return self.crs == map_plane.WGS84
 
-    @property
-    def frame(self):
-        return "geographic" if self.geographic else "basin"
-
     def metres(self, xy):
         """East and north [..., 2], from x = y = 0, of positions in the frame of the case."""
         return xy[..., ::-1] if self.geographic else xy
@@ -114,14 +110,9 @@ class Place:
 # ---- exported quantities
 
 
-@dataclass
-class Layer:
-    """Features of one kind."""
-
-    name: str
-    geometry: str   #: "Polygon", "LineString" or "Point"
-    columns: dict   #: {name: (unit or "", values [n])}
-    places: list    #: [n] of [k, 2] m, in the frame of the case
+#: geometry: "Polygon", "LineString" or "Point"; columns: {name: (unit or "", values [n])}; places: [n] of [k, 2] m, in
+#: the frame of the case
+Layer = namedtuple("Layer", "name geometry columns places")
 
 
 def _iceberg(run, frame):
@@ -153,15 +144,12 @@ def _about(run, frame):
 
 
 def floes_layer(run, frames):
-    """The floes that exist at the frames."""
-    places, index, at = [], [], []
+    places, index = [], []
     for frame in frames:
-        there = np.flatnonzero(np.isfinite(run.pose(frame)).all(axis=1))
+        index.append(np.flatnonzero(np.isfinite(run.pose(frame)).all(axis=1)))
         rings = run.polygons(frame, _about(run, frame))
-        places += [rings[i] for i in there]
-        index.append(there)
-        at.append(np.full(len(there), frame))
-    index, at = np.concatenate(index), np.concatenate(at)
+        places += [rings[i] for i in index[-1]]
+    at, index = np.repeat(frames, list(map(len, index))), np.concatenate(index)
 
     def of(values):
         return np.concatenate([values(f)[index[at == f]] for f in frames])
@@ -185,20 +173,14 @@ def bodies_layer(run, frames):
 
 def tracks_layer(run, _):
     """Tracks of the iceberg, the towing end and the vessel over the whole run."""
-    names, places, columns = [], [], []
-    for name, x, y in TRACKS:
-        if x not in run:
-            continue
-        xy = np.column_stack([run[x], run[y]])
-        there = np.isfinite(xy).all(axis=1)
-        if there.sum() > 1:
-            names.append(name)
-            places.append(xy[there])
-            time = run["time"][there]
-            columns.append((time[0], time[-1], np.hypot(*np.diff(xy[there], axis=0).T).sum()))
-    start, end, length = np.array(columns).reshape(-1, 3).T
-    return Layer("tracks", "LineString", {"name": ("", names), "start_s": ("s", start), "end_s": ("s", end),
-                                          "length_m": ("m", length)}, places)
+    some = {name: np.column_stack([run["time"], run[x], run[y]]) for name, x, y in TRACKS if x in run}
+    some = {name: rows[np.isfinite(rows[:, 1:]).all(axis=1)] for name, rows in some.items()}
+    some = {name: rows for name, rows in some.items() if len(rows) > 1}
+    lengths = [np.hypot(*np.diff(rows[:, 1:], axis=0).T).sum() for rows in some.values()]
+    start, end = (np.array([rows[k, 0] for rows in some.values()]) for k in (0, -1))
+    return Layer("tracks", "LineString", {
+        "name": ("", list(some)), "start_s": ("s", start), "end_s": ("s", end), "length_m": ("m", np.array(lengths))},
+        [rows[:, 1:] for rows in some.values()])
 
 
 def loads_layer(run, _):
@@ -214,41 +196,34 @@ def loads_layer(run, _):
 MAKE = {"floes": floes_layer, "bodies": bodies_layer, "tracks": tracks_layer, "loads": loads_layer}
 
 
-@dataclass
-class Trajectories:
-    """Positions of everything in the frames, [n, T]; NaN where an object does not exist."""
+#: of everything in the frames, NaN where an object does not exist. name [n]: "floe 17", "iceberg", "towing end",
+#: "vessel"; time [T] s; xy [n, T, 2] m, in the frame of the case; speed [n, T] m/s; thickness [n] m, NaN except for
+#: floes
+Trajectories = namedtuple("Trajectories", "name time xy speed thickness")
 
-    name: list            #: [n]: "floe 17", "iceberg", "towing end", "vessel"
-    time: np.ndarray      #: [T] s
-    xy: np.ndarray        #: [n, T, 2] m, in the frame of the case
-    speed: np.ndarray     #: [n, T] m/s
-    thickness: np.ndarray  #: [n] m, NaN except for floes
 
-    @staticmethod
-    def of(run, frames):
-        time = run.frame_times[frames]
-        xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
-        speed = np.stack([run.speed(f) for f in frames], axis=1)
-        piece = _pieces(xy, np.array(run.period))
-        rows = []
-        for i in range(run.n_floes):
-            for k in range(piece[i].max() + 1):
-                at = (piece[i] == k) & np.isfinite(xy[i]).all(axis=1)
-                if at.any():
-                    rows.append((f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
-                                 np.where(at, speed[i], np.nan), run.thickness[i]))
-        for name, x, y in TRACKS:
-            if x in run and np.isfinite(run[x]).any():
-                if name == "iceberg":
-                    way = np.array([_iceberg(run, f) for f in frames])
-                else:
-                    way = np.array([_led(run, f, (x, y)) for f in frames])
-                speeds = [run.body_speed(f)[run.towed] if name == "iceberg" else np.nan for f in frames]
-                rows.append((name, way, np.array(speeds), np.nan))
-        if not rows:
-            raise RunError(run.result, "holds nothing that moves", "export a run with floes or a towed body")
-        names, *columns = zip(*rows)
-        return Trajectories(list(names), time, *map(np.array, columns))
+def trajectories(run, frames):
+    """Raises RunError."""
+    xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
+    speed = np.stack([run.speed(f) for f in frames], axis=1)
+    piece = _pieces(xy, np.array(run.period))
+    rows = []
+    for i in range(run.n_floes):
+        for k in range(piece[i].max() + 1):
+            at = (piece[i] == k) & np.isfinite(xy[i]).all(axis=1)
+            if at.any():
+                rows.append((f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
+                             np.where(at, speed[i], np.nan), run.thickness[i]))
+    for name, x, y in TRACKS:
+        if x in run and np.isfinite(run[x]).any():
+            berg = name == "iceberg"
+            way = [_iceberg(run, f) if berg else _led(run, f, (x, y)) for f in frames]
+            speeds = [run.body_speed(f)[run.towed] if berg else np.nan for f in frames]
+            rows.append((name, np.array(way), np.array(speeds), np.nan))
+    if not rows:
+        raise RunError(run.result, "holds nothing that moves", "export a run with floes or a towed body")
+    names, *columns = zip(*rows)
+    return Trajectories(list(names), run.frame_times[frames], *map(np.array, columns))
 
 
 def _pieces(xy, period):
@@ -270,7 +245,8 @@ def _rows(layer):
 
 def geojson(layer, place):
     """The text, with the head that `bergtow outlines` and `bergtow field` write: frame and origin for ice.outlines."""
-    head = {"bergtow": {"origin": list(place.zero)} | ({} if place.crs else {"frame": place.frame})}
+    head = {"bergtow": {"origin": list(place.zero)} | ({} if place.crs else {
+        "frame": "geographic" if place.geographic else "basin"})}
     if not place.degrees:
         head["crs"] = {"type": "name", "properties": {"name": place.crs or map_read.local_crs()}}
     lines = []
@@ -415,9 +391,6 @@ def dataset(t, place, start, title):
          "source": "bergtow, discrete element model", "made_by": writing.MARK, "comment": place.words})
 
 
-# ---- the command
-
-
 def moment(text):
     """Read --time: "all", "last" or a time in s."""
     if text in ("all", "last"):
@@ -440,10 +413,9 @@ def options(p):
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="file to write: .gpkg, .geojson, "
                    ".shp, or trajectories of everything as .csv or .nc (CF-1.8)")
     p.add_argument("--time", metavar="T", type=moment, help="write floes and bodies at the frame nearest to T "
-                                                            "seconds, at "
-                   "the last frame, or at all (default: last; all for trajectories)")
+                   "seconds, at the last frame, or at all (default: last; all for trajectories)")
     p.add_argument("--layer", choices=LAYERS, help="layer to write (default: all in a .gpkg, floes in a .geojson or "
-                                                   ".shp)")
+                   ".shp)")
     p.add_argument("--start", metavar="DATE", type=date, help="UTC date at time zero, for a .nc: 2027-03-01T06:00 "
                    "(default: 1970, marked as assumed)")
     arguments.add_force(p)
@@ -452,8 +424,8 @@ def options(p):
 def perform(a):
     path, kind = a.output, a.output.suffix.lower()
     arguments.ends_in(path, tuple(DEFAULT))
-    trajectories = kind in TRAJECTORIES
-    if a.layer and trajectories:
+    of_all = kind in TRAJECTORIES
+    if a.layer and of_all:
         raise BergtowError(f"--layer: {kind} holds trajectories; leave it out, or write a .gpkg, .geojson or .shp",
                            USAGE)
     if a.start and kind != ".nc":
@@ -466,11 +438,11 @@ def perform(a):
     with Run(a.run) as run:
         place = Place.of(run)
         names = (a.layer,) if a.layer else DEFAULT[kind]
-        framed = trajectories or a.time is not None or not FRAMED.isdisjoint(names)
-        time = ("all" if trajectories else "last") if a.time is None else a.time
+        framed = of_all or a.time is not None or not FRAMED.isdisjoint(names)
+        time = ("all" if of_all else "last") if a.time is None else a.time
         frames = frames_of(run, time) if framed else []
-        if trajectories:
-            t = Trajectories.of(run, frames)
+        if of_all:
+            t = trajectories(run, frames)
             if kind == ".csv":
                 write_table(t, place, path, a.force)
             else:
@@ -496,7 +468,7 @@ def perform(a):
 
 def frames_of(run, time):
     """Indices of the frames. Raises RunError; BergtowError for a time beyond the last frame."""
-    last = run.frame_at(math.inf if time == "last" else 0.0 if time == "all" else time)
+    run.need_frames()
     if time == "all":
         return list(range(run.n_frames))
     if time == "last":
@@ -504,7 +476,7 @@ def frames_of(run, time):
     if not run.frame_times[0] <= time <= run.frame_times[-1]:
         raise BergtowError(f"--time: {times_text(time)} is outside the frames, "
                            f"{times_text(run.frame_times[0], run.frame_times[-1])}", USAGE)
-    return [last]
+    return [run.frame_at(time)]
 
 
 def _write(layers, place, path, kind, force):

@@ -84,8 +84,8 @@ def options(p):
     p.add_argument("--footprint", metavar="X,Y,X,Y,...", type=corners, help="corners of the imaged area, as columns "
                    "and rows of the image from its upper left; the area around it was not seen")
     p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
-    p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, for an image without a "
-                                                                  "georeference")
+    p.add_argument("--pixel", metavar="LENGTH", type=metres,
+                   help="size of a pixel, for an image without a georeference")
     p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="keep only floes whose middle lies in this "
                    "rectangle about the centre, along x and y of the case")
     p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out floes that reach into this "
@@ -105,12 +105,11 @@ def options(p):
 
 def check_files(a):
     """Check, before any work, the file names and whether the files may be written."""
-    arguments.ends_in(a.output, (".geojson", ".json"))
-    if a.record:
-        arguments.ends_in(a.record, (".json",))
-    if a.picture:
-        arguments.ends_in(a.picture, writing.PICTURES)
-    written = [f for f in (a.output, a.record, a.picture) if f]
+    kinds = (a.output, (".geojson", ".json")), (a.record, (".json",)), (a.picture, writing.PICTURES)
+    for file, allowed in kinds:
+        if file:
+            arguments.ends_in(file, allowed)
+    written = [file for file, _ in kinds if file]
     if len({f.resolve() for f in [a.map, *written]}) <= len(written):
         raise BergtowError("the map and the files to write need different names", USAGE)
     for file in written:
@@ -230,12 +229,10 @@ def perform(a):
     farthest = _library.limit("map_farthest_m")
     if distortion["farthest_m"] > farthest:
         raise RunError(found.path, f"has floes {distortion['farthest_m'] / 1e3:.4g} km from the centre; bergtow allows "
-                       f"{farthest / 1e3:g} km",
-                       "choose part of it with --box or --where, or set --centre")
+                       f"{farthest / 1e3:g} km", "choose part of it with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:
         raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m on average, as degrees look in "
-                       "metres",
-                       "say its crs: --crs EPSG:4326")
+                       "metres", "say its crs: --crs EPSG:4326")
     say("\n".join(map_text.plane_lines(plane, distortion, bend)))
     say(f"tolerance: {map_text.length(rules.tolerance)}")
     say("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))

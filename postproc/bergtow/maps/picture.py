@@ -7,27 +7,21 @@ from bergtow.plot import style
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-GONE = style.JAM
-
-
-def rings(geometries):
-    return [np.asarray(p.exterior.coords)[:, :2] for g in geometries for p in parts_of(g)]
-
-
 @style.look()
 def draw(found, floes, rules, plane, path, force):
     """Left: the map in the plane. Right: the floes on the map, with the parts left out or cut away in red."""
-    x0, y0, x1, y1 = bounds_of([s.geometry for s in found.shapes])
+    bounds = np.array([s.geometry.bounds for s in found.shapes])
+    (x0, y0), (x1, y1) = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
     scale, unit = style.scale([x1 - x0, y1 - y0], "m")
     ratio = min(1.6, max(0.4, (y1 - y0) / (x1 - x0)))
     figure, panels = style.subplots(1, 2, figsize=(12, 5.2 * ratio + 1.6), sharex=True, sharey=True)
-    before = PolyCollection([r / scale for r in rings(s.geometry for s in found.shapes)], facecolor="#bcd7e8",
-                            edgecolor=style.WATER, linewidth=0.4)
-    panels[0].add_collection(before)
-    panels[1].add_collection(PolyCollection([r / scale for r in rings(s.geometry for s in found.shapes)],
-                                            facecolor=GONE, edgecolor="none"))
-    panels[1].add_collection(PolyCollection([r / scale for r in rings(f.polygon for f in floes)], facecolor="#eaf3f8",
-                                            edgecolor=style.WATER, linewidth=0.4))
+    before, after = ([np.asarray(p.exterior.coords)[:, :2] / scale for g in some for p in parts_of(g)]
+                     for some in ([s.geometry for s in found.shapes], [f.polygon for f in floes]))
+    edge = {"edgecolor": style.WATER, "linewidth": 0.4}
+    for axes, shapes, look in ((panels[0], before, {"facecolor": "#bcd7e8"} | edge),
+                               (panels[1], before, {"facecolor": style.JAM, "edgecolor": "none"}),
+                               (panels[1], after, {"facecolor": "#eaf3f8"} | edge)):
+        axes.add_collection(PolyCollection(shapes, **look))
     frame(panels[1], rules, scale)
     for axes, words in zip(panels, (f"as read: {len(found.shapes)} shapes", f"as written: {len(floes)} floes; red was "
                                     "left out")):
@@ -39,11 +33,6 @@ def draw(found, floes, rules, plane, path, force):
     figure.subplots_adjust(left=0.07, right=0.985, bottom=0.6 / figure.get_figheight(), wspace=0.06,
                            top=1 - 1.0 / figure.get_figheight())
     writing.save(figure, path, force)
-
-
-def bounds_of(geometries):
-    bounds = np.array([g.bounds for g in geometries])
-    return (*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0))
 
 
 def names(plane):

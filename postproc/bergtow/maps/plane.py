@@ -175,7 +175,7 @@ class Plane:
             where = "lies about latitude {1:.4g}, longitude {0:.4g}, where there is no sea ice".format(*plane.centre)
             raise RunError(found.path, where,
                            "swap the coordinates if latitude comes first, or give the place with --centre")
-        plane._aeqd = about(plane.centre)
+        plane._aeqd = pyproj.Proj(proj="aeqd", lon_0=plane.centre[0], lat_0=plane.centre[1], datum="WGS84", units="m")
         return plane
 
     def _prepare(self, found, xy):
@@ -245,10 +245,6 @@ class Plane:
             f = pyproj.Proj(self.crs).get_factors(*there.T)
             out["map_scale"] = [float(f.tissot_semiminor.min()), float(f.tissot_semimajor.max())]
         return out
-
-
-def about(centre):
-    return pyproj.Proj(proj="aeqd", lon_0=centre[0], lat_0=centre[1], datum="WGS84", units="m")
 
 
 def middle(lonlat):

@@ -51,8 +51,6 @@ def local_crs():
 
 @dataclass
 class Reading:
-    """How to read a file if there is a choice."""
-
     layer: str = None
     where: str = None
     thickness: str = None   #: name of a column; of an image, "VALUE=M,..."
@@ -81,8 +79,6 @@ class Shape:
 
 @dataclass
 class Map:
-    """The contents of a file."""
-
     path: Path
     crs: str                    #: WKT or a name, local_crs(), or None if the file gives no crs
     shapes: list

@@ -60,7 +60,6 @@ def plane_lines(plane, distortion, bend):
 
 
 def change_lines(book):
-    """One line for each kind of change."""
     lines = []
     for kind in (k for k in KINDS if k in book):
         c = book[kind]
@@ -82,15 +81,13 @@ def numbers(floes, rectangle, concentration, refers_to, share):
     size = np.sqrt(4 * areas / np.pi)
     convex = sum(f.polygon.convex_hull.area <= f.polygon.area * (1 + 1e-9) for f in floes)
     thick = np.array([f.thickness for f in floes if f.thickness is not None])
-    out = {
+    return {
         "floes": len(floes), "area_m2": areas.sum(), "mean_size_m": size.mean(), "sizes_m": dict(zip(
             ("least", "q10", "q25", "median", "q75", "q90", "largest"),
             np.quantile(size, (0, .1, .25, .5, .75, .9, 1)))),
         "size_spread": size.std() / size.mean(), "rectangle_m": list(rectangle), "imaged_share": share,
         "concentration": concentration, "refers_to": refers_to, "convex": convex, "with_thickness": len(thick),
-        "mean_thickness_m": thick.mean() if len(thick) else None, "distribution": distribution(size, areas),
-    }
-    return out
+        "mean_thickness_m": thick.mean() if len(thick) else None, "distribution": distribution(size, areas)}
 
 
 def distribution(size, areas):
@@ -143,7 +140,6 @@ def case_lines(path, numbers, heading, margin, latitude=None):
 
 
 def record(found, plane, crs, distortion, bend, book, rules, floes):
-    """Everything as one dict for JSON."""
     return {
         "map": {"file": str(found.path), "crs": name_of(crs), "says_of_itself": found.about or None,
                 "shapes": len(found.shapes)},
@@ -154,5 +150,4 @@ def record(found, plane, crs, distortion, bend, book, rules, floes):
         "changes": {kind: {"what": KINDS[kind], "count": c.count, "area_before_m2": c.before,
                            "area_after_m2": c.after, "largest_relative": c.largest, "first": c.names}
                     for kind, c in book.items()},
-        "floes": floes,
-    }
+        "floes": floes}

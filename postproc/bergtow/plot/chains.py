@@ -25,8 +25,6 @@ DECADES = 2.5  # decades below the largest force for which lines are drawn
 
 @dataclass
 class Contacts:
-    """Contacts of one step."""
-
     time: float          #: s
     body: np.ndarray     #: [n, 2] ids
     normal: np.ndarray   #: [n, 2]
@@ -86,10 +84,8 @@ def segments(run, c):
 def outlines(run, c):
     """Floes and bodies at the end of the step: two lists of [n, 2] m."""
     pose = c.pose.copy()
-    pose[:run.n_floes, :2] = run.wrap(pose[:run.n_floes, :2])
-    for k, b in enumerate(run.bodies):
-        if b.towed:
-            pose[run.n_floes + k, :2] = run.wrap(pose[run.n_floes + k:run.n_floes + k + 1, :2])[0]
+    moves = [*range(run.n_floes), *(run.n_floes + k for k, b in enumerate(run.bodies) if b.towed)]
+    pose[moves, :2] = run.wrap(pose[moves, :2])
     floes = [place(run.vertices[a:b], p) for a, b, p in zip(run.offsets[:-1], run.offsets[1:], pose)
              if np.isfinite(p[0])]
     bodies = [place(b.vertices, p) for b, p in zip(run.bodies, pose[run.n_floes:])]
@@ -99,13 +95,13 @@ def outlines(run, c):
 def with_images(run, shapes):
     """(copies of shapes [n, 2] m, the index of each) that reach into the domain: a shape that crosses a periodic end
     also appears at the other."""
-    (x0, x1, y0, y1), (px, py) = run.box, run.period
+    x0, x1, y0, y1 = run.box
     out, which = [], []
-    for shift in ((i * px, j * py) for i in ((-1, 0, 1) if px else (0,)) for j in ((-1, 0, 1) if py else (0,))):
+    for shift in run.images:
         for k, shape in enumerate(shapes):
-            low, high = (np.asarray(shape) + shift).min(axis=0), (np.asarray(shape) + shift).max(axis=0)
-            if not any(shift) or (high >= (x0, y0)).all() and (low <= (x1, y1)).all():
-                out.append(np.asarray(shape) + shift)
+            moved = np.asarray(shape) + shift
+            if not shift.any() or (moved.max(axis=0) >= (x0, y0)).all() and (moved.min(axis=0) <= (x1, y1)).all():
+                out.append(moved)
                 which.append(k)
     return out, np.array(which, dtype=int)
 
@@ -114,8 +110,7 @@ def view(run, lines, bodies, whole):
     """(x0, x1, y0, y1) m: the domain, or the part of it around the towed body and the forces, with a margin of a tenth
     of its shorter side."""
     x0, x1, y0, y1 = run.box
-    points = [lines.reshape(-1, 2)] + ([bodies[run.towed]] if run.towed is not None else [])
-    points = np.concatenate(points)
+    points = np.concatenate([lines.reshape(-1, 2)] + ([bodies[run.towed]] if run.towed is not None else []))
     if whole or not len(points):
         return run.box
     margin = 0.1 * min(x1 - x0, y1 - y0)
@@ -138,7 +133,6 @@ def joined(run, c):
 
 
 def draw(run, c, whole=False):
-    """The figure."""
     c = joined(run, c)
     lines, force = segments(run, c)
     floes, bodies = outlines(run, c)
@@ -149,41 +143,32 @@ def draw(run, c, whole=False):
     figure = style.Figure(figsize=(width, height))
     axes = figure.add_axes((0.7 / width, 0.6 / height, (width - 2.1) / width, (height - 1.5) / height))
     axes.set_facecolor(style.WATER)
-    axes.add_collection(
-        PolyCollection([run.on_page(p) for p in with_images(run, floes)[0]], facecolor="#dfe9ef", edgecolor="#8fa3b3",
-                       linewidth=0.5))
+    axes.add_collection(PolyCollection([run.on_page(p) for p in with_images(run, floes)[0]], facecolor="#dfe9ef",
+                                       edgecolor="#8fa3b3", linewidth=0.5))
     for shape, k in zip(*with_images(run, bodies)):
         body = run.bodies[k]
         colour = style.BODY if body.towed else style.WALL if body.wall else style.FIXED
-        axes.add_collection(
-            PolyCollection([run.on_page(shape)], facecolor=colour, edgecolor=style.BODY_EDGE if body.towed else colour,
-                           linewidth=0.8, zorder=2))
+        axes.add_collection(PolyCollection([run.on_page(shape)], facecolor=colour, linewidth=0.8, zorder=2,
+                                           edgecolor=style.BODY_EDGE if body.towed else colour))
     top = force.max(initial=0.0)
     if top > 0:
         lines, which = with_images(run, lines)
         lines, force = np.array(lines), force[which]
-        order = np.argsort(force)
-        lines, force = lines[order], force[order]
         least = top * 10 ** -DECADES
-        seen = force >= least
-        widths = WIDEST * np.maximum(force[seen] / top, 1e-12) ** 0.5
-        drawn = LineCollection(run.on_page(lines[seen]), array=force[seen], cmap=style.FORCE_MAP,
-                               norm=LogNorm(least, top), linewidths=np.maximum(widths, 0.4), capstyle="round", zorder=3)
+        seen = [k for k in np.argsort(force) if force[k] >= least]
+        lines, force = lines[seen], force[seen]
+        drawn = LineCollection(run.on_page(lines), array=force, cmap=style.FORCE_MAP, norm=LogNorm(least, top),
+                               linewidths=np.maximum(WIDEST * (force / top) ** 0.5, 0.4), capstyle="round", zorder=3)
         axes.add_collection(drawn)
         factor, unit = style.scale([top], "N")
-        bar = figure.colorbar(drawn,
-                              cax=figure.add_axes(
-                                  ((width - 1.15) / width, 0.6 / height, 0.16 / width, (height - 1.5) / height)),
-                              format=lambda v, _: f"{v / factor:g}")
-        bar.set_label(f"impulse / time step ({unit})")
+        bar = figure.add_axes(((width - 1.15) / width, 0.6 / height, 0.16 / width, (height - 1.5) / height))
+        figure.colorbar(drawn, cax=bar, format=lambda v, _: f"{v / factor:g}", label=f"impulse / time step ({unit})")
     axes.set_aspect("equal")
     low, high = run.on_page([[x0, y0], [x1, y1]])
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="y, east (m)" if run.geographic else "x (m)",
              ylabel="x, north (m)" if run.geographic else "y (m)")
-    words = (
-        f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the force, "
-        f"none below {10 ** -DECADES:.1g} of the largest"
-        if top > 0 else "no contact bears a force")
+    words = (f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the "
+             f"force, none below {10 ** -DECADES:.1g} of the largest" if top > 0 else "no contact bears a force")
     figure.text(0.02, 1 - 0.14 / height, f"{style.title(run)}: force chains at {c.time:g} s", va="top", fontsize=13.5,
                 fontweight="bold")
     figure.text(0.02, 1 - 0.42 / height, f"{style.conditions(run)}\n{words}", va="top", fontsize=10, color=style.FAINT)
@@ -192,14 +177,8 @@ def draw(run, c, whole=False):
 
 def options(p):
     p.add_argument("run", metavar="RUN", help="output folder of a run")
-    p.add_argument(
-        "contacts",
-        metavar="FILE.h5",
-        type=Path,
-        help=
-        "the file that --dump-contacts STEP:FILE.h5 of that run wrote; without one, bergtow plot-field --colour force "
-        "shows the largest force on each floe"
-    )
+    p.add_argument("contacts", metavar="FILE.h5", type=Path, help="the file that --dump-contacts STEP:FILE.h5 of that "
+                   "run wrote; without one, bergtow plot-field --colour force shows the largest force on each floe")
     p.add_argument("-o", "--output", metavar="FILE", type=Path, help="file to write (default: RUN/chains.png)")
     p.add_argument("--whole", action="store_true",
                    help="draw the whole domain (default: the part with the towed body and the forces)")

@@ -42,12 +42,11 @@ def draw_map(e, first, second):
     most = 1
     for i, v in enumerate(ys):
         for j, u in enumerate(xs):
-            cell = [dict(zip(e.seed[c.finished].tolist(), e.mean[c.finished])) for c in conditions
-                    if c.values[first] == u and c.values[second] == v]
-            least[i, j] = any(e.without_bound(c.members) for c in conditions
-                              if c.values[first] == u and c.values[second] == v)
+            cell = [c for c in conditions if c.values[first] == u and c.values[second] == v]
+            least[i, j] = any(e.without_bound(c.members) for c in cell)
             if cell:
-                mean[i, j], low, high = stat_mean.mean_of_conditions(cell)
+                mean[i, j], low, high = stat_mean.mean_of_conditions(
+                    [dict(zip(e.seed[c.finished].tolist(), e.mean[c.finished])) for c in cell])
                 width[i, j] = (high - low) / 2 / abs(mean[i, j]) if mean[i, j] and not least[i, j] else np.nan
                 most = max(most, len(cell))
     factor, unit = style.scale([np.nanmedian(mean)], "N")
@@ -55,10 +54,9 @@ def draw_map(e, first, second):
     height = figure.get_size_inches()[1]
     figure.subplots_adjust(left=0.08, right=0.98, top=1 - 1.15 / height, bottom=0.75 / height, wspace=0.2)
     log = wants_log(mean / factor)
-    for ax, values, label, texts, colours in ((axes[0], mean / factor, f"mean ice resistance ({unit})",
-                                               lambda v: style.short(v), style.SPEED_MAP),
-                                              (axes[1], 100 * width, "half the 95 % interval of the mean (%)",
-                                               lambda v: f"{v:.0f} %", style.FORCE_MAP)):
+    for ax, values, label, texts, colours in (
+            (axes[0], mean / factor, f"mean ice resistance ({unit})", style.short, style.SPEED_MAP),
+            (axes[1], 100 * width, "half the 95 % interval of the mean (%)", "{:.0f} %".format, style.FORCE_MAP)):
         norm = LogNorm() if log and ax is axes[0] else None
         image = ax.pcolormesh(values, cmap=colours, norm=norm, edgecolor=style.PAPER, linewidth=0.6)
         for (i, j), v in np.ndenumerate(values):
@@ -82,7 +80,6 @@ def draw_map(e, first, second):
 
 
 def draw_indices(axes, names, indices):
-    """Draw bars of first-order and total Sobol indices."""
     for k, name in enumerate(names):
         for what, shift, colour, label in (("first", 0.17, style.ICE, "first order"),
                                            ("total", -0.17, style.TOW, "total")) if name in indices else ():
@@ -96,20 +93,17 @@ def draw_sensitivity(e, x):
     """Figure of Sobol indices, of the mean and also of its logarithm if given, beside partial rank correlations; None
     if there are neither."""
     ranks = x.get("ranks", {})
-    given = [(words, x[key])
-             for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm"))
-             if "indices" in x.get(key, {})]
-    names = sorted(set(ranks).union(*(s["indices"] for _, s in given)),
-                   key=lambda k: (max([s["indices"][k]["total"]
-                                       for _, s in given
-                                       if k in s["indices"]], default=0), abs(ranks.get(k, {}).get("prcc", 0))))
+    kinds = [(words, x.get(key, {})) for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm"))]
+    given = [(words, s) for words, s in kinds if "indices" in s]
+    names = sorted(set(ranks).union(*(s["indices"] for _, s in given)), key=lambda k: (
+        max([s["indices"][k]["total"] for _, s in given if k in s["indices"]], default=0),
+        abs(ranks.get(k, {}).get("prcc", 0))))
     if not names:
         return None
     n = len(given) + 1
     figure, grid = style.subplots(1, n, figsize=(3.2 + 4.2 * n, 2.2 + 0.6 * len(names)), sharey=True, squeeze=False)
-    notes = ["black: 95 %", *(f"no Sobol indices of the {words}: {x[key]['refused']}"
-                              for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm"))
-                              if "refused" in x.get(key, {}))]
+    notes = ["black: 95 %", *(f"no Sobol indices of the {words}: {s['refused']}" for words, s in kinds
+                              if "refused" in s)]
     width, height = figure.get_size_inches()
     lines = [line for note in notes for line in textwrap.wrap(note, int(13.5 * width))]  # letters of 9 points
     height += 0.17 * (len(lines) - 1)

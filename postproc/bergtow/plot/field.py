@@ -33,10 +33,7 @@ def body_place(run, frame):
 
 def panel_words(run, label, frame, follow):
     """The title of a panel: label, time, and the position of the body if the view follows it."""
-    words = [f"t = {style.times_text(run.frame_times[frame])}"]
-    if label:
-        words.insert(0, label)
-    lines = [", ".join(words)]
+    lines = [", ".join([label] * bool(label) + [f"t = {style.times_text(run.frame_times[frame])}"])]
     if follow:
         x0, x1, y0, y1 = run.box
         x, y = (style.fixed(v, max(x1 - x0, y1 - y0)) for v in body_place(run, frame))
@@ -46,10 +43,8 @@ def panel_words(run, label, frame, follow):
 
 def layout(n, view, turned, lines):
     """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation). lines: of a title
-    between narrow panels.
-
-    Wide views are stacked, others stand side by side; sizes follow from the view, so no space is left blank.
-    """
+    between narrow panels. Wide views are stacked, others stand side by side; sizes follow from the view, so no space is
+    left blank."""
     wide, high = view[1] - view[0], view[3] - view[2]
     if turned:
         wide, high = high, wide

@@ -28,8 +28,7 @@ class Film:
     def __init__(self, run, frames, kind="speed", width=1280, window="auto"):
         self.run = run
         follow, view = framed(run, window)
-        wide, high = (view[3] - view[2], view[1] - view[0]) if run.geographic else (view[1] - view[0],
-                                                                                    view[3] - view[2])
+        wide, high = run.on_page([view[1] - view[0], view[3] - view[2]])
         left, right, head, between, curve, foot = 0.85, 1.15, 0.85, 0.95, 1.75, 0.58
         if wide >= high:
             field_w = 10.0
@@ -57,14 +56,12 @@ class Film:
         self.scene = Scene(field, run, colouring, view, follow, animated=True)
         if run.n_floes:
             bar_h = min(field_h, 3.2)
-            cax = self.figure.add_axes(
-                box(left + (panel_w + field_w) / 2 + 0.2, base + (field_h - bar_h) / 2, 0.14, bar_h))
-            colouring.bar(self.figure, self.scene.mappable, cax)
+            colouring.bar(self.figure, self.scene.mappable, self.figure.add_axes(
+                box(left + (panel_w + field_w) / 2 + 0.2, base + (field_h - bar_h) / 2, 0.14, bar_h)))
         style.headline(self.figure, run, "ice field and ice resistance" if run.towed is not None else "ice field",
                        0.2 / size[0])
         self.clock = self.figure.text(1 - 0.25 / size[0], 1 - 0.14 / size[1], "", va="top", ha="right", fontsize=13.5,
                                       family="DejaVu Sans Mono", animated=True)
-        self.moving = []
         self.curve = self.figure.add_axes(box(left, foot, panel_w, curve))
         self._draw_curve()
         self.figure.canvas.draw()
@@ -90,13 +87,10 @@ class Film:
         for line in axes.lines:
             if line.get_gid() == "running mean":
                 line.set_alpha(0.35)
-        self.past = Line2D([], [], color=style.ICE, linewidth=2.2, zorder=5, animated=True)
-        self.cursor = Line2D([], [], color=style.INK, linewidth=1.0, zorder=6, animated=True)
-        self.dot = Line2D([], [], color=style.ICE, marker="o", markersize=6, markeredgecolor="white", zorder=7,
-                          animated=True)
-        for line in (self.past, self.cursor, self.dot):
-            axes.add_line(line)
-            self.moving.append(line)
+        looks = ({"color": style.ICE, "linewidth": 2.2, "zorder": 5}, {"color": style.INK, "linewidth": 1, "zorder": 6},
+                 {"color": style.ICE, "marker": "o", "markersize": 6, "markeredgecolor": "white", "zorder": 7})
+        self.moving = [axes.add_line(Line2D([], [], animated=True, **look)) for look in looks]
+        self.past, self.cursor, self.dot = self.moving
 
     def pixels(self, frame):
         """[height, width, 4] uint8 RGBA; valid until the next call."""
@@ -146,20 +140,17 @@ def write_mp4(film, frames, fps, path):
 
 def write_gif(film, frames, fps, path):
     """Write a GIF with one palette of 255 colours, taken from four frames, for the whole film; no dithering, which
-    would flicker.
-
-    Pixels that do not change get the 256th index, transparent: their long runs need almost no space.
-    """
-    picked = [film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,
-                                                                                len(frames) - 1, min(4, len(frames)))]
+    would flicker. Pixels that do not change get the 256th index, transparent: their long runs need almost no space."""
+    picked = [film.pixels(frames[int(i)])[:, :, :3].copy()
+              for i in np.linspace(0, len(frames) - 1, min(4, len(frames)))]
     palette = Image.fromarray(np.concatenate(picked)).quantize(255, method=Image.Quantize.MEDIANCUT)
     colours = palette.getpalette()[:765] + [0, 0, 0]
 
     def pictures():
         before = None
         for frame in frames:
-            now = np.asarray(
-                Image.fromarray(film.pixels(frame)[:, :, :3]).quantize(palette=palette, dither=Image.Dither.NONE))
+            now = np.asarray(Image.fromarray(film.pixels(frame)[:, :, :3]).quantize(palette=palette,
+                                                                                   dither=Image.Dither.NONE))
             picture = Image.fromarray(now if before is None else np.where(now == before, np.uint8(255), now))
             picture.putpalette(colours)
             before = now

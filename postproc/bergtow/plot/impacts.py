@@ -53,9 +53,8 @@ def draw_hull(axes, run, values, colour, label):
     factor, unit = style.scale([top], "N")
     scale = 0.75 * size / top if top > 0 else 0.0
     outlines = along_hull(run)
-    axes.add_collection(
-        PolyCollection([run.on_page(s) for s in bars(outlines, values, scale)], facecolor=colour, edgecolor=style.PAPER,
-                       linewidth=0.6))
+    shapes = [run.on_page(s) for s in bars(outlines, values, scale)]
+    axes.add_collection(PolyCollection(shapes, facecolor=colour, edgecolor=style.PAPER, linewidth=0.6))
     axes.add_patch(Polygon(run.on_page(hull), closed=True, facecolor=style.WINDOW, edgecolor=style.INK, linewidth=1.0))
     step = _round(top / factor)
     for level in np.arange(step, 1.001 * top / factor, step) if top > 0 else []:
@@ -67,8 +66,8 @@ def draw_hull(axes, run, values, colour, label):
                   arrowprops=dict(arrowstyle="->", color=style.FAINT, linewidth=1))
     axes.annotate("body's own x", run.on_page(0.5 * ahead[1] - [0, 0.1 * size]), fontsize=8.5, color=style.FAINT,
                   ha="center", va="center")
-    for shape in bars(outlines, values, scale):
-        axes.update_datalim(run.on_page(shape))
+    for shape in shapes:
+        axes.update_datalim(shape)
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set_axis_off()

@@ -37,22 +37,21 @@ def draw_exceedance(e, options, tails=None):
     conversions, top, least, notes = set(), 0.0, np.inf, []
     for colour, c in zip(CYCLE, some[::every(some)]):
         hits = [h for h in map(e.impacts, c.finished) if h]
-        fields = [{"time": h[0], "peak": h[1], "start": h[2], "hours": h[3]} for h in hits]
-        peaks, rate = stat_extreme.exceedance(fields)
-        some_above = peaks > 0
-        if not some_above.any():
+        hours = sum(h[3] for h in hits)
+        peaks, rate = stat_extreme.exceedance([{"peak": h[1], "hours": h[3]} for h in hits])
+        above = peaks > 0
+        if not above.any():
             continue
         conversions.update(h[4] for h in hits)
-        top, least = max(top, peaks[0]), min(least, peaks[some_above][-1])
-        axes.plot(peaks[some_above], rate[some_above], color=colour, drawstyle="steps-post", linewidth=1.4,
-                  label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
+        top, least = max(top, peaks[0]), min(least, peaks[above][-1])
+        axes.plot(peaks[above], rate[above], color=colour, drawstyle="steps-post", linewidth=1.4,
+                  label=f"{c.label}\n{len(peaks)} collisions, {hours:.3g} h")
         tail = tails[c.index] if tails else extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
             z = np.geomspace(tail["threshold"] * 1.0001, 3 * peaks[0], 200)
             fitted = tail["rate_per_hour"] * scipy.stats.genpareto.sf(z, tail["shape"], tail["threshold"],
                                                                       tail["scale"])
-            axes.plot(z, np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan), color=colour, linewidth=1,
-                      dashes=(4, 2))
+            axes.plot(z, np.where(fitted > 0.1 / hours, fitted, np.nan), color=colour, linewidth=1, dashes=(4, 2))
             notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
     if not conversions:
         return None

@@ -8,8 +8,8 @@ these differ between the tows of one case, the estimates are those of each tow. 
 which no such tow made good.
 """
 import sys
-from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 from bergtow import arguments, writing
 from bergtow.errors import RunError
@@ -26,58 +26,33 @@ import numpy as np
 SAME = 0.02  # relative difference allowed between the thickness or the curves of runs in one picture
 
 
-@dataclass
-class Point:
-    """One run."""
-
-    path: Path
-    title: str
-    asked: float          #: ice.concentration, or the actual one if the case does not give it
-    concentration: float  #: actual
-    mean: float           #: N, AtLeast if steps of its window have no solution
-    se: float             #: standard error of the mean, N, NaN if the run gives none
-    low: float            #: 95 % interval of the mean, N, NaN if the run gives none
-    high: float
-    steady: bool          #: whether the tow is steady in the window
-    change: float         #: change of the ice resistance over the window, N, NaN if the run does not give it
-    reference: float      #: measured value, N, NaN without one
-    unconverged: float    #: share of steps that did not converge
-    warnings: int
-    estimates: dict       #: {name: Estimate}
-    case: dict            #: {key: text}
-    state: str            #: hash of the final state, "" if the run does not give it
-    conditions: dict      #: inputs of the estimates: thickness_m, width_m, ..., and "curves"
-
-    @property
-    def of_ice(self):
-        """Estimates of the ice resistance."""
-        return {name: e for name, e in self.estimates.items() if not e.on_top}
-
-
 def read(path):
-    """Read the point from a run's folder."""
+    """A run as a point: forces in N, NaN where the run gives none, "mean" AtLeast if steps of its window have no
+    solution; "asked": ice.concentration, or the actual one if the case does not give it; "change": of the ice
+    resistance over the window; "reference": the measured value; "unconverged": share of the steps; "of_ice": the
+    estimates of the ice resistance; "state": hash of the final state, "" if the run does not give it; "conditions":
+    inputs of the estimates, thickness_m, width_m, ..., and "curves". Raises RunError."""
     with Run(path) as run:
-        estimates = run.summary.get("estimates")
+        file, estimates = run.path / "summary.json", run.summary.get("estimates")
         if not isinstance(estimates, dict) or "curves" not in estimates:
-            raise RunError(run.path / "summary.json", "holds no estimates",
-                           "run a case with a towed body, with this version")
+            raise RunError(file, "holds no estimates", "run a case with a towed body, with this version")
         if estimates.get("speed_along_m_s") is None:
             if np.isfinite(run.adrift):
-                raise RunError(run.path / "summary.json", f"shows a tow whose last line parted at {run.adrift:g} s",
+                raise RunError(file, f"shows a tow whose last line parted at {run.adrift:g} s",
                                "run it with a stronger line, or end it before")
-            raise RunError(run.path / "summary.json", "is of a body that is not towed", "run a case with a tow")
+            raise RunError(file, "is of a body that is not towed", "run a case with a tow")
         made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
         if not np.isfinite(mean):
-            raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no window")
-        return Point(path=run.path, title=style.title(run),
-                     asked=made if source_of_ice(run.case) else run.value("ice.concentration", made),
-                     concentration=made, mean=mean, se=run.number("mean_ice_resistance_se_n"), low=low, high=high,
-                     steady=run.verdict[0] == "steady",
-                     change=run.number("window.series.ice_resistance.change_n"),
-                     reference=run.number("reference.mean_force_n"),
-                     unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
-                     warnings=len(run.warnings), estimates=run.estimates, case=dict(run.case),
-                     state=str(run.summary.get("state_hash") or ""), conditions=estimates)
+            raise RunError(file, "has no mean ice resistance", "run longer: there was no window")
+        return SimpleNamespace(
+            path=run.path, title=style.title(run), concentration=made, mean=mean, low=low, high=high,
+            asked=made if source_of_ice(run.case) else run.value("ice.concentration", made),
+            se=run.number("mean_ice_resistance_se_n"), steady=run.verdict[0] == "steady",
+            change=run.number("window.series.ice_resistance.change_n"), reference=run.number("reference.mean_force_n"),
+            unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
+            warnings=len(run.warnings), estimates=run.estimates, case=dict(run.case),
+            of_ice={name: e for name, e in run.estimates.items() if not e.on_top},
+            state=str(run.summary.get("state_hash") or ""), conditions=estimates)
 
 
 def curve(point, name):
@@ -103,8 +78,7 @@ def check_alike(points):
         if not np.isclose(here, there, rtol=SAME, atol=0):
             raise RunError(other.path, f"has other ice than {first.path}: {there:.4g} m thick, and {here:.4g} m there",
                            "draw them in separate pictures")
-        key, here, there = next(compared.unlike(first.case, other.case, ("ice.concentration", )), (None, "", ""))
-        if key:
+        for key, here, there in compared.unlike(first.case, other.case, ("ice.concentration", )):
             raise RunError(other.path,
                            f"has a different case from {first.path}: {key} is {here} there and {there} here",
                            "draw them in separate pictures")
@@ -126,10 +100,8 @@ def once(points):
 
 def rows(points):
     """One row per concentration: (asked, number of runs, how many steady, mean, combined drift (stat_drift.of),
-    standard error, 95 % interval, ratio and force of each estimate, largest share of steps that did not converge).
-
-    For several runs: mean of the means, error and interval from their scatter. For one run: its own values.
-    """
+    standard error, 95 % interval, ratio and force of each estimate, largest share of steps that did not converge). For
+    several runs: mean of the means, error and interval from their scatter. For one run: its own values."""
     out = []
     for asked in sorted({p.asked for p in points}):
         some = [p for p in points if p.asked == asked]
@@ -160,8 +132,8 @@ def table(points):
             "steps not converged", "warnings"]
     lines = ["| " + " | ".join(head) + " |", "|" + " ---: |" * len(head)]
     for row in rows(points):
-        cells = [f"{100 * row['concentration']:.3g}",
-                 str(row["runs"]), f"{row['mean']:.4g}", f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"]
+        cells = [f"{100 * row['concentration']:.3g}", str(row["runs"]), f"{row['mean']:.4g}",
+                 f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"]
         for name in names:
             force = row["forces"].get(name, np.nan)
             text = "–" if np.isnan(force) else f"{force:.3g}" + ("" if row["valid"][name] else "*")
@@ -290,13 +262,8 @@ def span(points, key):
 def write_around(figure, points, lost):
     """Write heading and notes. lost: legends of curves outside the axes."""
     e = points[0].conditions
-    figure.text(
-        0.02,
-        0.98,
-        f"{points[0].title}: ice resistance and estimates" if len(points) == 1 else "Ice resistance and estimates",
-        va="top",
-        fontsize=13.5,
-        fontweight="bold")
+    of = f"{points[0].title}: ice" if len(points) == 1 else "Ice"
+    figure.text(0.02, 0.98, f"{of} resistance and estimates", va="top", fontsize=13.5, fontweight="bold")
     figure.text(0.02, 0.94,
                 f"{span(points, 'thickness_m')} m of ice, body {span(points, 'width_m')} m across, "
                 f"{span(points, 'speed_along_m_s')} m/s through the ice; {len(points)} "

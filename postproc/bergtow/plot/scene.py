@@ -30,8 +30,8 @@ class Colouring:
         self.run, self.kind = run, kind
         samples = np.concatenate([self._raw(i) for i in frames]) if run.n_floes else np.zeros(1)
         samples = samples[np.isfinite(samples)]
-        unit, power, self.extend = {"speed": "m/s", "force": "N", "thickness": "m", "generation": "1"}[kind], 1.0, \
-            "neither"
+        unit = {"speed": "m/s", "force": "N", "thickness": "m", "generation": "1"}[kind]
+        power, self.extend = 1.0, "neither"
         if kind == "generation":
             low, high = 0.0, max(1.0, float(run.generation.max(initial=0)))
         elif kind == "thickness":
@@ -57,10 +57,8 @@ class Colouring:
                       "thickness": f"ice thickness ({unit})", "generation": "splits that made the floe"}[kind]
 
     def _raw(self, frame):
-        if self.kind == "thickness":
-            return self.run.thickness
-        if self.kind == "generation":
-            return self.run.generation
+        if self.kind in ("thickness", "generation"):
+            return getattr(self.run, self.kind)
         return self.run.speed(frame) if self.kind == "speed" else self.run.least_contact_force(frame)
 
     def values(self, frame):
@@ -68,14 +66,12 @@ class Colouring:
         return self._raw(frame) / self.factor
 
     def bar(self, figure, mappable, cax, orientation="vertical"):
-        """Draw the colour bar on the axes cax."""
         bar = figure.colorbar(mappable, cax=cax, orientation=orientation, extend=self.extend,
                               extendfrac=0.03, label=self.label)
         bar.outline.set(linewidth=0.6, edgecolor=style.FAINT)
         bar.ax.tick_params(length=3)
         if self.kind == "force":
-            top = self.norm.vmax
-            ticks = _round_steps(top)
+            ticks = _round_steps(self.norm.vmax)
             bar.set_ticks(ticks, labels=[f"{t:g}" for t in ticks])
         if self.kind == "generation":
             bar.locator = MaxNLocator(integer=True)
@@ -138,9 +134,8 @@ def view_body(run):
     left, right = shift[0] - reach[0] / 2, shift[0] + reach[0] / 2
     if run.case.get("domain.ends") == "moving":  # ice beyond that distance comes from the other end of the domain
         ahead = run.value("domain.ahead", (x1 - x0) / 2)
-        behind = x1 - x0 - ahead
-        left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right,
-                                                                              ahead if heading[0] >= 0 else behind)
+        low, high = (x1 - x0 - ahead, ahead) if heading[0] >= 0 else (ahead, x1 - x0 - ahead)
+        left, right = max(left, -low), min(right, high)
     return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
 
 
@@ -162,35 +157,27 @@ def add_options(p):
 
 def tow_line(run, frame, position):
     """[n, 2] m: hull, towing end and, with two branches, hull again, for a towed body at a position; only the towing
-    end if all branches have broken.
-
-    None without a line.
-    """
+    end if all branches have broken. None without a line."""
     at = run.frame_times[frame]
-    if run.case.get("tow.mode") not in (
-            "line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
+    needed = {"carriage_x", "carriage_y", "body_x", "body_y"}
+    if run.case.get("tow.mode") not in ("line", "thrust") or not needed <= set(run.series_names):
         return None
     sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
     if sample >= len(run["time"]):
         return None
-    ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
-    end, points = position + ahead, []
+    end, points = position + [run[f"carriage_{k}"][sample] - run[f"body_{k}"][sample] for k in "xy"], []
     broken = {e["subject"]: e["time_s"] for e in run.events if e["kind"] == "line_broken"}
     for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
         if broken.get(branch + 1, np.inf) > at:
-            hull = place(
-                [[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]],
-                [*position, run.body_pose(frame)[run.towed, 2]])
-            points += [hull[0]] if points else [hull[0], end]
+            hull, = place([[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]],
+                          [*position, run.body_pose(frame)[run.towed, 2]])
+            points += [hull] if points else [hull, end]
     return np.array(points or [end])
 
 
 class Scene:
-    """Artists of the ice field on one set of axes.
-
-    view       (x0, x1, y0, y1) m follow     the view and the axes are relative to the towed body animated   artists are
-    left out of the figure's own drawing (for blitting)
-    """
+    """Artists of the ice field on one set of axes. view: (x0, x1, y0, y1) m; follow: the view and the axes are relative
+    to the towed body; animated: artists are left out of the figure's own drawing (for blitting)."""
 
     def __init__(self, axes, run, colouring, view, follow=False, animated=False):
         self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
@@ -213,16 +200,15 @@ class Scene:
 
         # Walls are endless along a periodic direction. The towed body and its line extend across a seam, but in a view
         # that follows the body not across the ends of a moving window.
-        px, py = run.period
-        self._images = [
-            np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))
-        ]
+        self._images = run.images
         self._towed = [a for a in self._images if not (follow and a[0] and run.case.get("domain.ends") == "moving")]
-        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-        self._corners = corners
+        self._corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        middle = self._corners.mean(axis=0)
+        #: the water, extended without end along periodic directions
+        self._sea = middle + (self._corners - middle) * np.where(np.array(run.period) > 0, 1e3, 1.0)
         kept = dict(animated=animated)
-        self._water = Polygon(run.on_page(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0,
-                              **kept)
+        self._water = Polygon(run.on_page(self._corners), closed=True, facecolor=style.WATER, edgecolor="none",
+                              zorder=0, **kept)
         width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
         self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
@@ -253,10 +239,8 @@ class Scene:
         self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
-        self.artists = [
-            self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges, self._line,
-            self._body, self._arrow
-        ]
+        self.artists = [self._water, self._floes, self._rafted, self._cracks, self._track, self._solid, *edges,
+                        self._line, self._body, self._arrow]
         for artist in self.artists:
             axes.add_artist(artist)
 
@@ -265,7 +249,6 @@ class Scene:
         return self._floes
 
     def show(self, frame):
-        """Update the artists to a frame."""
         run = self.run
         run.need_frames()
         position, centre = np.zeros(2), None
@@ -288,7 +271,7 @@ class Scene:
         bodies = run.body_polygons(frame, centre)
         self._solid.set_verts([run.on_page(p + shift - origin) for shift in self._images
                                for p, b in zip(bodies, run.bodies) if not b.towed])
-        self._water.set_xy(run.on_page(self._unbounded(self._corners) - origin))
+        self._water.set_xy(run.on_page(self._sea - origin))
         if run.towed is None:
             return
         self._body.set_verts(self._everywhere(bodies[run.towed] - origin))
@@ -324,12 +307,6 @@ class Scene:
         return [Line2D(*self.run.on_page(line).T, color=style.FAINT, linewidth=1.0, linestyle=(0, (4, 3)), zorder=5,
                        clip_on=False, **kept) for line in lines]
 
-    def _unbounded(self, corners):
-        """The water, extended without end along periodic directions."""
-        grow = np.where(np.array(self.run.period) > 0, 1e3, 1.0)
-        middle = corners.mean(axis=0)
-        return middle + (corners - middle) * grow
-
     def _show_track(self, frame, origin):
         """Draw the track of the body so far, interrupted where it crossed a periodic end of the domain."""
         run = self.run
@@ -340,10 +317,9 @@ class Scene:
         step = max(1, int(done.sum()) // 400)
         way = np.stack([run["body_x"][done], run["body_y"][done]], axis=1)[::-1][::step][::-1]
         if self.follow:
-            period = np.array([p if p > 0 else np.inf for p in run.period])
+            period = np.array(run.period)
             last = way[-1] if len(way) else origin
-            way = way + np.where(np.isfinite(period), np.round(
-                (origin - last) / period), 0) * np.where(np.isfinite(period), period, 0)
+            way = way + np.where(period > 0, np.round((origin - last) / np.where(period > 0, period, 1)), 0) * period
         elif len(way):
             wrapped = run.wrap(way)
             jump = np.flatnonzero((np.abs(np.diff(wrapped, axis=0)) > 0.5 * np.abs(self._corners[2] - self._corners[0]))
@@ -366,6 +342,6 @@ class Scene:
         n = np.array([-u[1], u[0]])
         ahead = position + u * (((outline - position) @ u).max() + 0.22 * self._arrow_length)
         size = self._arrow_length
-        shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]
-                          ]) * size
+        shape = size * np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07],
+                                 [0, 0.07]])
         self._arrow.set_verts(self._everywhere(ahead + shape[:, :1] * u + shape[:, 1:] * n))

@@ -38,9 +38,9 @@ INERTIA = "#8c6bb1"   # inertia
 CORIOLIS = "#b8860b"  # Coriolis force
 TILT = "#4d4d4d"      # force of the sea-surface tilt
 #: lines of a force balance in the order of the file: colour, width, dashes; registered forces follow
-BALANCE = ((TOW, 2.8, None), (ICE, 1.3, None), (DRAG, 1.6, (6, 2)), (CORIOLIS, 1.6, (5, 1.5, 1, 1.5)), (TILT, 1.6, (1,
-                                                                                                                    1)),
-           (INERTIA, 1.6, (2, 1.5)), ("#c2417c", 1.6, (4, 1)), ("#1b4f9c", 1.6, (3, 1, 1, 1)), ("#7a5b00", 1.6, (7, 1)))
+BALANCE = ((TOW, 2.8, None), (ICE, 1.3, None), (DRAG, 1.6, (6, 2)), (CORIOLIS, 1.6, (5, 1.5, 1, 1.5)),
+           (TILT, 1.6, (1, 1)), (INERTIA, 1.6, (2, 1.5)), ("#c2417c", 1.6, (4, 1)), ("#1b4f9c", 1.6, (3, 1, 1, 1)),
+           ("#7a5b00", 1.6, (7, 1)))
 #: stacked panels, and curves of estimates, in the order of the file
 PANELS = (ICE, TOW, DRAG, INERTIA)
 ESTIMATES = (TOW, DRAG, INERTIA, "#56b4e9", "#e69f00", "#cc79a7", "#1b4f9c", "#7a5b00", "#4d4d4d")
@@ -240,5 +240,4 @@ def head(figure, words, below, left=0.02, kept=0):
 
 
 def headline(figure, run, subject, left=0.02, kept=0):
-    """Put title and conditions at the top of a figure."""
     head(figure, f"{title(run)}: {subject}", conditions(run), left, kept)

@@ -68,7 +68,6 @@ def draw_members(axes, e, rows, x, y):
 
 
 def members_legend(e, word):
-    """Handles and labels of draw_members."""
     there = {"sound"} | {mark_of(e, m) for m in e.used}
     return [(Line2D([], [], linestyle="none", **mark), words.format(word))
             for kind, (mark, words) in MARKS.items() if kind in there]
@@ -100,14 +99,12 @@ def draw_fields(axes, e, some, key, factor, log_x):
 
 
 def fields_legend(e):
-    """Handles and labels of draw_fields."""
-    line = Line2D
     field, *others = members_legend(e, "a field")
     if e.without_bound(np.arange(e.n)):
-        others.append((line([], [], marker="^", color=style.JAM, linestyle="none", markersize=8), "mean, at least"))
-    return [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"), field,
-            (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12,
-                  markeredgewidth=2), "median of the fields"), *others]
+        others.append((Line2D([], [], marker="^", color=style.JAM, linestyle="none", markersize=8), "mean, at least"))
+    return [(Line2D([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"), field,
+            (Line2D([], [], marker="_", color=style.INK, linestyle="none", markersize=12, markeredgewidth=2),
+             "median of the fields"), *others]
 
 
 def force_limits(e, some_groups, log):
@@ -204,14 +201,13 @@ def draw_sweep(e, key):
             axes.set_xlabel(axis_label(e, key))
             axes.tick_params(labelbottom=True)
     pairs = fields_legend(e) + [(handle, label) for label, handle in extra.items()]
-    note = " ".join(
-        ([f"{len(panels) - MAX_PANELS} further combinations are not shown."] if len(panels) > MAX_PANELS else []) +
-        (["Estimates at the speed made good, dotted outside the range they are meant for."]
-         if key == "ice.concentration" else []) +
-        ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
-        (["A bar down to the lower edge includes zero."] if log_y and any(
-            stat_mean.t_interval(e.mean[c.finished])[0] <= 0 and not e.without_bound(c.members)
-            for _, some in shown for c in some) else []))
+    to_zero = log_y and any(stat_mean.t_interval(e.mean[c.finished])[0] <= 0 and not e.without_bound(c.members)
+                            for _, some in shown for c in some)
+    note = " ".join(words for words, there in (
+        (f"{len(panels) - MAX_PANELS} further combinations are not shown.", len(panels) > MAX_PANELS),
+        ("Estimates at the speed made good, dotted outside the range they are meant for.", key == "ice.concentration"),
+        (f"Out of the picture: {', '.join(lost)}.", lost), ("A bar down to the lower edge includes zero.", to_zero))
+        if there)
     wide, height = figure.get_size_inches()
     note = textwrap.wrap(note, int(13.5 * wide))  # letters of 9 points in an inch
     lines, below = -(-len(pairs) // 3), 0.15 * max(0, len(note) - 1)

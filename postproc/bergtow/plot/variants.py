@@ -47,12 +47,10 @@ def panels(e):
     found = {}
     for c in e.conditions():
         others = tuple((k, v) for k, v in c.values.items() if k != KEY)
-        rows = c.finished
-        found.setdefault(others, {})[c.values[KEY]] = rows
-    out = []
+        found.setdefault(others, {})[c.values[KEY]] = c.finished
+    out, first = [], order[0]
     for others, some in found.items():
         of = {name: dict(zip(e.repeat[rows].tolist(), e.mean[rows])) for name, rows in some.items() if len(rows)}
-        first = order[0]
         if first not in of or len(of) < 2:
             continue
         seeds = {name: set(e.seed[some[name]].tolist()) for name in of}

@@ -18,7 +18,6 @@ _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
 
 
 def variable(colour):
-    """Name of the CSS variable of a colour."""
     return f"--figure-{colour.lstrip('#')}"
 
 

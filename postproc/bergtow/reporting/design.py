@@ -153,10 +153,7 @@ def write_study(a, case, repeats, wider):
              "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed}
     parameters = {"ice.concentration": values} if values else {}
     fitting = {f"ice.concentration={c!r}": {"domain.width": width} for c, width in wider.items()}
-    if a.by_speed:
-        parameters["tow.speed"] = list(a.by_speed)
-        fitting |= {f"tow.speed={text}": keys for text, keys in a.by_speed.items()}
-    for key, some in a.varied.items():
+    for key, some in (({"tow.speed": a.by_speed} if a.by_speed else {}) | a.varied).items():
         parameters[key] = list(some)
         fitting |= {f"{key}={text}": keys for text, keys in some.items() if keys}
     study |= {name: some for name, some in (("parameters", parameters), ("with", fitting)) if some}
@@ -356,9 +353,6 @@ def answer_of(work, a, plan, began):
     print(a.output / "answer.json")
 
 
-# ---- command line
-
-
 concentration = measure("%", lambda x: 0 <= x <= 0.95, "not from 0 to 95 %; give concentrations as in 0.6,0.8")
 speed = measure("m/s", words="not above zero; give speeds as in \"0.8 kn,1 kn\" or 0.8kn:1.4kn:4")
 
@@ -521,8 +515,9 @@ def perform(a):
         plan = None
     else:
         layers = files(a.file)
-        work, plan = planned(a, {name: section(layers, name) for name in SECTIONS}, found, began)
-        run_case(work, a, {name: section(layers, name) for name in SECTIONS})
+        case = {name: section(layers, name) for name in SECTIONS}
+        work, plan = planned(a, case, found, began)
+        run_case(work, a, case)
     answer_of(work, a, plan, began)
     if not a.no_replay:
         make_replay(work, a, work.last - time.monotonic())

@@ -88,7 +88,6 @@ def at_speeds(answer):
 
 
 def operation(s, cases, values, answer):
-    """Blocks of the operational limits."""
     text = {v.key: in_short(v.value) for v in values}
     (pull, what), rows = pull_of(cases, answer), []
     head_sea = next((c for c in (answer or {}).get("load_cases", []) if c["id"] == "case.head_sea"), None)
@@ -130,7 +129,6 @@ def wind_met(run):
 
 
 def window_mean(run, *names):
-    """Means of series over the window."""
     there = within(run["time"], *run.window)
     return np.array([run[name][there].mean() for name in names])
 

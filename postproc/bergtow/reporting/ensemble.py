@@ -82,7 +82,6 @@ def marks(d):
 
 
 def design_row(c):
-    """Cells of a condition in the answer's table."""
     tow, tension = c["design"]["tow"], c["design"]["tension"]
     if tow is None:
         return [unbroken(c["label"]), "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 8]
@@ -106,31 +105,29 @@ def answer(e, s, cases, results, told=None):
             "largest simulated", "smallest", "in the start", "fields", "hours"]
     notes = ["Largest simulated: of the same moving mean."]
     left_out = [3, 4] if all(row[3] == "–" for row in rows) else []  # no line
-    if any(c["design"]["tow"] and c["design"]["tow"].get("below_zero") for c in s["conditions"]):
-        notes.append("Smallest: of the same, the least force. Where the mean is below zero it is the load to bear.")
-    else:
-        left_out.append(head.index("smallest"))
-    if any(c["design"]["tow"] and design_value.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
-        notes.append("In the start: of the same moving mean, the largest that begins before the window, which no "
-                     "other column includes.")
-    else:
-        left_out.append(head.index("in the start"))
+    tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
+    for column, there, words in (
+            ("smallest", any(d.get("below_zero") for d in tows),
+             "Smallest: of the same, the least force. Where the mean is below zero it is the load to bear."),
+            ("in the start", any(map(design_value.start_exceeds, tows)), "In the start: of the same moving mean, the "
+             "largest that begins before the window, which no other column includes.")):
+        notes += [words] * there
+        left_out += [head.index(column)] * (not there)
     head, *rows = ([cell for k, cell in enumerate(row) if k not in left_out] for row in (head, *rows))
     asked, held = loads_text.asked(s), loads_text.holds_for(s)
     figure = None if len(s["conditions"]) < 2 else report_run.picture(
         "design", "Design tow force of each condition", lambda: plot_design.draw(
             s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
             lambda key: reading(key, e.units[key])[0]))
-    out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
+    out = [lines(f"{asked}.")] if asked else []
     out += [lines(governing(s))] if len(s["conditions"]) > 1 else []
     carried = "".join(cell for row in rows for cell in row[1:])
     notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
-    notes += [loads_text.steps(s)] if loads_text.steps(s) else []
-    out += [table(head, rows), lines(" ".join(notes), faint=True)]
+    out += [table(head, rows), lines(" ".join(filter(None, [*notes, loads_text.steps(s)])), faint=True)]
     out += [figure] if figure else []
+    beyond = report_method.beyond(results, e)
     out += [{"kind": "pairs", "label": "line, vessel, and limits of the intervals",
-             "rows": report_method.beyond(results, e)[1:] if told else
-             report_method.holds(cases) + report_method.beyond(results, e)}] if cases else []
+             "rows": beyond[1:] if told else report_method.holds(cases) + beyond}] if cases else []
     return out + [lines(held)] * bool(held)
 
 
@@ -167,15 +164,12 @@ def without_value(s, value):
     return f"No value for {names}{reached}. "
 
 
-def kind_of(warning):
-    """The code of a warning with any names (of keys, series) among its values; numbers do not distinguish kinds."""
-    return " ".join([warning["code"], *(v for v in warning["values"].values() if isinstance(v, str))])
-
-
 def members(e, s):
     """Rows of all members: varied keys, status, mean, doubts, state hash, warnings in words."""
     labels = {c.index: c.label for c in e.conditions()}
     by_name, out = {row["name"]: row for row in s["members"]}, []
+    def kind_of(warning):  # names (of keys, series) among its values distinguish kinds, numbers do not
+        return " ".join([warning["code"], *(v for v in warning["values"].values() if isinstance(v, str))])
     for m in range(e.n):
         row = by_name.get(e.name[m])
         n, (low, high) = (row["mean"], row["within_95"]) if row else (np.nan, (np.nan, np.nan))
@@ -186,8 +180,7 @@ def members(e, s):
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
             "mean_ice_resistance_n": n, "low_95_n": low, "high_95_n": high, "doubts": ", ".join(sorted(e.doubts(m))),
             "kinds": {kind_of(w): scrubbed(w["text"]) for w in reversed(warned)},
-            "reported": [scrubbed(w) for w in [e.reason[m], *(w["text"] for w in warned)] if w]
-        })
+            "reported": [scrubbed(w) for w in [e.reason[m], *(w["text"] for w in warned)] if w]})
     return out
 
 
@@ -228,16 +221,14 @@ def provenance(e):
 
 def caption(name):
     """Caption for a picture of bergtow plot-ensemble by its name, "sweep-ice-concentration"."""
-    if name.startswith("sweep-"):
-        return "Mean ice resistance against " + short_key(name[6:].replace("-", ".", 1))
-    if name.startswith("above-"):
-        return f"How much of the time the {name[6:].replace('-', ' ')} is above a level"
-    if name.startswith("returns-"):
-        return f"How often the {name[8:].replace('-', ' ')} is exceeded"
+    kind, _, of = name.partition("-")
+    words = of.replace("-", " ")
     return {
+        "sweep": f"Mean ice resistance against {short_key(of.replace('-', '.', 1))}",
+        "above": f"How much of the time the {words} is above a level", "returns": f"How often the {words} is exceeded",
         "map": "Mean ice resistance over two parameters, and its interval",
         "sensitivity": "What the mean ice resistance depends on", "exceedance": "How often a peak is exceeded"
-    }.get(name, name)
+    }.get(kind, name)
 
 
 def pictures(e, options, s):
@@ -319,12 +310,10 @@ def beside(results, told=None):
 def first_runs(e, s):
     """[(condition of the statistics, its values with their origin, the case as {key: text}, attributes)] for the first
     member of each condition that can be read."""
-    out = []
-    for c, of in zip(s["conditions"], e.conditions()):
-        found = next(e.each(of.members[e.status[of.members] == FINISHED],
-                            lambda run: (report_case.values(run), run.case, run.attributes)), None)
-        out += [(c, *found)] if found else []
-    return out
+    found = ((c, next(e.each(of.members[e.status[of.members] == FINISHED],
+                             lambda run: (report_case.values(run), run.case, run.attributes)), None))
+             for c, of in zip(s["conditions"], e.conditions()))
+    return [(c, *first) for c, first in found if first]
 
 
 def varied(e, runs):
@@ -349,10 +338,9 @@ def varied(e, runs):
 def ranges(results, told):
     """{key: (range, its source)} for the values that the uncertainty budget varied, or for the ranges of bergtow
     design, whose sources are in a separate table."""
-    out = {r["key"]: (f"{r['low']} to {r['high']}", "") for r in (told or {}).get("assumed", [])}
-    for key, given in (results["budget"]["assumed"] if "budget" in results else {}).items():
-        out[key] = given["distribution"], given["source"] or "assumed"
-    return out
+    return {r["key"]: (f"{r['low']} to {r['high']}", "") for r in (told or {}).get("assumed", [])} | {
+        key: (given["distribution"], given["source"] or "assumed")
+        for key, given in results.get("budget", {"assumed": {}})["assumed"].items()}
 
 
 def of_answer(found):
@@ -433,5 +421,4 @@ def context(folder, place=None, given=None, also=()):
         "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
         "waiting": waiting, "lead": lead, "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
-        "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]
-    }
+        "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]}

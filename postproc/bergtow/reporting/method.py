@@ -10,18 +10,13 @@ from bergtow.result.run import case_value
 from bergtow.stats import alike as stat_alike
 from bergtow.stats import extreme as stat_extreme
 from bergtow.stats import profile as stat_profile
-from bergtow.table import counted, number, quantity
+from bergtow.table import counted, number, quantity, span
 from bergtow.text import budget as budget_text
 from bergtow.text import capability as capability_text
 from bergtow.text import converge as converge_text
 from bergtow.text import loads as loads_text
 
 KEYS = "ice.splitting.toughness", "ice.rafting.kappa", "ice.crushing.pressure"
-
-
-def _span(values, text=lambda v: f"{v:.3g}"):
-    low, high = min(values), max(values)
-    return text(low) if low == high else f"{text(low)} to {text(high)}"
 
 
 def _fields(s, cases):
@@ -34,12 +29,11 @@ def _fields(s, cases):
 
 
 def _amount(s, cases):
-    """The amount of simulation, in a sentence."""
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
     n = sum(c["members"]["used"] for c in s["conditions"])
     said = f"{n} tows in {counted(len(s['conditions']), 'condition')}{_fields(s, cases)}"
     if tows:
-        fields, hours = _span([d["fields"] for d in tows]), _span([d["hours"] for d in tows], number)
+        fields, hours = span([d["fields"] for d in tows]), span([d["hours"] for d in tows], number)
         said += f"; {fields} fields and {hours} hours of tow a condition, the start-up left out"
     return said + "."
 
@@ -53,16 +47,15 @@ def method(s, cases):
         "and air, added mass and the Coriolis force act on floes and body. The force of the ice on the body is the "
         "sum of these impulses over the time step. The tow force is the force along the tow: ice resistance, drag of "
         "water and air, Coriolis force, slope of the sea and inertia. Forces across the tow are not included.",
-        _amount(s, cases)
-    ]
+        _amount(s, cases)]
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
     if not tows:
         return out
     out.append(
         f"{loads_text.asked(s)}. This is the level of the return time −T / ln(1 − p), "
-        f"{_span([d['return_hours'] for d in tows])} h: the level that is exceeded once in that time on average, if "
+        f"{span([d['return_hours'] for d in tows])} h: the level that is exceeded once in that time on average, if "
         "all of it is towed in that condition. The load is first averaged by a moving mean over "
-        f"{_span([d['time_scale_s'] for d in tows])} s, so that pushes and collisions count by their impulse. "
+        f"{span([d['time_scale_s'] for d in tows])} s, so that pushes and collisions count by their impulse. "
         "Excursions above a threshold are gathered into clusters, to whose maxima a generalised Pareto distribution "
         "is fitted (block maxima and a generalised extreme value distribution where there are too few clusters). The "
         "95 % intervals come from the profile "
@@ -81,7 +74,7 @@ def method(s, cases):
 def _span_of(cases, key):
     """"10", or "5 to 17": the range of positive values of a key in these cases."""
     values = {case_value(case.texts, key, 0.0): case.texts.get(key, "") for _, case in cases}
-    return _span([v for v in values if v > 0] or [0.0], lambda v: values.get(v, "0"))
+    return span([v for v in values if v > 0] or [0.0], lambda v: values.get(v, "0"))
 
 
 def _ice(case, toughness, kappa, pressure):
@@ -107,7 +100,6 @@ def _pack(case):
 
 
 def _end(case):
-    """The motion of the towing end, in a sentence."""
     return {
         "speed": "The tow holds its speed whatever force this takes: no line or vessel slows down, so "
                  "the tow force does not include the dynamics of the line.",
@@ -213,21 +205,20 @@ def _convergence(found, e):
     least = converge_text.without(min(filter(None, shares), default=None))
     words = (("matters", "it depends on", ""), ("open", "open is", ""), ("none", "no effect that matters of", least),
              ("elsewhere", "not compared at the value of these tows:", ""))
-    some = [(said, [name for name, verdict in verdicts.items() if verdict == kind], end) for kind, said, end in words]
+    some = [f"{said} {', '.join(name for name in verdicts if verdicts[name] == kind)}{end}" for kind, said, end in words
+            if kind in verdicts.values()]
     at = compared.alone(found, texts)
-    return "; ".join([f"{said} {', '.join(names)}{end}" for said, names, end in some if names] +
-                     [f"studied at {at} alone"] * bool(at)) or "nothing compared"
+    return "; ".join(some + [f"studied at {at} alone"] * bool(at)) or "nothing compared"
 
 
 def beyond(results, e):
     """Rows (what, value) from the results of other commands, for the answer; results: {name: found}. e: Ensemble."""
     budget, converge = results.get("budget"), results.get("converge")
-    rows = [("assumed values, standard deviation", "not studied: friction, thickness, size, κ, drag and "
-             "draft were not varied beyond the conditions above" if budget is None else "; ".join(
-        f"{budget_text.of_mean(b, b['parameters']['sd'])} of the {b['meaning'].split(':')[-1].strip()}"
-        for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
-    if budget is not None and budget.get("doubt"):
-        rows[0] = rows[0][0], f"{rows[0][1]} ({budget['doubt']})"
-    rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
-                 else _convergence(converge, e)))
-    return rows + list(_capability(results["capability"]) if "capability" in results else [])
+    found = "not studied: friction, thickness, size, κ, drag and draft were not varied beyond the conditions above" \
+        if budget is None else "; ".join(
+            f"{budget_text.of_mean(b, b['parameters']['sd'])} of the {b['meaning'].split(':')[-1].strip()}"
+            for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found"
+    doubt = f" ({budget['doubt']})" if budget and budget.get("doubt") else ""
+    return [("assumed values, standard deviation", found + doubt),
+            ("width, length, time step, tolerance, start", _convergence(converge, e) if converge else "not studied"),
+            *(_capability(results["capability"]) if "capability" in results else ())]

@@ -93,15 +93,9 @@ def render(template, context, paper=False):
 
 def options(p):
     arguments.add_run(p, "report.html")
-    p.add_argument(
-        "--size",
-        metavar="MB",
-        type=float,
-        default=LIMIT / 1e6,
-        help=
-        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page reports "
-        "this (default: %(default)g)"
-    )
+    p.add_argument("--size", metavar="MB", type=float, default=LIMIT / 1e6, help="limit of the replay's data in the "
+                   "page; frames, then floes, are left out to meet it, and the page reports this (default: "
+                   "%(default)g)")
     p.add_argument("--no-compression", action="store_true",
                    help="store the replay's data as they are, for browsers that cannot unpack them")
     for name in TITLE_BLOCK:

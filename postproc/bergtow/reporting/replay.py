@@ -99,11 +99,8 @@ def nearest_floes(run, frames, n):
 
 
 class Replay:
-    """The replay of a run.
-
-    head    dict for JSON: everything except the large arrays blobs   {name: base64 text} notes   sentences on omissions
-    and rounding Raises RunError.
-    """
+    """The replay of a run. head: everything except the large arrays, for JSON; blobs: {name: base64 text}; notes:
+    sentences on omissions and rounding. Raises RunError."""
 
     def __init__(self, run, limit=LIMIT, compress=True):
         run.need_frames()
@@ -118,10 +115,9 @@ class Replay:
             "period": list(run.period), "moving": run.case.get("domain.ends") == "moving", "quanta": self.quanta,
             "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
             "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
-            "style": {k.lower(): getattr(style, k)
-                      for k in ("INK", "WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")
-                      }, "rafts": run.value("ice.rafting.kappa", 0) > 0, **self._bodies(frames), "curve": curve(run)
-        }
+            "style": {k.lower(): getattr(style, k) for k in ("INK", "WATER", "WALL", "FIXED", "BODY", "BODY_EDGE",
+                                                             "TRACK", "RAFTED")},
+            "rafts": run.value("ice.rafting.kappa", 0) > 0, **self._bodies(frames), "curve": curve(run)}
 
     @property
     def size(self):
@@ -154,12 +150,9 @@ class Replay:
         (x, y, yaw, speed, force), self.lives = read_frames(run, frames, floes)
         self.quanta, numbers = {}, {}
         for axis, name, values in ((0, "x", x), (1, "y", y)):
-            period = run.period[axis]
-            low, high = (run.box[2 * axis],
-                         run.box[2 * axis] + period) if period else (float(values.min(initial=np.inf)),
-                                                                     float(values.max(initial=-np.inf)))
-            if not np.isfinite([low, high]).all():
-                low, high = 0.0, 1.0  # no floes
+            period, low = run.period[axis], run.box[2 * axis]
+            low, high = (low, low + period) if period else map(float, (values.min(), values.max())) if values.size \
+                else (0.0, 1.0)
             numbers[name], *self.quanta[name] = quantise(values, low, high, period)
         numbers["yaw"], *self.quanta["yaw"] = quantise(np.mod(yaw, 2 * np.pi), 0.0, 2 * np.pi, True)
         for name, values in (("speed", speed), ("force", force)):
@@ -173,9 +166,8 @@ class Replay:
                          "are in result.h5.")
         if len(floes) < run.n_floes:
             which = "those that come closest to the towed body" if run.towed is not None else "the largest ones"
-            notes.append(
-                f"{len(floes)} of the {run.n_floes} floes are in this page, {which}, to keep it small. The rest of the "
-                f"water is not free of ice: all floes are in result.h5.")
+            notes.append(f"{len(floes)} of the {run.n_floes} floes are in this page, {which}, to keep it small. The "
+                         "rest of the water is not free of ice: all floes are in result.h5.")
         worst = max(self.quanta[axis][1] / 2 for axis in "xy")
         notes.append(f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact "
                      "force to 16 bits; result.h5 holds them in full.")
@@ -184,11 +176,10 @@ class Replay:
         run = self.run
         counts = np.diff(run.offsets)[floes]
         owner = np.repeat(np.isin(np.arange(run.n_floes), floes), np.diff(run.offsets))
-        self.blobs["vertices"] = pack(run.vertices[owner].astype(np.float32), self.compress)
-        self.blobs["counts"] = pack(counts.astype(np.uint16), self.compress)
-        self.blobs["thickness"] = pack(run.thickness[floes].astype(np.float32), self.compress)
-        self.blobs["area"] = pack(run.area[floes].astype(np.float32), self.compress)
-        self.blobs["lives"] = pack(self.lives.astype(np.uint32), self.compress)
+        for name, values, kind in (("vertices", run.vertices[owner], np.float32), ("counts", counts, np.uint16),
+                                   ("thickness", run.thickness[floes], np.float32),
+                                   ("area", run.area[floes], np.float32), ("lives", self.lives, np.uint32)):
+            self.blobs[name] = pack(values.astype(kind), self.compress)
 
     def _colourings(self, frames):
         """Quantities that can colour the floes: label, upper and lower limit in SI units, power of the scale, 64
@@ -198,14 +189,11 @@ class Replay:
         if run.n_floes and np.ptp(run.thickness) > 1e-9 * run.thickness.max():
             kinds.append(("thickness", "thickness"))
         for kind, name in kinds:
-            c = Colouring(run, kind,
-                          thinned(len(frames), 60) if len(frames) == run.n_frames else frames[thinned(len(frames), 60)])
+            c = Colouring(run, kind, frames[thinned(len(frames), 60)])
             table = (255 * c.cmap(np.linspace(0, 1, 64))[:, :3]).round().astype(int)
-            out.append({
-                "kind": kind, "name": name, "label": c.label, "factor": c.factor, "low": float(c.norm.vmin),
-                "high": float(c.norm.vmax), "power": float(getattr(c.norm, "gamma", 1.0)), "above": c.extend == "max",
-                "table": table.tolist()
-            })
+            out.append({"kind": kind, "name": name, "label": c.label, "factor": c.factor, "low": float(c.norm.vmin),
+                        "high": float(c.norm.vmax), "power": float(getattr(c.norm, "gamma", 1.0)),
+                        "above": c.extend == "max", "table": table.tolist()})
         return out
 
     def _samples(self, frames):
@@ -242,8 +230,8 @@ class Replay:
             out["line"] = [line.round(5).tolist() for line in lines]
         if "body_x" in run and len(run["time"]):
             kept = thinned(len(run["time"]), TRACK)
-            out["track"] = {"time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
-                            "y": run["body_y"][kept].round(5).tolist()}
+            out["track"] = {name: run[series][kept].round(digits).tolist() for name, series, digits in (
+                ("time", "time", 6), ("x", "body_x", 5), ("y", "body_y", 5))}
         if "window_x" in run and np.isfinite(run["window_x"]).any():
             sample = self._samples(frames)
             out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()
@@ -258,10 +246,7 @@ def _digits(values):
 
 def curve(run):
     """Force against time for the replay: least, largest and running mean of the samples in each of at most BUCKETS
-    pieces.
-
-    Without a towed body: kinetic energy. None without samples.
-    """
+    pieces. Without a towed body: kinetic energy. None without samples."""
     time = run["time"]
     kinds = [("kinetic_energy", "kinetic energy", style.ICE)]
     if run.towed is not None:
@@ -273,24 +258,18 @@ def curve(run):
     samples, seconds = smoothing(run)
     edges = np.unique(np.linspace(0, len(time), min(BUCKETS, len(time)) + 1).astype(int))
     middle = (edges[:-1] + edges[1:] - 1) // 2
-    out = {
-        "time": _digits(time[middle]), "start": float(min(0.0, time[0])), "end": float(time[-1]), "smooth_s": seconds,
-        "lines": []
-    }
+    lines = []
     for name, label, colour in kinds:
         values = run[name]
         with np.errstate(invalid="ignore"):
             smooth = running_mean(values, samples)
             low, high = np.fmin.reduceat(values, edges[:-1]), np.fmax.reduceat(values, edges[:-1])
-        out["lines"].append({
-            "name": name, "label": label, "unit": run.units(name), "colour": colour, "low": _digits(low),
-            "high": _digits(high), "smooth": _digits(smooth[middle])
-        })
-    out["window"] = list(run.window) if run.window else None
+        lines.append({"name": name, "label": label, "unit": run.units(name), "colour": colour, "low": _digits(low),
+                      "high": _digits(high), "smooth": _digits(smooth[middle])})
     mean, low, high = run.interval("ice_resistance")
-    out["window_name"] = run.window_name
-    out["at_least"] = run.at_least
-    out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float(
-        (high - low) / 2) if np.isfinite(high - low) else None)
-    out["events"] = [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.events]
-    return out
+    return {"time": _digits(time[middle]), "start": float(min(0.0, time[0])), "end": float(time[-1]),
+            "smooth_s": seconds, "lines": lines, "window": list(run.window) if run.window else None,
+            "window_name": run.window_name, "at_least": run.at_least,
+            "mean": float(mean) if np.isfinite(mean) else None,
+            "band": float((high - low) / 2) if np.isfinite(high - low) else None,
+            "events": [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.events]}

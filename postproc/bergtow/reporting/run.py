@@ -29,12 +29,10 @@ KEY_VALUES = {
             "tow.vessel.bollard_pull", "tow.vessel.free_speed"],
     "Domain and environment": [
         "domain.length", "domain.width", "domain.ends", "domain.sides", "water.current_x", "water.current_y",
-        "water.current_table", "water.tilt", "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"
-    ],
+        "water.current_table", "water.tilt", "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"],
     "Numerical": [
         "run.dt", "run.duration", "output.window_start", "solver.tolerance", "solver.max_sweeps", "impact.conversion",
-        "impact.duration", "impact.pressure"
-    ],
+        "impact.duration", "impact.pressure"],
 }
 MAX_EVENTS = 40  #: rows in the table; a tow may have thousands of waypoints
 UNSET = {"body.mass": "0 kg"}  #: values that mean "derived from other keys"
@@ -70,21 +68,16 @@ def picture(name, title, draw):
 
 
 def pictures(run):
-    """The pictures of a run that the scripts of postproc/ draw."""
-    out = [
-        picture("field", "Ice field before, during and after", lambda: plot_field.draw(run)),
-        picture("loaded", "Contact force on the floes", lambda: plot_field.draw(run, "force"))
-    ] if run.n_floes and run.n_frames else []
-    if run.towed is None:
-        return out
-    out.insert(0, picture("force", "Force on the towed body", lambda: plot_force.draw(run)))
-    out.append(
-        picture("impacts", "Loads around the hull, and how often a peak is exceeded", lambda: plot_impacts.draw(run)))
-    out.append(
-        picture("resistance", "Resistance against concentration: this run and the estimates",
-                lambda: plot_resistance.draw([plot_resistance.read(run.path)])))
-    out.append(picture("solver", "Contact solver", lambda: plot_force.draw_diagnostics(run)))
-    return out
+    field = [("field", "Ice field before, during and after", lambda: plot_field.draw(run)),
+             ("loaded", "Contact force on the floes", lambda: plot_field.draw(run, "force"))]
+    some = field if run.n_floes and run.n_frames else []
+    if run.towed is not None:
+        some = [("force", "Force on the towed body", lambda: plot_force.draw(run)), *some,
+                ("impacts", "Loads around the hull, and how often a peak is exceeded", lambda: plot_impacts.draw(run)),
+                ("resistance", "Resistance against concentration: this run and the estimates",
+                 lambda: plot_resistance.draw([plot_resistance.read(run.path)])),
+                ("solver", "Contact solver", lambda: plot_force.draw_diagnostics(run))]
+    return [picture(*one) for one in some]
 
 
 def start_peak(run, key="start_peak_line_tension_n"):
@@ -97,6 +90,17 @@ def ice_start_peak(run):
     """The same for the ice resistance, if it exceeds all values in the window."""
     key = "window.series.ice_resistance.start_peak_n"
     return start_peak(run, key) if run.number(key) > run.number("peak_ice_resistance_n") else ""
+
+
+def line_tension(run):
+    """[(label, number, text)] of the largest tension; none without a line."""
+    n = run.number
+    return [("largest line tension", force(n("peak_line_tension_n")), "mean over a step, within the window" +
+             start_peak(run))] if np.isfinite([n("peak_line_tension_n"), n("start_peak_line_tension_n")]).any() else []
+
+
+def source_of_reference(run):
+    return run.summary["reference"].get("source") or "source not stated"
 
 
 def figures(run):
@@ -112,19 +116,14 @@ def figures(run):
            (f"tow force, {name}", tow, f"95 % interval {tow_range}"),
            ("largest ice resistance in a step", force(n("peak_ice_resistance_n")),
             (run.summary.get("peak_conversion") or "") + ice_start_peak(run))]
-    if np.isfinite([n("peak_line_tension_n"), n("start_peak_line_tension_n")]).any():
-        out.append(("largest line tension", force(n("peak_line_tension_n")),
-                    "mean over a step, within the window" + start_peak(run)))
+    out += line_tension(run)
     if np.isfinite([n("impacts.largest.peak_n"), n("impacts.start_largest_peak_n")]).any():
         out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")),
                     f"{run.summary['impacts']['conversion']}, within the window" +
                     start_peak(run, "impacts.start_largest_peak_n")))
     if np.isfinite(n("reference.mean_force_n")):
-        out.append(("simulated / measured", style.short(
-            n("reference.ratio")
-        ), f"measured {force(n('reference.mean_force_n'))}: "
-           f"{run.summary['reference'].get('source') or 'source not stated'}"
-                    ))
+        out.append(("simulated / measured", style.short(n("reference.ratio")),
+                    f"measured {force(n('reference.mean_force_n'))}: {source_of_reference(run)}"))
     return out
 
 
@@ -165,13 +164,10 @@ def forces(run):
              ("95 % of the step means are below", force(n("p95_ice_resistance_n")), "", conversion),
              ("99 % of the step means are below", force(n("p99_ice_resistance_n")), "", conversion),
              ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion + ice_start_peak(run))]
-    if np.isfinite([n("peak_line_tension_n"), n("start_peak_line_tension_n")]).any():
-        rows.append(("largest line tension", force(n("peak_line_tension_n")), "",
-                     "mean over a step, within the window" + start_peak(run)))
+    rows += [(what, value, "", remark) for what, value, remark in line_tension(run)]
     if np.isfinite(n("reference.mean_force_n")):
-        rows.append(("measured mean force (reference)", force(n("reference.mean_force_n")), "",
-                     run.summary["reference"].get("source") or "source not stated"))
-        rows.append(("simulated / measured", style.short(n("reference.ratio")), "", ""))
+        rows += [("measured mean force (reference)", force(n("reference.mean_force_n")), "", source_of_reference(run)),
+                 ("simulated / measured", style.short(n("reference.ratio")), "", "")]
     return rows
 
 
@@ -182,12 +178,10 @@ def estimates(run):
         e = estimate.numbers
         spread = None not in (e["force_n"], e["high_n"], e["low_n"]) and e["high_n"] > e["low_n"]
         ratio = e["simulated_over_estimate"] if estimate.compares else None
-        rows.append({
-            "label": estimate.label, "force": force(e["force_n"]),
-            "range": f"{force(e['low_n'])} to {force(e['high_n'])}" if spread else "",
-            "ratio": style.short(ratio) if ratio is not None else "–", "valid": estimate.valid, "note": e["note"],
-            "formula": e["formula"], "source": e["source"]
-        })
+        rows.append({"label": estimate.label, "force": force(e["force_n"]),
+                     "range": f"{force(e['low_n'])} to {force(e['high_n'])}" if spread else "",
+                     "ratio": style.short(ratio) if ratio is not None else "–", "valid": estimate.valid,
+                     **{key: e[key] for key in ("note", "formula", "source")}})
     return rows
 
 
@@ -196,11 +190,9 @@ def impacts(run):
     i = run.summary.get("impacts")
     if not isinstance(i, dict):
         return None
-    rows = [(
-        "collisions in the window",
-        f"{i['collisions']:.0f} in {style.short(60 * run.number('impacts.hours'))} min; "
-        f"{i['collisions_whole_run']:.0f} in the whole run"
-    ), ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))),
+    rows = [("collisions in the window", f"{i['collisions']:.0f} in {style.short(60 * run.number('impacts.hours'))} "
+             f"min; {i['collisions_whole_run']:.0f} in the whole run"),
+            ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))),
             ("mean ice resistance, quasi-static", force(run.number("impacts.mean_quasi_static_resistance_n"))),
             ("largest quasi-static normal load of a floe, wall or shore",
              force(run.number("impacts.largest_quasi_static_load_n")) +
@@ -210,12 +202,10 @@ def impacts(run):
         body = int(big["floe"]) - run.n_start
         struck = f"floe {big['floe']}" if body < 0 else \
             run.bodies[body].name if body < len(run.bodies) else f"piece {body - len(run.bodies)}"
-        rows.append((
-            "largest peak",
-            f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse "
-            f"{style.short(big['impulse_ns'])} N s, "
-            f"approach {style.short(big['approach_m_s'])} m/s), {struck} at {style.times_text(big['time_s'])}" +
-            start_peak(run, "impacts.start_largest_peak_n")))
+        rows.append(("largest peak", f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over "
+                     f"{style.short(big['duration_s'])} s, impulse {style.short(big['impulse_ns'])} N s, approach "
+                     f"{style.short(big['approach_m_s'])} m/s), {struck} at {style.times_text(big['time_s'])}" +
+                     start_peak(run, "impacts.start_largest_peak_n")))
     elif np.isfinite(run.number("impacts.start_largest_peak_n")):
         rows.append(("largest peak", "none in the window" + start_peak(run, "impacts.start_largest_peak_n")))
     return {"conversion": i["conversion"], "rows": rows,
@@ -229,17 +219,14 @@ def quality(run):
     if run.window:
         rule = {"given": "begin given in the case",
                 "mser5": "begin found from the series (MSER-5)"}.get(run.summary["window"].get("rule"), "")
-        rows += [
-            ("verdict", run.verdict[0], run.verdict[1]),
-            (run.window_name,
-             f"{style.times_text(*run.window)}, {n('window.n_samples'):.0f} samples", rule),
-            ("independent samples in it", style.short(n("window.n_independent")),
-             f"correlation time {style.short(n('window.correlation_time_s'))} s"
-             if np.isfinite(n("window.correlation_time_s")) else "")
-        ]
+        rows += [("verdict", *run.verdict),
+                 (run.window_name, f"{style.times_text(*run.window)}, {n('window.n_samples'):.0f} samples", rule),
+                 ("independent samples in it", style.short(n("window.n_independent")),
+                  f"correlation time {style.short(n('window.correlation_time_s'))} s"
+                  if np.isfinite(n("window.correlation_time_s")) else "")]
     if run.towed is not None:
-        rows += [(f"balance of the body: ice − ({run.balance})",
-                  share(n("budget.closure_relative")), "relative to the largest of them"),
+        rows += [(f"balance of the body: ice − ({run.balance})", share(n("budget.closure_relative")),
+                  "relative to the largest of them"),
                  ("ice resistance by momentum", share(n("budget.ice_momentum_closure_relative")),
                   "without the contacts of the body, relative to the largest of them")]
     rows += [("momentum residual", share(n("momentum_residual")),
@@ -249,8 +236,7 @@ def quality(run):
              ("largest overlap", f"{style.short(1000 * n('max_overlap_m'), 2)} mm",
               f"{100 * n('max_overlap_relative'):.2g} % of the mean floe size"
               if np.isfinite(n("max_overlap_relative")) else ""),
-             ("contact work",
-              f"{style.short(n('contact_work_j'))} J" if np.isfinite(n("contact_work_j")) else "–",
+             ("contact work", f"{style.short(n('contact_work_j'))} J" if np.isfinite(n("contact_work_j")) else "–",
               f"{n('positive_work_steps'):.0f} steps in which the contacts added energy")]
     if n("crushing_steps", 0):
         rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J",
@@ -258,20 +244,17 @@ def quality(run):
     if n("max_rafted_area_m2", 0):
         rows.append(("rafted", f"{style.short(n('rafted_area_m2'))} m²",
                      f"{100 * n('rafted_share_of_ice'):.2g} % of the ice, {n('rafting_pairs'):.0f} pairs; edges took "
-                     f"{style.short(n('raft_edge_work_j'))} J, "
-                     f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction "
-                     f"{style.short(n('raft_friction_work_j'))} J"))
+                     f"{style.short(n('raft_edge_work_j'))} J, {style.short(n('rafted_energy_j'))} J of it in the "
+                     f"sheets' height, friction {style.short(n('raft_friction_work_j'))} J"))
     if run.summary.get("splitting"):
         at, bent, burst, steps, small, old = (n(f"splitting.{name}") for name in (
             "near", "far", "burst", "steps", "refused_size", "refused_generation"))
         sizes = (f"floes of {style.short(n('splitting.size_before_m'))} m (median √A) into pieces of "
                  f"{style.short(n('splitting.piece_size_m'))} m; " if n("splitting.splits") else "")
-        rows.append((
-            "splits", f"{n('splitting.splits'):.0f}",
-            f"{at:.0f} opened at a contact, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks of "
-            f"{style.short(n('splitting.crack_length_m'))} m; {sizes}times not split: {small:.0f} because a piece "
-            f"would have been too small or slender, {old:.0f} in the last generation"
-        ))
+        rows.append(("splits", f"{n('splitting.splits'):.0f}",
+                     f"{at:.0f} opened at a contact, {bent:.0f} bent, {burst:.0f} burst, in {steps:.0f} steps; cracks "
+                     f"of {style.short(n('splitting.crack_length_m'))} m; {sizes}times not split: {small:.0f} because "
+                     f"a piece would have been too small or slender, {old:.0f} in the last generation"))
     if n("stalled_s", 0):
         rows.append(("body stood still", f"{style.short(n('stalled_s'))} s", "while the tow asked for motion"))
     return rows
@@ -290,9 +273,8 @@ def events(run):
 def provenance(run):
     """Rows (what, value) on how the run was made."""
     a = run.attributes
-    rows = [("program",
-             f"{a.get('program', 'bergtow')} {a.get('version', '')}, revision {a.get('revision', 'unknown')}"),
-            ("compiler", a.get("compiler")), ("flags", a.get("flags")), ("libraries", a.get("libraries")),
+    rows = [("program", f"{a.get('program', 'bergtow')} {a.get('version', '')}, revision "
+             f"{a.get('revision', 'unknown')}"), *((what, a.get(what)) for what in ("compiler", "flags", "libraries")),
             ("command line", re.sub(r"\S*/(?=[^\s/])", "", str(a.get("command_line", "")))),
             ("ranks × threads", f"{a.get('ranks', '?')} × {a.get('threads', '?')}"), ("started", a.get("start_time")),
             ("host", a.get("host")), ("wall time", f"{style.short(run.number('wall_time_s'))} s"),
@@ -315,9 +297,8 @@ def key_values(run, values):
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
             continue
         out[heading] = (report_case.of_field(run) if heading == "Ice" else []) + [
-            by_key[k] for k in keys if k in by_key and by_key[k].kind != "unused" and by_key[k].value not in
-            ("", "none", UNSET.get(k))
-        ]
+            v for v in map(by_key.get, keys) if v and v.kind != "unused" and v.value not in
+            ("", "none", UNSET.get(v.key))]
     return out
 
 
@@ -335,9 +316,8 @@ def context(run, limit=LIMIT, compress=True, given=None):
     block = report_case.title_block(run.case, run.attributes, given or {})
     return {
         "block": block if any(value != "–" for _, value in block[:len(report_case.TITLE_BLOCK)]) else [],
-        "marked": report_case.marked(block),
-        "title": breakable(run.summary.get("title")
-                           or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
+        "marked": report_case.marked(block), "title": breakable(run.summary.get("title") or run.path.resolve().name),
+        "stamp": stamp(run), "conditions": style.conditions(run),
         "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name,
         "warnings": [warning["text"] for warning in run.warnings] if isinstance(run.summary.get("warnings"), list)
         else ["summary.json holds no list of warnings"],
@@ -347,5 +327,4 @@ def context(run, limit=LIMIT, compress=True, given=None):
         "values": values, "kinds": report_case.KINDS,
         "n_assumed": sum(v.kind in ("assumed", "memory", "reported") for v in values),
         "preface": report_case.preface(run.case_text), "case_text": run.case_text, "resolved_text": run.resolved_text,
-        "pictures": pictures(run), "replay": replay
-    }
+        "pictures": pictures(run), "replay": replay}

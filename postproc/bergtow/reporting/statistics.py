@@ -18,41 +18,37 @@ from bergtow.text import ensemble as ensemble_text
 import numpy as np
 
 
+def ends(name, found, key="interval_95"):
+    """Columns of an interval; None where there is none."""
+    return dict(zip((f"{name}_low", f"{name}_high"), found.get(key, (None, None))))
+
+
 def load_columns(c, names):
     """Columns of the loads; their names end with the unit, as in summary.json."""
     out = {}
     for name, units in names.items():
-        x = c["loads"].get(name)
-        def column(what, value, name=name, units=units):
-            out[f"{name}_{what}_{units.lower()}"] = value
-        column("mean", x and x["mean"]["value"])
-        for k, end in enumerate(("low", "high")):
-            column(f"mean_{end}", x and x["mean"]["interval_95"][k])
-        column("sd", x and x["sd"]["value"])
-        column("p99", x and x["quantiles"]["99"]["value"])
-        column("largest", x and x["largest"])
-        column("smallest", x and x["smallest"])
-        column("start_up", x and x["start_up"] and x["start_up"]["largest"])
-        column("design", x and x["design"].get("value"))
-        for k, end in enumerate(("low", "high")):
-            column(f"design_{end}", x and x["design"].get("interval_95", (None, None))[k])
-        out[f"{name}_time_scale_s"] = x and x["time_scale_s"]
+        x = c["loads"].get(name, {})
+        mean, start, design = (x.get(key) or {} for key in ("mean", "start_up", "design"))
+        columns = {"mean": mean.get("value"), **ends("mean", mean), "sd": x.get("sd", {}).get("value"),
+                   "p99": x.get("quantiles", {}).get("99", {}).get("value"), "largest": x.get("largest"),
+                   "smallest": x.get("smallest"), "start_up": start.get("largest"), "design": design.get("value"),
+                   **ends("design", design)}
+        out |= {f"{name}_{what}_{units.lower()}": value for what, value in columns.items()}
+        out[f"{name}_time_scale_s"] = x.get("time_scale_s")
     return out
 
 
 def csv_row(c, load_names):
     """Columns of a condition, without nesting; forces in N."""
     r = c["resistance"]
-    row = {"condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"],
-           **{k: c["members"][k] for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n
-                                                              for k, n in c["members"]["doubts"].items()}}
-    w = c["without_bound"]
-    row |= {"at_least": int(bool(w["words"])), "no_load_share": w["share"], "ended_without_solution": len(w["ended"])}
-    for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max",
-                "largest_share", "fields_needed"):
-        row[key] = r.get(key)
+    w, m = c["without_bound"], c["members"]
+    row = {"condition": c["index"] + 1, **c["values"], "fields": m["used"],
+           **{k: m[k] for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n for k, n in m["doubts"].items()},
+           "at_least": int(bool(w["words"])), "no_load_share": w["share"], "ended_without_solution": len(w["ended"])}
+    row |= {key: r.get(key) for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median",
+                                        "trimmed_mean", "min", "max", "largest_share", "fields_needed")}
     for key in ("t_95", "bootstrap_95", "median_95"):
-        row[f"{key}_low"], row[f"{key}_high"] = r.get(key, (None, None))
+        row |= ends(key, r, key)
     for name, estimate in c["estimates"].items():
         row[name], row[f"{name}_valid"] = estimate["force"], estimate["valid"]
         if not estimate["on_top"]:

@@ -65,11 +65,8 @@ def chain(rows, name, value):
 def verdicts(rows, own):
     """{compared quantity: "matters", "none" or "open" at the study's own value, "elsewhere" if that value was not
     compared}."""
-    out = {}
-    for name in dict.fromkeys(row["name"] for row in rows if row["name"] in KEYS):
-        found = chain(rows, name, own.get(name))
-        out[name] = found[0]["judged"] if found else "elsewhere"
-    return out
+    return {name: found[0]["judged"] if (found := chain(rows, name, own.get(name))) else "elsewhere"
+            for name in dict.fromkeys(row["name"] for row in rows if row["name"] in KEYS)}
 
 
 def _differ(a, b):

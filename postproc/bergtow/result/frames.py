@@ -240,11 +240,15 @@ class Frames:
                     return end
         return np.full(2, np.nan)
 
+    @property
+    def images(self):
+        """Shifts [2], m, from a body in the domain to its periodic images around it, with no shift among them."""
+        x, y = (np.array([-period, 0.0, period] if period else [0.0]) for period in self.period)
+        return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+
     def wrap(self, xy, centre=None):
         """Shift positions [n, 2] m by whole periods to within half a period of centre (default: of the domain).
-
-        Components in non-periodic directions are returned unchanged, to the bit.
-        """
+        Components in non-periodic directions are returned unchanged, to the bit."""
         x0, x1, y0, y1 = self.box
         centre = ((x0 + x1) / 2, (y0 + y1) / 2) if centre is None else centre
         xy = np.array(xy, dtype=float)
@@ -274,11 +278,9 @@ class Frames:
         return np.split(self._world(pose), self.offsets[1:-1]) if self.n_floes else []
 
     def polygon_array(self, frame, centre=None):
-        """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]).
-
-        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. Existing floes come first, in
-        order; in a periodic domain, images follow for floes that extend over the edge of the wrapped domain.
-        """
+        """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]). Outlines with fewer than M vertices
+        repeat their last one. Row k is floe index[k]. Existing floes come first, in order; in a periodic domain, images
+        follow for floes that extend over the edge of the wrapped domain."""
         pose = self.pose(frame)
         pose[:, :2] = self.wrap(pose[:, :2], centre)
         outlines = self._world(pose)[self._padding] if self.n_floes else np.zeros((0, 1, 2))
@@ -299,10 +301,8 @@ class Frames:
         return outlines, index
 
     def body_polygons(self, frame, centre=None):
-        """Bodies of a frame in the world frame: list of arrays [n, 2] m in the order of bodies.
-
-        The towed body is wrapped as in wrap(); walls and fixed bodies keep their positions in the file.
-        """
+        """Bodies of a frame in the world frame: list of arrays [n, 2] m in the order of bodies. The towed body is
+        wrapped as in wrap(); walls and fixed bodies keep their positions in the file."""
         pose = self.body_pose(frame)
         if self.towed is not None:
             pose[self.towed, :2] = self.wrap(pose[self.towed:self.towed + 1, :2], centre)[0]

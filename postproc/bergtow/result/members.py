@@ -200,13 +200,11 @@ class Members:
 
     def _unsound(self):
         """{name: why} of members whose results are incomplete or damaged; from here on they count as waiting."""
-        out = {self.name[m]: self.reason[m].strip()
-               for m in np.flatnonzero(self.status == WAITING)
+        out = {self.name[m]: self.reason[m].strip() for m in np.flatnonzero(self.status == WAITING)
                if self.hole[m] in ("unsound", "unreadable")}
         for m in np.flatnonzero(self.status == FINISHED):
-            why = integrity.fault_of_member(self.folder(m), self.name[m],
-                                            self.study.encode()) if self.folder(m).is_dir() else None
-            if why:
+            folder = self.folder(m)
+            if folder.is_dir() and (why := integrity.fault_of_member(folder, self.name[m], self.study.encode())):
                 out[self.name[m]] = why
                 self.status[m], self.reason[m], self.hole[m] = WAITING, f"its result is not sound: {why}", "unsound"
         return out
@@ -219,12 +217,9 @@ class Members:
     def estimates(self):
         """{name: {"label", "on_top"}} of the estimates in the members' summaries, in the order of the program's
         registry."""
-        forces = [key for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
-        out = {}
-        for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
-            meaning = self.meaning[key]
-            out[meaning["estimate"]] = {"label": meaning["label"], "on_top": meaning["kind"] == "on top"}
-        return out
+        some = [self.meaning[key] for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
+        return {m["estimate"]: {"label": m["label"], "on_top": m["kind"] == "on top"}
+                for m in sorted(some, key=lambda m: int(m.get("order", 0)))}
 
     @property
     def complete(self):
@@ -334,16 +329,14 @@ class Members:
         for m in np.flatnonzero(self.status == FINISHED):
             codes = {warning["code"] for warning in self.warnings(m)}
             verdict, independent = (self.number(key, m) for key in ("window_verdict", "window_n_independent"))
-            short = verdict == verdicts.index("too short") or (np.isnan(verdict)
-                                                                and not independent >= independent_least)
+            short = verdict == verdicts.index("too short") or np.isnan(verdict) and not independent >= independent_least
             few = self.number("window_n_contact_stretches", m) < stretches_least
             checks = {
                 "unconverged": self.number("unconverged_steps", m) > 0,
                 "unbounded": self.number("window_no_load_share", m) > 0,
                 "jammed": self.number("stalled_windows", m) > 0,
                 "unsteady": verdict == verdicts.index("not steady"), "short": short and not few, "few": few,
-                "stopped": "stopped" in codes, "other": bool(codes - TOLD)
-            }
+                "stopped": "stopped" in codes, "other": bool(codes - TOLD)}
             out[int(m)] = {kind for kind, there in checks.items() if there}
         return out
 
@@ -391,10 +384,7 @@ class Members:
 
     def exclude(self, kinds):
         """Leave out members with these doubts from here on; returns {name: kinds} of those dropped."""
-        for m in np.flatnonzero(self.status == FINISHED):
-            hit = self.doubts(m) & set(kinds)
-            if hit:
-                self._dropped[int(m)] = hit
+        self._dropped |= {m: doubts & set(kinds) for m, doubts in self._doubts.items() if doubts & set(kinds)}
         return {self.name[m]: sorted(hit) for m, hit in self._dropped.items()}
 
     @cached_property
@@ -437,11 +427,10 @@ class Members:
             first = rows[0]
             values = {key: (str(column[first]) if column.dtype == object else float(column[first]))
                       for key, column in self.parameters.items()}
-            out.append(
-                Condition(int(index), values, varied or list(values), self.units, rows,
-                          np.array([m for m in rows if m in used], dtype=int),
-                          int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)),
-                          sum(int(m) in self._dropped for m in rows)))
+            out.append(Condition(int(index), values, varied or list(values), self.units, rows,
+                                 np.array([m for m in rows if m in used], dtype=int),
+                                 *(int(np.sum(self.status[rows] == kind)) for kind in (FAILED, WAITING)),
+                                 sum(int(m) in self._dropped for m in rows)))
         return out
 
     def tows(self, rows, excluded=True):

@@ -58,11 +58,10 @@ def annotated(text):
             return
         if path[:1] in (["floes"], ["base"]):
             return
-        rest = text[node.end_mark.index:].split("\n",
-                                                1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
+        scalar = isinstance(node, yaml.ScalarNode)
+        rest = text[node.end_mark.index:].partition("\n")[0] if scalar or node.flow_style else ""
         comment = re.match(r"\s+#\s*(.*)", rest)
-        value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(
-            text[node.start_mark.index:node.end_mark.index].split())
+        value = node.value if scalar else " ".join(text[node.start_mark.index:node.end_mark.index].split())
         out.setdefault(".".join(path), (value, comment[1].strip() if comment else ""))
 
     for root in roots:
@@ -151,8 +150,7 @@ def not_used(run, case):
 def spread(values, unit, mean):
     """Mean and range of a quantity over the floes, in words."""
     low, high = np.min(values), np.max(values)
-    return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(
-        high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
+    return f"{mean:.3g} {unit}" + (f", {low:.3g} to {high:.3g} {unit}" if high - low > 1e-9 * abs(high) else "")
 
 
 def of_field(run):

@@ -55,11 +55,6 @@ def areas(a, count):
                                  0.0), axis=1)
 
 
-def area(p):
-    """Area of one polygon [n, 2], m²."""
-    return float(areas(p[None], np.array([len(p)]))[0])
-
-
 def near(middle, reach):
     """Pairs [P, 2] (i, j), i < j, in ascending order, of circles that overlap: centres [n, 2], radii [n].
 

@@ -14,9 +14,9 @@ the remedy.
 """
 import json
 import re
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -71,33 +71,6 @@ class Numbers(dict):
         raise RunError(self.file, f"has no {key}", "the file is damaged, or of another version: run the case again")
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """An estimate of the resistance as described in a file."""
-
-    name: str
-    label: str
-    on_top: bool         #: not an ice resistance: it is added to the others, and is not compared with a run
-    uses_floe_size: bool  #: its curve differs between fields of a case
-    numbers: dict        #: the entries in summary.json: force_n, low_n, high_n, valid, compares, note, ...
-
-    @property
-    def force(self):
-        """N, NaN where the formula has no value."""
-        force = self.numbers.get("force_n")
-        return np.nan if force is None else force
-
-    @property
-    def valid(self):
-        """Is it meant for the conditions?"""
-        return bool(self.numbers.get("valid"))
-
-    @property
-    def compares(self):
-        """Can a run be compared with it? It must be valid, and depend on the concentration."""
-        return bool(self.numbers.get("compares")) and self.force > 0
-
-
 def parse_case(text):
     """The values of a case file as {"section.key": text}, lists on one line; floes given by hand are left out."""
     out = {}
@@ -135,9 +108,8 @@ def _pairs(text):
 class Run(Frames):
     """The output folder of one run.
 
-    path        folder summary     dict, the numbers of summary.json attributes  dict, provenance (root attributes of
-    result.h5) Raises RunError, from the constructor for missing or damaged files, later for missing or damaged entries.
-    """
+    path: folder; summary: the numbers of summary.json; attributes: provenance, the root attributes of result.h5. Raises
+    RunError, from the constructor for missing or damaged files, later for missing or damaged entries."""
 
     def __init__(self, path):
         self.path = Path(path)
@@ -270,14 +242,19 @@ class Run(Frames):
 
     @property
     def estimates(self):
-        """{name: Estimate}, in the order of the program's registry; {} if there are none."""
+        """{name: estimate of the resistance}, in the order of the program's registry; {} if there are none."""
         found, labels, out = self.summary.get("estimates"), self.summary.get("estimate_labels"), {}
         for name, numbers in (found if isinstance(found, dict) else {}).items():
             if not (isinstance(numbers, dict) and "force_n" in numbers):
                 continue  # one of the conditions, or the curves
-            about = labels[name]
-            out[name] = Estimate(name, about["label"], about["kind"] == "on top", bool(about.get("uses_floe_size")),
-                                 numbers)
+            about, force = labels[name], np.nan if numbers["force_n"] is None else numbers["force_n"]
+            out[name] = SimpleNamespace(
+                label=about["label"], on_top=about["kind"] == "on top",  # added to the others, not compared with a run
+                uses_floe_size=bool(about.get("uses_floe_size")),  # its curve differs between fields of a case
+                numbers=numbers,  # the entries in summary.json: force_n, low_n, high_n, valid, compares, note, ...
+                force=force,  # N, NaN where the formula has no value
+                valid=bool(numbers.get("valid")),  # is it meant for the conditions?
+                compares=bool(numbers.get("compares")) and force > 0)  # valid, and it depends on the concentration
         return out
 
     @property
@@ -450,7 +427,7 @@ class Run(Frames):
         if np.isfinite(box).all():
             return tuple(box)
         points = self._world(self.pose(0)) if self.n_floes else self.body_polygons(0)[0]
-        return (*_extent(points[:, 0]), *_extent(points[:, 1]))
+        return tuple(np.stack([points.min(axis=0), points.max(axis=0)], axis=1).ravel().tolist())
 
     @property
     def period(self):
@@ -491,7 +468,3 @@ class Run(Frames):
         if "load" in group:
             out["load"] = self._read("panels/load", ndim=2)
         return out
-
-
-def _extent(x):
-    return float(np.min(x)), float(np.max(x))

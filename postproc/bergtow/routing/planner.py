@@ -6,9 +6,10 @@ t = 0: a position x of the berg at time t is x + drift t over the ground.
 """
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from ctypes import POINTER, c_double, c_int64
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Union
@@ -219,15 +220,20 @@ class _Task:
             least = math.sqrt((x1 - x0) * (y1 - y0) / most)
             setattr(t, name, 0 if value is None else _number(name, value, least))
 
-    def call(self, what: str, *more: Any) -> _library.RoutePlan:
-        plan = _library.RoutePlan()
-        getattr(_library.library(), what)(ctypes.byref(self.task), *more, ctypes.byref(plan))
-        return plan
+    @contextlib.contextmanager
+    def call(self, what: str, *more: Any) -> Iterator[_library.RoutePlan]:
+        """The plan, whose arrays are freed at the end of the block."""
+        plan, library = _library.RoutePlan(), _library.library()
+        getattr(library, what)(ctypes.byref(self.task), *more, ctypes.byref(plan))
+        try:
+            yield plan
+        finally:
+            library.bt_route_free(ctypes.byref(plan))
 
-    def cover(self, most: int = 1000) -> tuple[np.ndarray, tuple[float, float, float, float]]:
+    def cover(self) -> tuple[np.ndarray, tuple[float, float, float, float]]:
         x0, y0, x1, y1 = self.task.extent
-        cell = max(x1 - x0, y1 - y0) / most
-        nx, ny = max(1, math.ceil((x1 - x0) / cell)), max(1, math.ceil((y1 - y0) / cell))
+        cell = max(x1 - x0, y1 - y0) / 1000
+        nx, ny = (max(1, math.ceil(side / cell)) for side in (x1 - x0, y1 - y0))
         out = np.zeros((ny, nx))
         _library.library().bt_route_cover(ctypes.byref(self.task), nx, ny, _pointer(out))
         return np.clip(out, 0, 1), (x0, x1, y0, y1)
@@ -294,29 +300,23 @@ def plan(ice: Ice, hull: Hull, start: Iterable[float], goal: Points, **options: 
 
     Raises BergtowError for invalid numbers. If there is no route, Plan.status gives the reason."""
     task = _Task(ice, hull, start, goal, **options)
-    found = task.call("bt_route_make")
     t = task.task
-    try:
+    with task.call("bt_route_make") as found:
         routes = [_route(found.route[k], "planned" if k else "straight", t.width, found.cell) for k in range(found.n)]
-        status, n, spacing, cell, states = STATUS[found.status], found.n, found.spacing, found.cell, found.states
-        force = found.force
-    finally:
-        _library.library().bt_route_free(ctypes.byref(found))
-    data: dict[str, Any] = {}
-    if status.startswith("start"):
-        data = {"x": t.start[0], "y": t.start[1]}
-    elif status.startswith("goal"):
-        data = {"x": t.goal[0], "y": t.goal[1]}
-    if status.endswith("too_thick"):
-        data |= {"force": force, "factor": t.force_factor, "limit": t.force_limit}
-    if status.endswith("no_go"):
-        far = [apart.to_edges(np.array([[data["x"], data["y"]]]), polygon)[0]
-               for polygon in np.split(task.no_go, task.no_go_first[1:-1])]
-        data |= {"polygon": int(np.argmin(far)), "needed": t.reach + t.clearance}
-    if status == "fewer_routes":
-        data = {"wanted": t.routes, "found": n - 1}
-    cover, cover_extent = task.cover()
-    return Plan(status, data, routes, spacing, cell, states, cover, cover_extent)
+        status = STATUS[found.status]
+        data: dict[str, Any] = {}
+        for what, place in ("start", t.start), ("goal", t.goal):
+            if status.startswith(what):
+                data = {"x": place[0], "y": place[1]}
+        if status.endswith("too_thick"):
+            data |= {"force": found.force, "factor": t.force_factor, "limit": t.force_limit}
+        if status.endswith("no_go"):
+            far = [apart.to_edges(np.array([[data["x"], data["y"]]]), polygon)[0]
+                   for polygon in np.split(task.no_go, task.no_go_first[1:-1])]
+            data |= {"polygon": int(np.argmin(far)), "needed": t.reach + t.clearance}
+        if status == "fewer_routes":
+            data = {"wanted": t.routes, "found": found.n - 1}
+        return Plan(status, data, routes, found.spacing, found.cell, found.states, *task.cover())
 
 
 def route_through(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[float], corners: Points = (), *,
@@ -325,13 +325,10 @@ def route_through(ice: Ice, hull: Hull, start: Iterable[float], end: Iterable[fl
     force. Without corners it is the straight line. Options: those of plan()."""
     task = _Task(ice, hull, start, np.asarray(list(end), dtype=float), speeds=(speed,), **options)
     points = np.ascontiguousarray(corners, dtype=float).reshape(-1, 2)
-    found = task.call("bt_route_through", len(points), _pointer(points))
-    try:
+    with task.call("bt_route_through", len(points), _pointer(points)) as found:
         if not found.n:
             raise BergtowError(UNREACHED[STATUS[found.status]])
         return _route(found.route[0], "planned" if len(points) else "straight", task.task.width, found.cell)
-    finally:
-        _library.library().bt_route_free(ctypes.byref(found))
 
 
 def fit_weights(features: Sequence[Union[Mapping[str, float], Sequence[float]]], forces: Sequence[float]) -> Fit:

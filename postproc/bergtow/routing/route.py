@@ -61,9 +61,6 @@ STATUS = {
 }
 
 
-# ---- command line
-
-
 def options(p):
     p.add_argument("case", metavar="CASE.yml", type=Path)
     p.add_argument("--to", required=True, metavar="X,Y", help="goal, in metres of the case or with units, or in "
@@ -136,11 +133,9 @@ def wanted(a, s):
     if a.members == 1 and a.map_error is None and a.drift_error is None and a.thickness_error == THICKNESS:
         errors = members.Errors(0.0, 0.0, 0.0)
     else:
-        errors = members.Errors(
-            POSITION * s.hull.width if a.map_error is None else a.map_error, a.thickness_error,
-            DRIFT * speeds[-1] if a.drift_error is None else a.drift_error)
-    if a.drift_error is None and s.values["water.current_table"] and errors.drift:
-        errors = members.Errors(errors.position, errors.thickness, 0.0)
+        drift = 0.0 if s.values["water.current_table"] else DRIFT * speeds[-1]
+        errors = members.Errors(POSITION * s.hull.width if a.map_error is None else a.map_error, a.thickness_error,
+                                drift if a.drift_error is None else a.drift_error)
     return {"speeds": tuple(speeds), "errors": errors,
             "assumed": a.map_error is None or a.drift_error is None or a.thickness_error == THICKNESS,
             "limit": a.force_limit, "radius": a.radius if a.radius is not None else
@@ -173,9 +168,7 @@ def at_speed(route, speed, s, cell, options):
     *over_ground, goal = route.waypoints + np.outer([*times, route.duration], s.drift)
     moved = passed(over_ground, s.start, s.drift, speed) if any(s.drift) and over_ground else None
     found, why = [], None
-    for some in (corners, moved):
-        if some is None:
-            continue
+    for some in (corners, *[moved] * (moved is not None)):
         try:  # a hair less of a radius: arcs that touch fit in spite of rounding
             found.append(planner.route_through(s.ice, s.hull, s.start, goal, some, speed=speed, cell=cell,
                                                **options | {"radius": 0.999 * options["radius"]}))

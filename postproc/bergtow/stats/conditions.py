@@ -30,8 +30,7 @@ def member(e, m):
     """Mean of one member with its standard error within the run."""
     within = stat_mean.series_mean(e.steady(m))
     mean, independent = e.mean[m], e.number("window_n_independent", m)
-    low, high = within.low, within.high
-    se, share = within.se, e.number("window_no_load_share", m)
+    low, high, se, share = within.low, within.high, within.se, e.number("window_no_load_share", m)
     if share > 0:
         mean, se, low, high = at_least.AtLeast(mean, share), np.nan, np.nan, np.nan
     return {"name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
@@ -42,11 +41,9 @@ def member(e, m):
 
 def samples(e, rows, members):
     """Samples of the steady windows of a condition: (those of each field; number of independent ones; every 2 tau-th
-    above zero, at most MAX_SAMPLES).
-
-    All fields are thinned equally, by the median of their tau. Thinning each field by its own tau would give it the
-    weight 1/tau, and almost all weight to a field without contact, whose tau is that of a constant.
-    """
+    above zero, at most MAX_SAMPLES). All fields are thinned equally, by the median of their tau. Thinning each field by
+    its own tau would give it the weight 1/tau, and almost all weight to a field without contact, whose tau is that of a
+    constant."""
     found = [(e.steady(m), members[m]["tau_samples"]) for m in rows]
     every = [x for x, _ in found if len(x)]
     taus = [tau for x, tau in found if len(x) and np.ptp(x) > 0 and np.isfinite(tau)]
@@ -62,38 +59,30 @@ def estimates(e, rows, mean):
     compared with it (bergtow/estimate.h)."""
     out = {}
     for name, estimate in e.estimates.items():
-        def column(what, default=None):
+        def column(what, default=np.full(len(rows), np.nan)):
             values = e.summary.get(f"estimates_{name}_{what}")
-            return np.full(
-                len(rows),
-                np.nan) if values is None and default is None else default if values is None else values[rows]
+            return default if values is None else values[rows]
         valid = column("valid")
         force, compares = float(np.mean(column("force_n"))) if len(rows) else np.nan, column("compares", valid)
         held = len(rows) and not estimate["on_top"] and np.all(compares == 1) and force > 0
-        out[name] = {
-            "label": estimate["label"], "on_top": estimate["on_top"], "force": force,
-            "valid": bool(len(rows)
-                          and np.all(valid == 1)), "compares": bool(held), "ratio": mean / force if held else np.nan
-        }
+        out[name] = {"label": estimate["label"], "on_top": estimate["on_top"], "force": force,
+                     "valid": bool(len(rows) and np.all(valid == 1)), "compares": bool(held),
+                     "ratio": mean / force if held else np.nan}
     return out
 
 
 def extremes(e, rows, options):
     """Exceedance, block maxima and peaks over a threshold of a condition's collisions."""
-    fields, conversions = [], set()
-    for m in rows:
-        hits = e.impacts(m)
-        if hits:
-            time, peak, start, hours, conversion = hits
-            fields.append({"time": time, "peak": peak, "start": start, "hours": hours,
-                           "gap": 2 * e.number("window_correlation_time_s", m)})
-            conversions.add(conversion)
+    hits = {m: found for m in rows if (found := e.impacts(m))}
+    conversions = {conversion for *_, conversion in hits.values()}
+    fields = [{"time": time, "peak": peak, "start": start, "hours": hours}
+              for time, peak, start, hours, _ in hits.values()]
     if not fields:
         return {"refused": "no collisions: the members' folders are not there, or impact.conversion was none"}
     if len(conversions) > 1:
         return {"refused": f"peaks of different conversions: {'; '.join(sorted(conversions))}"}
-    gaps = [f["gap"] for f in fields if np.isfinite(f["gap"])]
-    gap = options.gap if options.gap is not None else float(np.median(gaps)) if gaps else 0.0
+    taus = [tau for m in hits if np.isfinite(tau := e.number("window_correlation_time_s", m))]
+    gap = options.gap if options.gap is not None else float(np.median(2 * np.array(taus))) if taus else 0.0
     peaks, rate = stat_extreme.exceedance(fields)
     hours = sum(f["hours"] for f in fields)
     ranks = [k for k in (1, 3, 10, 30, 100, 300, 1000) if k <= len(peaks)]
@@ -102,8 +91,7 @@ def extremes(e, rows, options):
         "collisions_per_hour": len(peaks) / hours, "exceedance": [{"per_hour": rate[k - 1], "peak": peaks[k - 1]}
                                                                   for k in ranks],
         "block_maxima": stat_extreme.by_blocks(fields, options.hours, options.blocks, options.resamples),
-        "over_threshold": stat_extreme.over_threshold(fields, options.hours, gap, options.threshold, options.resamples)
-    }
+        "over_threshold": stat_extreme.over_threshold(fields, options.hours, gap, options.threshold, options.resamples)}
 
 
 def drift(e, rows, mean):
@@ -113,14 +101,13 @@ def drift(e, rows, mean):
         return {"verdict": "not judged", "words": "too few fields"}
     change, (low, high), moved = found
     factor, unit = scale([abs(change)], "N")
-    words = (f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} (95 %: "
-             f"{short(min(abs(low), abs(high)) / factor)} to "
-             f"{short(max(abs(low), abs(high)) / factor)})") if moved else "no drift"
+    ends = " to ".join(short(end / factor) for end in sorted((abs(low), abs(high))))
+    words = f"{'rises' if change > 0 else 'falls'} by {short(abs(change) / factor)} {unit} (95 %: {ends})" if moved \
+        else "no drift"
     return {"verdict": "not steady" if moved else "steady", "change": change, "change_95": (low, high), "words": words}
 
 
 def condition(e, c, members, options):
-    """All statistics of one condition."""
     rows = c.finished
     means, errors = (np.array([members[m][key] for m in rows]) for key in ("mean", "se_within"))
     fields = stat_mean.between_fields(means, errors, options.error)
@@ -139,8 +126,7 @@ def condition(e, c, members, options):
             "independent": independent, "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
             "fits": stat_fit.fit_all(values, options.resamples)
         }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options, gathered),
-        "loads_left_out": left_out, "panels": loads.panels(e, rows)
-    }
+        "loads_left_out": left_out, "panels": loads.panels(e, rows)}
     without = e.without_bound(c.members)
     if without and len(rows):
         out = at_least.condition(out, str(without), without.share, loads.bounded(out["loads"], without))
@@ -166,18 +152,15 @@ def sample(e, means):
 
 def sensitivity(e, members):
     """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, with respect to
-    the varied parameters.
-
-    If a few jams dominate the variance of the mean, no smooth function predicts it; its logarithm may still be
-    predictable.
-    """
+    the varied parameters. If a few jams dominate the variance of the mean, no smooth function predicts it; its
+    logarithm may still be predictable."""
     if without := e.without_bound(np.arange(e.n)):
         return {"refused": f"means are lower bounds, {without}"}
     varied, y, of = sample(e, {m: members[m]["mean"] for m in e.used})
     if not varied or len(y) < 8:
         return {"refused": "nothing is varied" if not varied else f"{len(y)} {of}, needs 8"}
-    logs = stat_sensitivity.sobol(
-        varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
+    logs = stat_sensitivity.sobol(varied, np.log(y)) if y.min() > 0 else {
+        "refused": f"{np.sum(y <= 0)} means are not positive"}
     return {"members": len(e.used), "samples": len(y), "of": of, "ranks": stat_sensitivity.rank_correlations(varied, y),
             "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
 

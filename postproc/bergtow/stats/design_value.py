@@ -350,8 +350,7 @@ def statement(e, rows, c):
                               "mean": worst[1]["mean"]["value"]},
         "warnings": [{"what": what, "detail": detail} for what, detail in warned], "branches": lines,
         "breaking_load": case.breaking_load if case else np.nan,
-        "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
-    }
+        "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)}
 
 
 def _moved(e, case):

@@ -132,9 +132,7 @@ def block_maxima(time, peak, start, hours, blocks):
     """Largest peak in each of the equal blocks of a field, NaN in a block without peaks."""
     k = np.clip(((time - start) / (3600 * hours) * blocks).astype(int), 0, blocks - 1)
     out = np.full(blocks, np.nan)
-    for i in range(blocks):
-        if (k == i).any():
-            out[i] = peak[k == i].max()
+    np.fmax.at(out, k, peak)
     return out
 
 
@@ -170,12 +168,9 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
     if threshold is None:
         threshold = choose_threshold(fields, pooled, gap, clusters_wanted)
         if threshold is None:
-            return {
-                "refused": saturated(pooled, what) or
-                           f"too little data: fewer than {LEAST_EXCESSES} independent peaks ({gap:.3g} s apart) above "
-                           "any usable threshold; simulate longer or add fields"
-                           + ("" if clusters_wanted else ", or `bergtow statistics` with a shorter --gap")
-            }
+            return {"refused": saturated(pooled, what) or f"too little data: fewer than {LEAST_EXCESSES} independent "
+                    f"peaks ({gap:.3g} s apart) above any usable threshold; simulate longer or add fields"
+                    + ("" if clusters_wanted else ", or `bergtow statistics` with a shorter --gap")}
     each = _excesses(fields, threshold, gap)
     excess, raw = np.concatenate(each), sum(int(np.sum(exceeds(f["peak"], threshold))) for f in fields)
     if len(excess) < LEAST_EXCESSES:
@@ -193,8 +188,8 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
     return {"threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
             "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
             "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
-            "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
-                                        resamples), "interval": interval_note(len(fields)),
+            "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit, resamples),
+            "interval": interval_note(len(fields)),
             "levels": [{"hours": T, "level": z, "level_95": bounded(fields, z, ends), "beyond_data": bool(T > hours)}
                        for T, (z, ends) in zip(hours_of_levels, levels)]}
 
@@ -219,14 +214,12 @@ def gpd_minus_log_likelihood(log_scale, shape, y):
 
 
 def gpd_intervals(each, hours, threshold, scale, shape, hours_of_levels):
-    """([(level, (low, high)) for each return time], (low, high) of the shape). each: excesses by field.
-
-    In the profile the rate of clusters stays at its estimate; its error, from the counts of the fields, is included in
-    the dispersion.
-    """
-    excess, unit, n = np.concatenate(each), scale, len(each)
-    y, total, hours = [x / unit for x in each], np.concatenate(each) / unit, np.asarray(hours, dtype=float)
-    rate = len(excess) / hours.sum()
+    """([(level, (low, high)) for each return time], (low, high) of the shape). each: excesses by field. In the profile
+    the rate of clusters stays at its estimate; its error, from the counts of the fields, is included in the
+    dispersion."""
+    y, unit, hours, n = [x / scale for x in each], scale, np.asarray(hours, dtype=float), len(each)
+    total = np.concatenate(y)
+    rate = len(total) / hours.sum()
     best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted scale), shape, ln rate
     def by_field(theta):
         return np.array([gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h
@@ -326,8 +319,7 @@ def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a
         "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
         "anderson_darling": fitted["anderson_darling"], "p_value": fitted["p_value"], "interval": interval_note(n),
         "levels": [{"hours": T, "level": z, "level_95": bounded(fields, z, ends), "beyond_data": bool(T > total)}
-                   for T, (z, ends) in zip(hours_of_levels, levels)]
-    }
+                   for T, (z, ends) in zip(hours_of_levels, levels)]}
 
 
 def gev_intervals(each, location, scale, shape, shares):

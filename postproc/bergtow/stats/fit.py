@@ -39,9 +39,8 @@ def _normal(x):
 
 
 def _lognormal(x):
-    logs = np.log(x)
-    return {"median": np.exp(logs.mean()), "sd_log": logs.std()}, Frozen(scipy.stats.lognorm, logs.std(),
-                                                                                            scale=np.exp(logs.mean()))
+    median, sd = np.exp(np.log(x).mean()), np.log(x).std()
+    return {"median": median, "sd_log": sd}, Frozen(scipy.stats.lognorm, sd, scale=median)
 
 
 def _weibull(x):
@@ -113,8 +112,8 @@ def gev(x):
 
 def _gev(x):
     location, scale, shape = gev(x)
-    return {"location": location, "scale": scale, "shape": shape}, Frozen(scipy.stats.genextreme, -shape, loc=location,
-                                                                                     scale=scale)
+    return {"location": location, "scale": scale, "shape": shape}, Frozen(scipy.stats.genextreme, -shape,
+                                                                          loc=location, scale=scale)
 
 
 #: name: (fit, parameters, positive values only?)

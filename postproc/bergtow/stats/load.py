@@ -141,8 +141,7 @@ def deviation(samples):
 
 def over_fields(statistic, samples, low=-np.inf, scale=None):
     """A statistic of the samples of all fields together, with its interval."""
-    without = [statistic(samples[:i] + samples[i + 1:]) for i in range(len(samples))
-               ] if len(samples) > 1 else [np.nan]
+    without = [statistic(samples[:i] + samples[i + 1:]) for i in range(len(samples))] if len(samples) > 1 else [np.nan]
     value = statistic(samples)
     return {"value": value, "interval_95": jackknife(value, without, low, np.inf, scale)}
 
@@ -196,8 +195,7 @@ def exceedance(fields, gap):
         out.append({
             "level": level,
             "share_of_time": ratio_over_fields(above, np.ones(len(fields)), 1.0, LOGIT, sum(clusters)),
-            "per_hour": ratio_over_fields(clusters, [f["hours"] for f in fields])
-        })
+            "per_hour": ratio_over_fields(clusters, [f["hours"] for f in fields])})
     return out
 
 
@@ -210,8 +208,7 @@ def summary(fields):
         "sd": over_fields(deviation, samples, 0.0, LOG),
         "quantiles": {str(q): over_fields(lambda some, q=q: percentile(some, q), samples, least) for q in QUANTILES},
         "largest": max(x.max() for x in samples),
-        "smallest": min(x.min() for x in samples)
-    }
+        "smallest": min(x.min() for x in samples)}
 
 
 def extremes(fields, gap, hours_of_levels, resamples):

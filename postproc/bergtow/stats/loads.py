@@ -68,39 +68,30 @@ def filler(run):
     return least if run.number("no_load_steps") > 0 else np.asarray
 
 
-def _floe_force(run):
-    """(Load, values) of the largest force of one floe, None if collisions are not recorded separately."""
-    if not {"largest_quasi_static_load", "impact_peak"} <= set(run.series_names):
-        return None
-    push, peak = run["largest_quasi_static_load"], run["impact_peak"]
-    if not (np.isfinite(push).any() and np.isfinite(peak).any()):
-        return None
-    conversion, steps = str(run.impacts["conversion"]), run.steps_per_sample
-    push = filler(run)(push)
-    return Load("floe_force", "force of one floe", run.units("largest_quasi_static_load"),
-                "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of a "
-                "collision", conversion=conversion,
-                refused=f"of every {steps} steps only the largest was kept; set output.sample_every: 1"
-                if steps > 1 else ""), np.maximum(push, peak)
-
-
-def _panel_load(run):
-    """(Load, values [n, panels]), None if a run has no panel series."""
-    if "load" not in run.panel_series:
-        return None
-    found = run.panel_series
-    return Load("panel_load", "load on one hull panel", found["units"],
-                "sum of the normal forces on a panel of the hull, the largest of them"), filler(run)(found["load"])
+def _floe_force(run, filled):
+    """[(Load, values)] of the largest force of one floe; none if collisions are not recorded separately."""
+    names = "largest_quasi_static_load", "impact_peak"
+    if not all(name in run and np.isfinite(run[name]).any() for name in names):
+        return []
+    steps, (push, peak) = run.steps_per_sample, (run[name] for name in names)
+    return [(Load("floe_force", "force of one floe", run.units(names[0]),
+                  "largest normal force of one floe or wall on the towed body: as the mean over a step, or the peak of "
+                  "a collision", conversion=str(run.impacts["conversion"]),
+                  refused=f"of every {steps} steps only the largest was kept; set output.sample_every: 1"
+                  if steps > 1 else ""), np.maximum(filled(push), peak))]
 
 
 def of_run(run):
-    """[(Load, values)] of a run, and the times of the values."""
-    out, filled = [], filler(run)
-    for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
-        if np.isfinite(run[name]).any():
-            out.append((Load(name, run.label(name), run.units(name), run.description(name),
-                             run.attribute(name, "needs")), filled(run[name])))
-    return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
+    """[(Load, values)] of a run, and the times of the values; panel loads are [n, panels]."""
+    filled, panels = filler(run), run.panel_series
+    out = [(Load(name, run.label(name), run.units(name), run.description(name), run.attribute(name, "needs")),
+            filled(run[name])) for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE)
+           if np.isfinite(run[name]).any()] + _floe_force(run, filled)
+    if "load" in panels:
+        load = Load("panel_load", "load on one hull panel", panels["units"],
+                    "sum of the normal forces on a panel of the hull, the largest of them")
+        out.append((load, filled(panels["load"])))
+    return out, run["time"]
 
 
 def of_member(e, m):
@@ -199,12 +190,6 @@ def _below_zero(load, mean, tow):
     return "its mean is below zero, so the level that it seldom exceeds is its least" if mean < 0 else ""
 
 
-def _of_a_constant(value, hours, total):
-    """The design value of a load that nothing makes vary: itself, and there is no tail to extrapolate."""
-    return {"value": value, "interval_95": (value, value), "model": CONSTANT, "return_hours": hours,
-            "times_the_hours_simulated": hours / total, "beyond_data": False, "shape": np.nan, "irregular": False}
-
-
 def _design(found, hours, total):
     """The level of the last return time from peaks over a threshold, or from block maxima if there are too few. There
     is none if its interval is not bounded: the sample then does not determine the tail, and such a level
@@ -254,10 +239,11 @@ def statistics(e, rows, options, gathered=None):
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
                 "probability": options.probability, "tow_hours": tow_hours,
                 **({"refused": below, "below_zero": True, "return_hours": design_hours} if below else
-                   _of_a_constant(fields[0]["peak"][0], design_hours, total) if itself else
-                   _design(found, design_hours, total))
-            }
-        }
+                   # nothing makes it vary: its value is itself, and there is no tail to extrapolate
+                   {"value": fields[0]["peak"][0], "interval_95": (fields[0]["peak"][0],) * 2, "model": CONSTANT,
+                    "return_hours": design_hours, "times_the_hours_simulated": design_hours / total,
+                    "beyond_data": False, "shape": np.nan, "irregular": False} if itself else
+                   _design(found, design_hours, total))}}
     return out
 
 

@@ -150,9 +150,7 @@ def between_fields(means, errors, wanted=0.05):
         "sd_of_fields": np.sqrt(max(sd**2 - within**2, 0.0)) if np.isfinite([sd, within]).all() else np.nan,
         "t_95": t_interval(means), "bootstrap_95": studentised_interval(means), "median": np.median(means),
         "median_95": median_interval(means), "trimmed_mean": trimmed, "trimmed_each_end": int(TRIM * n),
-        "largest_share": np.max(np.abs(means)) / total if total > 0 else np.nan, "percentiles": {
-            str(p): np.percentile(means, p)
-            for p in (5, 25, 75, 95)
-        }, "min": means.min(), "max": means.max(), "fields_needed": fields_needed(means.mean(), sd, wanted),
-        "fields_needed_95": tuple(fields_needed(means.mean(), s, wanted) for s in sd_range)
-    }
+        "largest_share": np.max(np.abs(means)) / total if total > 0 else np.nan,
+        "percentiles": {str(p): np.percentile(means, p) for p in (5, 25, 75, 95)},
+        "min": means.min(), "max": means.max(), "fields_needed": fields_needed(means.mean(), sd, wanted),
+        "fields_needed_95": tuple(fields_needed(means.mean(), s, wanted) for s in sd_range)}

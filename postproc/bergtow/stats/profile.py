@@ -30,12 +30,8 @@ SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes a
 
 def gradient(f, theta, step=1e-4):
     """d f / d theta, f scalar or [F]: [k] or [k, F]."""
-    out = []
-    for i in range(len(theta)):
-        d = np.zeros(len(theta))
-        d[i] = step
-        out.append((np.asarray(f(theta + d)) - np.asarray(f(theta - d))) / (2 * step))
-    return np.array(out)
+    return np.array([(np.asarray(f(theta + d)) - np.asarray(f(theta - d))) / (2 * step)
+                     for d in step * np.eye(len(theta))])
 
 
 def dispersion(minus_log_likelihoods, quantity, theta):
@@ -69,10 +65,7 @@ def drop(fields, c, share=1.0, level=0.95):
 
 def interval(minus_log_likelihood, best, rest, fall, first):
     """(low, high) of a quantity: where min over rest of minus_log_likelihood(q, rest) has risen by `fall` above its
-    value at q = best.
-
-    first: first step away from best. An end that is not found is infinite.
-    """
+    value at q = best. first: first step away from best. An end that is not found is infinite."""
     least = minus_log_likelihood(best, rest)
     def rise(q, start):
         # The simplex is set explicitly: SciPy's is 0.00025 wide near zero, so that the search ends where it began.

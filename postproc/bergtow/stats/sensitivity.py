@@ -54,9 +54,8 @@ def _interval(r, n, others):
 
 def rank_correlations(parameters, y):
     """{name: spearman, prcc with (low, high), p} of numeric parameters {name: [n]}; names of choices are left out."""
-    names = [
-        k for k, v in parameters.items() if np.asarray(v).dtype != object and np.ptp(np.asarray(v, dtype=float)) > 0
-    ]
+    names = [k for k, v in parameters.items()
+             if np.asarray(v).dtype != object and np.ptp(np.asarray(v, dtype=float)) > 0]
     n, ranks, target = len(y), {k: scipy.stats.rankdata(parameters[k]) for k in names}, scipy.stats.rankdata(y)
     out = {}
     for name in names:
@@ -128,8 +127,7 @@ def _indices(c, variance, terms, k):
     if not whole > 0:
         return np.full(k, np.nan), np.full(k, np.nan)
     alone = inside.sum(axis=1) == 1
-    return (np.array([power[inside[:, i] & alone].sum()
-                      for i in range(k)]) / whole, np.array([power[inside[:, i]].sum() for i in range(k)]) / whole)
+    return tuple(np.array([power[inside[:, i] & some].sum() for i in range(k)]) / whole for some in (alone, True))
 
 
 def sobol(parameters, y, resamples=RESAMPLES):
@@ -155,11 +153,8 @@ def sobol(parameters, y, resamples=RESAMPLES):
                            f"{PER_TERM * (len(names) + 1)} that differ in all of them"}
     (c, variance, r2, q2), a, terms, degree = best
     if q2 < LEAST_Q2:
-        return {
-            "refused": f"the best expansion (degree {degree}, {len(terms)} terms) predicts too little of {n} values: "
-                       f"Q² = {q2:.2f}, needs {LEAST_Q2}",
-            "q2": q2, "r2": r2
-        }
+        return {"refused": f"the best expansion (degree {degree}, {len(terms)} terms) predicts too little of {n} "
+                           f"values: Q² = {q2:.2f}, needs {LEAST_Q2}", "q2": q2, "r2": r2}
     first, total = _indices(c, variance, terms, len(names))
     rng, drawn = np.random.default_rng(SEED), []
     for _ in range(resamples):
@@ -168,14 +163,8 @@ def sobol(parameters, y, resamples=RESAMPLES):
         # the columns are nearly orthonormal, so the normal equations suffice
         again = np.linalg.lstsq(drawn_a.T @ drawn_a, drawn_a.T @ y[pick], rcond=None)[0]
         # its own variance and that of the resampling
-        drawn.append(np.concatenate(_indices(again, 2 * variance, terms, len(names))))
-    drawn = np.array(drawn).reshape(-1, 2 * len(names))
-    low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0) if len(drawn) else np.full((2, 2 * len(names)), np.nan)
-    k = len(names)
-    return {
-        "samples": n, "degree": degree, "terms": len(terms), "r2": r2, "q2": q2, "indices": {
-            name: {"first": first[i], "first_95": (low[i], high[i]), "total": total[i],
-                   "total_95": (low[k + i], high[k + i])}
-            for i, name in enumerate(names)
-        }
-    }
+        drawn.append(_indices(again, 2 * variance, terms, len(names)))
+    ends = np.nanquantile(drawn, [0.025, 0.975], axis=0) if drawn else np.full((2, 2, len(names)), np.nan)
+    return {"samples": n, "degree": degree, "terms": len(terms), "r2": r2, "q2": q2, "indices": {
+        name: {"first": first[i], "first_95": tuple(ends[:, 0, i]), "total": total[i], "total_95": tuple(ends[:, 1, i])}
+        for i, name in enumerate(names)}}

@@ -11,7 +11,7 @@ so they tend to be too wide. Sobol indices of the condition means (stats/sensiti
 the scale, linear or logarithmic, on which the expansion predicts better. Rejected: shares from correlations alone,
 which miss interactions; a surrogate of all members, whose cross-validation would see the same condition twice.
 """
-from dataclasses import dataclass
+from collections import namedtuple
 
 import numpy as np
 
@@ -23,13 +23,9 @@ LEAST = 8            # conditions
 QUANTITIES = ("width", "length", "dt", "tolerance", "window")  # of bergtow converge, those that affect the mean
 
 
-@dataclass(frozen=True)
-class Parts:
-    """The mean and the variances of the two parts."""
-
-    mean: float
-    fields: float      #: variance; NaN with one field in each condition
-    parameters: float  #: variance; with one field in each condition, that of both parts
+#: the mean and the variances of the two parts; with one field in each condition that of `fields` is NaN, and that of
+#: `parameters` the variance of both
+Parts = namedtuple("Parts", "mean fields parameters")
 
 
 def parts(groups):
@@ -46,9 +42,8 @@ def parts(groups):
     return Parts(float(grand), float(within), float(between - within * np.mean(1 / n)))
 
 
-def _sd(variance, ends):
-    low, high = (float(np.sqrt(max(v, 0.0))) if np.isfinite(v) else np.nan for v in ends)
-    return {"sd": float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else np.nan, "sd_95": (low, high)}
+def _sd(variance):
+    return float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else np.nan
 
 
 def shares(parameters, means):
@@ -127,7 +122,8 @@ def budget(parameters, condition, y, numerics=None):
            "mean_95": stat_load.jackknife(whole.mean, [p.mean for p in without])}
     for name in ("fields", "parameters"):
         v = getattr(whole, name)
-        out[name] = _sd(v, stat_load.jackknife(v, [getattr(p, name) for p in without], scale=stat_load.LOG))
+        ends = stat_load.jackknife(v, [getattr(p, name) for p in without], scale=stat_load.LOG)
+        out[name] = {"sd": _sd(v), "sd_95": tuple(map(_sd, ends))}
     n = out["numerics"] = _numerics(numerics, whole.mean)
     squares = {"fields": np.nan_to_num(whole.fields), "parameters": max(whole.parameters, 0.0),
                "numerics": np.nan_to_num(n["sd"]) ** 2 if n and "sd" in n else 0.0}

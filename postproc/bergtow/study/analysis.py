@@ -19,9 +19,6 @@ KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty bud
          "capability": ("Towing capability", capability_text)}
 
 
-# ---- command line
-
-
 def add_options(p, minutes):
     """Add --budget, --set, --jobs, --force."""
     p.add_argument("--budget", type=arguments.minutes, default=minutes, metavar="MIN",

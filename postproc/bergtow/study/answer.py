@@ -156,19 +156,17 @@ def parts_of(e, rows, value, wind):
 
 
 def condition(e, c, k, o):
-    """The row of a steady tow."""
     gathered = stat_loads.gather(e, c.finished, o)[0] if len(c.finished) else {}
     tow = gathered.get("tow_force")
     s = stat_conditions.condition(e, c, {m: stat_conditions.member(e, m) for m in c.finished}, o)
     found = s["loads"].get("tow_force")
     means = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))[c.finished]
     means = means[np.isfinite(means)]
-    name = f"steady.{k + 1}"
+    name, fields = f"steady.{k + 1}", tow[1] if tow else []
     case = case_of(e, {"id": name})
-    value = value_of(e, c, found, tow[1] if tow else [], too_slow(case, s["design"]["speed"]))
+    value = value_of(e, c, found, fields, too_slow(case, s["design"]["speed"]))
     parts = parts_of(e, c.finished, value["n"], windy(case))
-    start = found and found["start_up"]
-    hours = sum(f["hours"] for f in tow[1]) if tow else 0.0
+    start, hours = found and found["start_up"], sum((f["hours"] for f in fields), 0.0)
     return {
         "id": name, "label": c.label, "values": c.values, "fields": len(c.finished), "hours": hours, "value": value,
         "gap_s": found and found["gap_s"], "time_scale_s": found and found["time_scale_s"],
@@ -217,10 +215,8 @@ def tow_of(e, row, line, vessel):
         if not e.folder(m).is_dir():
             continue
         with Run(e.folder(m)) as run:
-            direction = run.value("tow.direction", 0.0)
-            vertices = run.bodies[run.towed].vertices
-            x, y = vertices.T
-            value = row["value"]
+            direction, value = run.value("tow.direction", 0.0), row["value"]
+            x, y = run.bodies[run.towed].vertices.T
             return load_cases.Tow(
                 case=run.case, speed=row["speed_m_s"], direction=direction,
                 mass=load_cases.mass_of(run, direction), water=part["water"], wind=part["wind"], ice=part["ice"],
@@ -353,8 +349,8 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     if ramp and ramp["by"] == "closed_form" and worst["start_up"] is not None:
         cases.append(own_start(worst, ramp))
     some = [c for c in cases if c["in_design"] and np.isfinite(c["n"]) and not held_back(worst)]
-    top = max((c for c in some if c["acts_on"] == "tow"), key=lambda c: c["n"], default=None)
-    hold = max(some, key=lambda c: c["n"], default=None)
+    of_tow = [c for c in some if c["acts_on"] == "tow"]
+    top, hold = (max(these, key=lambda c: c["n"], default=None) for these in (of_tow, some))
     design = top and {"id": "design", "row": top["id"], **{k: top[k] for k in ("n", "kind", "interval_95", "reason")},
                       "value": worst["value"] if top["id"] == "case.steady" else None}
     found = [r for r in ranges if r["reason"] is None]
@@ -390,6 +386,5 @@ def of(asked, plan, rows, cases, ramp, ranges, v, t, cost, **more):
     out = {"format": FORMAT, "asked": {k: x for k, x in asked.items() if k != "line_found"}, "plan": plan,
            "conditions": rows, "load_cases": cases, "ramp": ramp, "design": design, "assumed": ranges, "band": band,
            "vessel": vessel, "line": line, "speeds": by_speed,
-           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t,
-                                [c for c in some if c["acts_on"] == "tow"]), "cost": cost, **more}
+           "feasible": feasible(by_speed, asked["speed_m_s"], v, efficiency, t, of_tow), "cost": cost, **more}
     return out | {"sentence": sentence(out)}

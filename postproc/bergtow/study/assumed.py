@@ -91,9 +91,8 @@ def ratio(base, other):
 def band(n, rows):
     """(least, largest) value of a load n, when every effect takes the sign that makes it so."""
     effects = np.array([[row["n_low"], row["n_high"]] for row in rows
-                        if row["n_low"] is not None and row["n_high"] is not None], dtype=float).reshape(-1, 2)
-    return n + np.minimum(effects.min(axis=1, initial=0.0), 0.0).sum(), \
-        n + np.maximum(effects.max(axis=1, initial=0.0), 0.0).sum()
+                        if None not in (row["n_low"], row["n_high"])], dtype=float).reshape(-1, 2)
+    return n + effects.min(axis=1, initial=0.0).sum(), n + effects.max(axis=1, initial=0.0).sum()
 
 
 def _moments(row):

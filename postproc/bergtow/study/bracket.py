@@ -15,6 +15,7 @@ only if it would be with any outcomes of these trials.
 Success is assumed to be monotonic along the value. Between a value that succeeds and a value that fails, the midpoint
 is tried next; a value that stays undecided has p near q, and the gaps on both sides of it are narrowed.
 """
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,16 +47,11 @@ def verdict(good, bad, share=0.5, level=LEVEL):
 
 def least_trials(share=0.5):
     """The fewest trials that can decide, whichever side they are on: 6 for a share of one half, 82 for 95 %."""
-    n = 1
-    while verdict(n, 0, share) != YES or verdict(0, n, share) != NO:
-        n += 1
-    return n
+    return next(n for n in itertools.count(1) if verdict(n, 0, share) == YES and verdict(0, n, share) == NO)
 
 
 @dataclass
 class Point:
-    """Trials at one value."""
-
     value: float
     good: int = 0
     bad: int = 0
@@ -124,9 +120,7 @@ class Bracket:
         if yes is None and no is None:
             return OPEN
         if yes is not None and no is not None:
-            if (value - yes) * (no - yes) <= 0:
-                return YES
-            return NO if (value - no) * (yes - no) <= 0 else OPEN
+            return YES if (value - yes) * (no - yes) <= 0 else NO if (value - no) * (yes - no) <= 0 else OPEN
         near, side = (yes, YES) if no is None else (no, NO)
         open_ends = [v for v in (self.start, self.end) if self.judged(v) == OPEN]
         return side if all((value - near) * (v - near) <= 0 for v in open_ends) else OPEN
@@ -140,9 +134,8 @@ class Bracket:
 
     def next(self):
         """The value to try next, None when the search is over."""
-        for value in (self.start, self.end):
-            if self.more(value):
-                return value
+        if more := [v for v in (self.start, self.end) if self.more(v)]:
+            return more[0]
         yes, no = self.ends()
         if yes is None or no is None:
             undecided = [v for v in (self.start, self.end) if self.judged(v) == OPEN]
@@ -152,9 +145,8 @@ class Bracket:
             yes, no = undecided[0], no if yes is None else yes
         low, high = min(yes, no), max(yes, no)
         inner = sorted(v for v in self.points if low < v < high)
-        for value in inner:
-            if self.more(value):
-                return value
+        if more := [v for v in inner if self.more(v)]:
+            return more[0]
         # all values in between were tried without a decision: the gaps next to them, the wider one first
         stops = [low, *inner, high]
         gaps = [(b - a, a, b) for a, b in zip(stops, stops[1:]) if not inner or a == low or b == high]

@@ -34,14 +34,11 @@ OF = "mean_ice_resistance_n", "tow_force:99", "tow_force:100"
 
 def assumed(e):
     """{parameter: distribution and source as the study gives them}."""
-    out = {}
-    for key, words in e.assumed.items():
-        out[key] = dict(words)
-        if e.units[key] not in ("", "1") and out[key]["distribution"]:
-            out[key]["distribution"] += f" {e.units[key]}"
-        if not out[key]["distribution"]:
-            out[key]["distribution"] = ", ".join(dict.fromkeys(str(v) for v in e.parameters[key]))
-    return out
+    def distribution(key, words):
+        unit = "" if e.units[key] in ("", "1") else f" {e.units[key]}"
+        return f"{words}{unit}" if words else ", ".join(dict.fromkeys(str(v) for v in e.parameters[key]))
+    return {key: words | {"distribution": distribution(key, words["distribution"])}
+            for key, words in e.assumed.items()}
 
 
 def quantile(e, rows, name, share):
@@ -186,8 +183,7 @@ def options(p):
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
     p.add_argument("--of", action="append", metavar="NUMBER", help="quantity to study: a key of the summary, or "
                    "LOAD:SHARE for a quantile in %% of the moving mean of a load over its time scale, 100 for the "
-                   "largest "
-                   f"value of a tow; may be repeated (default: {', '.join(OF)})")
+                   f"largest value of a tow; may be repeated (default: {', '.join(OF)})")
     p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for the part of "
                    "numerical error")
     analysis.add_options(p, BUDGET)

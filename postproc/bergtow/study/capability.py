@@ -45,8 +45,6 @@ FAILING = 3              # failed runs at a value after which the search gives i
 
 @dataclass(frozen=True)
 class Trial:
-    """The result of one run."""
-
     field: int
     least: float      #: m/s, to be kept
     speed: float      #: m/s, mean over the parts of the window where the speed is ordered; NaN: adrift
@@ -129,9 +127,6 @@ class Search:
     say: object       #: stream for the progress, None for no output
     widen: bool = True
 
-    def folder(self, c, value):
-        return f"{c.name}/{value:.8g}"
-
     def sets(self, c, value):
         """The keys that a value replaces in the case, {key: value}."""
         sets = c.sets | {self.key: f"{value:.12g} {self.unit}".strip()}
@@ -146,7 +141,7 @@ class Search:
         instead, and the value is decided once no outcome of the failed run could change the decision."""
         point = c.search.point(value)
         value = point.value
-        name, some = self.folder(c, value), c.trials.setdefault(value, [])
+        name, some = f"{c.name}/{value:.8g}", c.trials.setdefault(value, [])
         failed = c.failed.setdefault(value, [])
         first = len(some) + len(failed)
         if time.monotonic() + self.runs.seconds.get(name, 0.0) * -(-n // self.runs.jobs) > self.runs.end:
@@ -209,7 +204,6 @@ class Search:
 
 
 def row_of(c, value):
-    """The numbers of a value of a condition."""
     some = c.trials[value][:1] if value in c.alike else c.trials[value]
     out = {"value": value, "fields": len(some), "made": sum(int(t.made) for t in some),
            "parted": sum(t.parted for t in some), "failed": len(c.failed[value]),
@@ -242,7 +236,6 @@ def failures(s):
 
 
 def found_of(c):
-    """The limit of a condition, and its curve."""
     s = c.search
     yes, no = s.ends()
     why, sure = c.why or contradiction(s), False
@@ -256,9 +249,6 @@ def found_of(c):
             "estimate": np.nan if s.against() else s.estimate(), "resolved": sure or not why, "why": why,
             "runs": sum(len(t) for t in c.trials.values()) + sum(len(f) for f in c.failed.values()),
             "points": [row_of(c, v) for v in sorted(c.trials) if c.trials[v]]}
-
-
-# ---- command line
 
 
 def resolved(binary, case, sets):
@@ -341,11 +331,10 @@ def options(p):
 
 
 def check_options(a):
-    for name, k in (("start", 0), ("end", 1)):
-        if getattr(a, name) is None:
-            if a.search not in RANGES:
-                raise BergtowError(f"--search {a.search}: say its range with --from and --to", USAGE)
-            setattr(a, name, RANGES[a.search][k])
+    if None in (a.start, a.end) and a.search not in RANGES:
+        raise BergtowError(f"--search {a.search}: say its range with --from and --to", USAGE)
+    a.start, a.end = (own if given is None else given
+                      for given, own in zip((a.start, a.end), RANGES.get(a.search, ("", ""))))
     least = bracket.least_trials(a.share)
     a.fields = a.fields or FIELDS * least
     if a.fields < least:

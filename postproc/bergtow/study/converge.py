@@ -187,11 +187,10 @@ def pairing(base, other):
 def judged(interval, margin, one_sided=False):
     """"none", "matters" or "open". one_sided: only effects above zero matter."""
     low, high = interval
-    if one_sided:
-        return "none" if high <= margin else "matters" if low > margin else "open"
-    if -margin <= low and high <= margin:
+    least = -np.inf if one_sided else -margin
+    if least <= low and high <= margin:
         return "none"
-    return "matters" if low > margin or high < -margin else "open"
+    return "matters" if low > margin or high < least else "open"
 
 
 def unsolved(study, name, n):
@@ -270,12 +269,11 @@ def window(study, margin):
         rows = []
         for i in range(n):
             with Run(study.path("case", i)) as run:
-                if run.window is None:
-                    return not_judged(*WINDOW, "a run has no window")
-                if run.adrift < run.window[1]:
-                    return not_judged(*WINDOW, "the line of a run parts before the end of its window")
-                if run.at_least:
-                    return not_judged(*WINDOW, "the load of a run has no bound in some steps of its window")
+                why = "a run has no window" if run.window is None else \
+                    "the line of a run parts before the end of its window" if run.adrift < run.window[1] else \
+                    "the load of a run has no bound in some steps of its window" if run.at_least else ""
+                if why:
+                    return not_judged(*WINDOW, why)
                 (start, end), t, x = run.window, run["time"], run["ice_resistance"]
                 first = start + (run.steps_per_sample - 1) * run.value("run.dt")
             middle = 0.5 * (start + end)
@@ -314,11 +312,8 @@ def fields_row(study):
 
 def verdicts(study):
     """{verdict on the window: number of tows of the unchanged case}."""
-    found = Counter()
-    for i in (i for i in range(FIELDS[-1]) if study.kept("case", i)):
-        with Run(study.path("case", i)) as run:
-            found[run.verdict[0]] += 1
-    return dict(found)
+    kept = [i for i in range(FIELDS[-1]) if study.kept("case", i)]
+    return dict(Counter(study.each("case", kept, lambda run: run.verdict[0])))
 
 
 def varied(study, kinds, margin, tries, end):
@@ -339,7 +334,6 @@ def varied(study, kinds, margin, tries, end):
 
 
 def converge(study, names, margin, tries=TRIES):
-    """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget is not enough for {FIELDS[0]} runs of the case",
                        "raise --budget and repeat the command; its runs are kept", SIGNAL)
@@ -359,9 +353,8 @@ def converge(study, names, margin, tries=TRIES):
 
 def names_of(text):
     found = [part.strip() for part in text.split(",") if part.strip()]
-    for name in found:
-        if name not in NAMES:
-            raise argparse.ArgumentTypeError(f"{name}: is none of {', '.join(NAMES)}")
+    if wrong := [name for name in found if name not in NAMES]:
+        raise argparse.ArgumentTypeError(f"{wrong[0]}: is none of {', '.join(NAMES)}")
     return found
 
 
@@ -382,8 +375,8 @@ def perform(a):
     folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
     analysis.begin("converge", a.case, "case", folder, a.force)
     checked(program_path(), a.case, a.set)
-    study = CaseRuns(a.case.resolve(), folder, "converge", program_path(), a.set, a.jobs, began + 60 * a.budget,
-                     began + 60 * a.budget)
+    last = began + 60 * a.budget
+    study = CaseRuns(a.case.resolve(), folder, "converge", program_path(), a.set, a.jobs, last, last)
     with locked(folder / "converge") as study.lock:
         rows = converge(study, a.vary, a.margin, a.tries)
         values = None  # the values of the case are unknown if the budget was spent before its first run ended

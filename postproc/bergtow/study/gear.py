@@ -47,9 +47,9 @@ def force(text, option):
         value = read(tonnes, "N")
     except BergtowError:
         return None
-    for wrong, why in ((not value > 0, "is not above zero"), (not re.search(r"[a-zA-Z]\s*$", text), "has no unit")):
-        if wrong:
-            raise BergtowError(f"{option} {text}: {why}; give it as \"110 t\" or \"1.1 MN\"", USAGE)
+    why = "is not above zero" if not value > 0 else "" if re.search(r"[a-zA-Z]\s*$", text) else "has no unit"
+    if why:
+        raise BergtowError(f"{option} {text}: {why}; give it as \"110 t\" or \"1.1 MN\"", USAGE)
     return value
 
 
@@ -126,12 +126,10 @@ def limit_speed(speeds, needs, has):
     """Speed, m/s, at which the required pull first exceeds the vessel's, linear between speeds; None if it never does,
     or already does at the first speed."""
     gap = np.asarray(has) - np.asarray(needs)
-    if gap[0] < 0:
+    k = int(np.argmax(gap < 0))
+    if k == 0:  # the first, or none
         return None
-    for k in range(1, len(gap)):
-        if gap[k] < 0:
-            return float(speeds[k - 1] + (speeds[k] - speeds[k - 1]) * gap[k - 1] / (gap[k - 1] - gap[k]))
-    return None
+    return float(speeds[k - 1] + (speeds[k] - speeds[k - 1]) * gap[k - 1] / (gap[k - 1] - gap[k]))
 
 
 def limit_by_drag(v, efficiency, speed, load, drag):

@@ -32,7 +32,7 @@ from dataclasses import dataclass, field
 
 from bergtow import towing
 from bergtow.case import quantities
-from bergtow.result.run import Run, case_value, within
+from bergtow.result.run import case_value, within
 from bergtow.stats import largest as stat_largest
 from bergtow.stats import load as stat_load
 from bergtow.stats import loads as stat_loads
@@ -130,12 +130,7 @@ class Runs:
         return -(-missing // self.runs.jobs) * self.own.get(name, self.pace) * seconds
 
     def measured(self, name, measure, fields=None):
-        """[measure(run)] for the fields."""
-        out = []
-        for i in fields or self.fields:
-            with Run(self.runs.path(name, i)) as run:
-                out.append(measure(run))
-        return out
+        return self.runs.each(name, fields or self.fields, measure)
 
 
 @functools.cache
@@ -191,8 +186,7 @@ def start_ramp(t):
     if np.isfinite(t.spring):
         # The ice holds a body at rest; drag grows as it gathers way, over many periods of the line, and excites no
         # swing. Rejected: counting drag as part of the holding force, which takes hours where drag is most of the load
-        drag = t.water + t.wind
-        return max(by_inertia, towing.ramp_for(t.value - drag, t.speed, t.spring, t.mass, resistance=t.ice))
+        return max(by_inertia, towing.ramp_for(t.value - (t.water + t.wind), t.speed, t.spring, t.mass, t.ice))
     return by_inertia
 
 
@@ -220,9 +214,8 @@ def loss_of_thrust(t):
     distance, time = coasting(t)
     values = {"coasts_m": distance, "coasts_s": time, "line_m": t.line.length}
     if not np.isfinite(t.spring):
-        known = [np.isfinite(t.line.stiffness), t.line.length > 0]
-        reason = {(True, False): "line_length_not_known", (False, True): "line_stiffness_not_known"}.get(
-            tuple(map(bool, known)), "line_not_known")
+        stiff, long = np.isfinite(t.line.stiffness), t.line.length > 0
+        reason = "line_not_known" if stiff == long else "line_length_not_known" if stiff else "line_stiffness_not_known"
         return none("loss_of_thrust", reason, by="closed_form", acts_on="line", formula="coasting", values=values)
     heavy = towing.effective_mass(t.mass, t.vessel_mass if np.isfinite(t.vessel_mass) else np.inf)
     snap = towing.snap_load(t.speed, t.spring, heavy, static=t.mean)

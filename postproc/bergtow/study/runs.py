@@ -82,8 +82,6 @@ def state_of(folder):
 
 @dataclass
 class CaseRuns:
-    """The runs of a study of one case."""
-
     case: Path
     folder: Path
     subject: str           #: name of the folder that contains them
@@ -259,13 +257,17 @@ class CaseRuns:
                            "mend the case" if name == "case" else "leave it out of --vary", self.code_of_failure())
         return True
 
-    def measured(self, name, fields, measure):
-        """Measures of existing runs; a single one for all fields if the seed does not change the ice."""
+    def each(self, name, fields, measure):
+        """[measure(run)] of existing runs."""
         out = []
-        for i in fields[:1] if self.alike(name) else fields:
+        for i in fields:
             with Run(self.path(name, i)) as run:
                 out.append(measure(run))
-        return np.array(out, dtype=float)
+        return out
+
+    def measured(self, name, fields, measure):
+        """The same as an array of numbers; a single one for all fields if the seed does not change the ice."""
+        return np.array(self.each(name, fields[:1] if self.alike(name) else fields, measure), dtype=float)
 
 
 def ensemble_made(folder):

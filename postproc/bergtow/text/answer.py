@@ -223,7 +223,6 @@ WORDS = {"beside": _against_weather, "covers": _covers, "needs": _needs, "needs_
 
 
 def sentence(answer):
-    """The answer in one paragraph."""
     out = []
     for part in answer["sentence"]:
         text = WORDS[part["code"]](part["values"], answer)
@@ -238,21 +237,14 @@ def sentence(answer):
 
 
 def _behind(row):
-    """Details of a load case, in words."""
     v, said = row["values"], []
-    def add(key, words):
+    for key, words in (("ramp_s", "ramp {1}"), ("slack_below_s", "line slack if stopped in less than {1}"),
+                       ("coasts_m", "the body drifts on for at least {0} m"), ("coasts_s", "in at least {1}"),
+                       ("relative_speed_m_s", "taken up at {0} m/s"), ("angle_deg", "{0} deg"),
+                       ("radius_m", "radius {0} m"), ("current_m_s", "current {0} m/s"), ("wind_m_s", "wind {0} m/s"),
+                       ("factor", "{0} times the pull")):
         if known(v.get(key)):
-            said.append(words.format(v[key], plain(v[key]), minutes(v[key])))
-    add("ramp_s", "ramp {2}")
-    add("slack_below_s", "line slack if stopped in less than {2}")
-    add("coasts_m", "the body drifts on for at least {1} m")
-    add("coasts_s", "in at least {2}")
-    add("relative_speed_m_s", "taken up at {1} m/s")
-    add("angle_deg", "{1} deg")
-    add("radius_m", "radius {1} m")
-    add("current_m_s", "current {1} m/s")
-    add("wind_m_s", "wind {1} m/s")
-    add("factor", "{1} times the pull")
+            said.append(words.format(plain(v[key]), minutes(v[key])))
     if row["reason"]:
         said.append(REASONS.get(row["reason"], row["reason"]))
     return ", ".join(said) or "–"
@@ -304,23 +296,20 @@ def speeds(a):
 
 def plan(p):
     """Before the first run: the cost of a value, and what the budget allows."""
-    each = f" ({p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min)"
-    fields = each if p["window_hours"] > 0 else ""
+    fields = f" ({p['needs_fields']} fields of {short(60 * p['window_hours'], 2)} min)" if p["window_hours"] else ""
     gives = {"return_level": "enough for it", "largest_of_n": "which gives the largest of them, and no tail",
              "nothing": "not one", "no_window": "but none gives a value if its window is as short as that"
              }[p["gives"]]
     return (f"A design value needs about {short(p['needs_hours'], 2)} h of simulated tow after the start{fields}, "
             f"about {short(p['needs_min'], 2)} min of computing here. The budget allows {p['budget_fields']} fields, "
-            f"{gives}. "
-            "(Both are estimates: of the program's speed, and of how soon new ice is in contact.)")
+            f"{gives}. (Both are estimates: of the program's speed, and of how soon new ice is in contact.)")
 
 
 def took(a):
     c = a["cost"]
-    rows = [["total wall time, without replay and report", f"{short(c['wall_s'] / 60, 2)} min"],
-            ["fields", f"{short(c['fields_s'] / 60, 2)} min"],
-            ["statistics", f"{short(c['statistics_s'] / 60, 2)} min"],
-            ["load cases and ranges", f"{short(c['cases_s'] / 60, 2)} min, {c['case_runs']} runs"]]
+    rows = [["total wall time, without replay and report", minutes(c["wall_s"])], ["fields", minutes(c["fields_s"])],
+            ["statistics", minutes(c["statistics_s"])],
+            ["load cases and ranges", f"{minutes(c['cases_s'])}, {c['case_runs']} runs"]]
     return [Table(["what", "took"], rows)]
 
 
@@ -338,7 +327,6 @@ def text(answer):
 
 
 def remarks(answer):
-    """Reservations about the numbers, in words."""
     out = [f"{CASES[c['id']]}: {REASONS.get(c['reason'], c['reason'])}" for c in answer["load_cases"]
            if c["kind"] == "none"]
     v = answer["vessel"]

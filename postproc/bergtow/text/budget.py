@@ -27,7 +27,6 @@ def _index(i, what):
 
 
 def rows(found):
-    """The lines of the table."""
     out = [["mean", quantity(found["mean"], found["units"]) + _ends(found, found["mean_95"]), "", "", "", "", ""]]
     one = found["fields"]["sd"] is None
     parts = [("fields: one tow", found["fields"]), ("parameters" + (" and fields" if one else ""), found["parameters"])]
@@ -37,9 +36,8 @@ def rows(found):
     indices = found["shares"].get("indices", {})
     for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
         i, given = indices.get(name), found["assumed"][name]
-        source = given["source"] or "assumed"
         out.append([f"- {name}", "", "", "", *((_index(i, "first"), _index(i, "total")) if i else ("–", "–")),
-                    "; ".join(t for t in (given["distribution"], source) if t)])
+                    "; ".join(filter(None, (given["distribution"], given["source"] or "assumed")))])
     out += _numerics(found)
     together = found["together"]["sd"]
     out.append(["together", quantity(together, found["units"]), of_mean(found, together), "", "", "", ""])
@@ -129,14 +127,10 @@ def warnings(found):
 
 
 def content(found):
-    """The tables of all numbers, one below the other."""
-    return [part for one in (found, *found.get("more", [])) for part in _content(one)]
-
-
-def _content(found):
     head = ["part", "standard deviation", "relative to the mean", "share of the variance", "Sobol, first order",
             "total", "range and source"]
-    return [*warnings(found), Table(head, rows(found)), [notes(found)]]
+    return [part for one in (found, *found.get("more", []))
+            for part in (*warnings(one), Table(head, rows(one)), [notes(one)])]
 
 
 def figure(found):

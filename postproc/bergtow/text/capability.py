@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The results of bergtow capability, as parts of bergtow/table.py and as a picture."""
 from bergtow.result.members import reading
-from bergtow.table import Table, Warned, number, quantity, scale, short
+from bergtow.table import Table, Warned, number, quantity, scale, short, span
 
 import numpy as np
 
@@ -88,8 +88,7 @@ def narrow(found):
            if (p.get("body_widths_needed") or 0) > (p.get("body_widths") or np.inf)]
     if not few:
         return ""
-    values = sorted({v for v, _, _ in few})
-    at = value(found, values[0]) + (f" to {value(found, values[-1])}" if len(values) > 1 else "")
+    at = span([v for v, _, _ in few], lambda v: value(found, v))
     return Warned(f"at {at} the domain is narrow for its ice ({min(w for _, w, _ in few):.3g} body widths; up to "
                   f"{max(n for _, _, n in few):.3g} are asked for): walls or periodic images carry part of the "
                   "resistance, and tows stop too early there; make domain.width larger.")
@@ -100,10 +99,10 @@ def wider(found):
     made = [(p["value"], p["wider"]) for c in found["conditions"] for p in c["points"] if p.get("wider")]
     if not made:
         return ""
-    values, widths = (sorted({x[k] for x in made}, key=lambda v: float(str(v).split()[0])) for k in (0, 1))
-    at, to = ([f(x[0])] + [f(x[-1])] * (len(x) > 1) for x, f in ((values, lambda v: value(found, v)), (widths, str)))
-    return (f"At {' to '.join(at)} the domain was made {' to '.join(to)} wide: narrower, its periodic images would "
-            "carry part of the resistance (--keep-width leaves it).")
+    values, widths = zip(*made)
+    return (f"At {span(values, lambda v: value(found, v))} the domain was made "
+            f"{span(widths, str, lambda v: float(v.split()[0]))} wide: narrower, its periodic images would carry part "
+            "of the resistance (--keep-width leaves it).")
 
 
 def content(found):

@@ -20,19 +20,15 @@ def value(row, which):
 
 
 def advice(row):
-    """The recommended value."""
     at = value(row, "recommended")
     if row["name"] == "fields":
-        return f"{value(row, 'recommended')} fields for {100 * row['wanted_error']:g} %"
+        return f"{at} fields for {100 * row['wanted_error']:g} %"
     if row["judged"] == "none":
         return f"{at} will do"
-    if row["judged"] == "matters" and row.get("recommended") is None:
-        return row["why"]
-    if row["judged"] == "matters" and row.get("walls"):
-        return f"the walls are felt; without them, take {at} or {row['finer']}"
-    if row["judged"] == "matters":
-        return f"take {at}, or {row['finer']}"
-    return row.get("why") or "–"
+    if row["judged"] == "open" or row.get("recommended") is None:
+        return row.get("why") or "–"
+    return f"the walls are felt; without them, take {at} or {row['finer']}" if row.get("walls") else \
+        f"take {at}, or {row['finer']}"
 
 
 def without(share):

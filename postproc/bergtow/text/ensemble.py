@@ -40,27 +40,20 @@ def means(s):
         if not r["n"]:
             rows.append([c["label"], fields_cell(c)] + ["–"] * (len(head) - 3) + [doubts(c)])
             continue
-        rows.append([c["label"],
-                     fields_cell(c),
-                     number(r["mean"] / factor),
-                     pair(r["t_95"], factor),
-                     pair(r["bootstrap_95"], factor),
-                     number(r["median"] / factor),
+        rows.append([c["label"], fields_cell(c), number(r["mean"] / factor), pair(r["t_95"], factor),
+                     pair(r["bootstrap_95"], factor), number(r["median"] / factor),
                      number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–",
-                     number(r["sd_between"] / factor),
-                     number(r["se_within"] / factor),
+                     number(r["sd_between"] / factor), number(r["se_within"] / factor),
                      f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
-                     f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
-                     doubts(c)])
+                     f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–", doubts(c)])
     note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an "
             "eighth of the fields at each end (from 8 fields on). Sd between: standard deviation between the means "
             "of runs; standard error in a run: of one run's mean, by its slowest cosine waves. Largest: share of the "
             "field with the largest mean in the sum of all. Doubts: U unconverged steps, B steps without a solution, "
             "so that its mean and peaks are at least these, J body stood still, N window not steady, S short window, F "
             "met little ice, X stopped early, O other warning.")
-    drifting = [
-        f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"
-    ]
+    drifting = [f"{c['label']}: {c['drift']['words']}" for c in s["conditions"]
+                if c["drift"]["verdict"] == "not steady"]
     unsteady = ("NOT STEADY over all fields: the mean of the fields still changes within the window, by more than one "
                 "run can see. " + "; ".join(drifting) + ". Begin the window later, or run longer.")
     return [Table(head, rows), [note], *[[unsteady]] * bool(drifting)]
@@ -110,35 +103,24 @@ def extremes(s):
     some = [c for c in s["conditions"] if "refused" not in c["extremes"]]
     if not some:
         return [["No peaks: " + s["conditions"][0]["extremes"]["refused"] + "."]]
-    hours = [level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
-             for level in c["extremes"][kind].get("levels", [])]
-    hours = sorted(set(hours))
+    hours = sorted({level["hours"] for c in some for kind in loads_text.NAMES
+                    for level in c["extremes"][kind].get("levels", [])})
     factor, unit = scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]], "N")
     head = ["condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
             *(f"once in {T:g} h" for T in hours)]
-    rows, short = [], []
+    rows, short, refused = [], [], set()
     for c in some:
         x = c["extremes"]
-        first = [f"{x['hours']:.3g}",
-                 number(x["collisions_per_hour"]),
+        first = [f"{x['hours']:.3g}", number(x["collisions_per_hour"]),
                  number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"]
-        for kind, label in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
+        for kind, label in loads_text.NAMES.items():
             f = x[kind]
             if "refused" in f:
-                rows.append([c["label"], label, *first, "–", "–", *["–"] * len(hours)])
+                refused.add(f"{c['label']}, {kind.replace('_', ' ')}: {f['refused']}")
+                rows.append([c["label"], label, *first, *["–"] * (2 + len(hours))])
                 continue
-            at = {level["hours"]: level for level in f["levels"]}
             short += loads_text.cut(c["label"], f, x["hours"])
-            rows.append([c["label"], label, *first,
-                         f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
-                         number(f["p_value"], 2),
-                         *(loads_text.level(at.get(T), factor) for T in hours)])
-    refused = {
-        f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}"
-        for c in some
-        for kind in ("over_threshold", "block_maxima")
-        if "refused" in c["extremes"][kind]
-    }
+            rows.append([c["label"], label, *first, *loads_text.fitted(f, hours, factor)])
     conversions = sorted({c["extremes"]["conversion"] for c in some})
     text = (f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other "
             "peaks. GPD: peaks over a threshold; GEV: block maxima. Brackets: 95 %. * beyond the hours simulated. ! "
@@ -160,28 +142,21 @@ def sensitivity(s):
         return -max([i[name]["total"] for _, i in given if name in i], default=0.0), -abs(
             np.nan_to_num(x["ranks"].get(name, {}).get("prcc", 0.0)))
     rows = []
+    def with_interval(found, what):
+        return f"{number(found[what], 2)} ({pair(found[f'{what}_95'])})" if found else "–"
     for name in sorted(names, key=weight):
         r = x["ranks"].get(name)
-        cells = [
-            name, *([number(r["spearman"], 2), f"{number(r['prcc'], 2)} ({pair(r['prcc_95'])})"] if r else ["–", "–"])
-        ]
-        for _, indices in given:
-            i = indices.get(name)
-            cells += [f"{number(i[what], 2)} ({pair(i[f'{what}_95'])})" for what in ("first",
-                                                                                     "total")] if i else ["–", "–"]
-        rows.append(cells)
+        rows.append([name, number(r and r["spearman"], 2), with_interval(r, "prcc"), *(
+            with_interval(indices.get(name), what) for _, indices in given for what in ("first", "total"))])
     head = ["parameter", "Spearman", "PRCC",
             *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))]
     notes = [(f"{counted(x['members'])}. " if x["of"] == "members" else
               f"Means of {counted(x['samples'], 'condition')}, of {counted(x['members'])}. ") + "Brackets: 95 %."]
-    for of, k in kinds:
-        notes.append(
-            f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
-            f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, "
-            f"{k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They "
-            f"divide the part that it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter "
-            f"of the fields and error of the expansion."
-        )
+    notes += [f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
+              f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, "
+              f"{k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They divide the part that "
+              f"it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields and error "
+              "of the expansion." for of, k in kinds]
     return [Table(head, rows), [" ".join(notes)]]
 
 
@@ -226,8 +201,7 @@ def members(s, markdown):
         lines.append(f"{counted(len(s['members_without_folder']))} "
                      f"{'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here "
                      f"({listed(s['members_without_folder'])}): the peaks of their collisions are not known.")
-    heavy = [c["label"]
-             for c in s["conditions"]
+    heavy = [c["label"] for c in s["conditions"]
              if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
@@ -245,7 +219,6 @@ def sections(s, markdown):
 
 
 def report(s, markdown=False):
-    """All sections as text."""
     def heading(text, level):
         return ["#" * level * markdown + " " * markdown + text]
     return written([heading(s["title"], 2), *(part for title, some in sections(s, markdown).items()

@@ -33,15 +33,11 @@ def asked(s):
 
 
 def value(d, factor):
-    if "refused" in d:
-        return "–"
-    return number(text_table.designed(d["value"], d["largest"]) / factor) + ("*" if d["beyond_data"] else "")
-
-
-def ends(d, factor):
-    if "refused" in d:
-        return "–"
-    return pair(d["interval_95"], factor)
+    """Cells with a design value and its interval."""
+    if d is None or "refused" in d:
+        return ["–", "–"]
+    return [number(text_table.designed(d["value"], d["largest"]) / factor) + "*" * d["beyond_data"],
+            pair(d["interval_95"], factor)]
 
 
 def design(s):
@@ -62,11 +58,9 @@ def design(s):
         if d is None:
             rows.append([c["label"], *["–"] * (len(head) - 1)])
             continue
-        tension = ([value(t, factor), ends(t, factor)] if t else ["–", "–"]) if lines else []
-        rows.append([c["label"], value(d, factor), ends(d, factor), *tension, number(d["mean"] / factor),
-                     number(d["largest"] / factor), *[number(d["smallest"] / factor)] * held,
-                     number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
-                     d.get("model", "–")])
+        rows.append([c["label"], *value(d, factor), *(value(t, factor) if lines else ()), number(d["mean"] / factor),
+                     number(d["largest"] / factor), *[number(d["smallest"] / factor)] * held, number(d["hours"]),
+                     number(d["return_hours"]), str(d["fields"]), d.get("model", "–")])
     notes = [f"{asked(s)}. 95 %: interval over fields, which holds for fields that are alike, without the effects "
              f"that the warnings name. * beyond the hours simulated: extrapolated with the tail."]
     notes += [text for text in (steps(s), holds_for(s)) if text]
@@ -111,8 +105,8 @@ def shared(found):
 
 
 def qualified(some):
-    """Texts of shared(), each followed by its conditions."""
-    return [f"{text} ({where})" if where else text for text, where in some]
+    """Texts, each followed in brackets by the other text of its pair, if that is not empty."""
+    return [f"{text} ({more})" if more else text for text, more in some]
 
 
 def _governs(c):
@@ -134,16 +128,13 @@ def warnings(s):
     for what, where in found.items():
         details = {detail for _, detail in where}
         if len(where) == every and len(details) == 1:
-            detail = details.pop()
-            out.append(Warned(f"{sentence(what)}{f' ({detail})' if detail else ''}."))
+            out.append(Warned(f"{sentence(qualified([(what, *details)])[0])}."))
         else:
-            some = [label + (f" ({detail})" if detail else "") for label, detail in where]
-            out.append(Warned(f"{sentence(what)}: {several(some)}."))
+            out.append(Warned(f"{sentence(what)}: {several(qualified(where))}."))
     return out
 
 
 def sentence(text):
-    """Capitalise the first letter."""
     return text[:1].upper() + text[1:]
 
 
@@ -154,35 +145,22 @@ def several(some):
                      [*some[:MAX_NAMED - 1], f"and {len(some) - MAX_NAMED + 1} more conditions"])
 
 
-def _rows_of(s, name, cells):
-    """One row for each condition that has the load."""
-    return [[c["label"], *cells(c["loads"][name])] for c in s["conditions"] if name in c["loads"]]
-
-
-def names(s):
-    """Loads of all conditions, in the order of the files."""
-    return list(dict.fromkeys(name for c in s["conditions"] for name in c["loads"]))
-
-
-def _unit(s, name):
-    some = [c["loads"][name] for c in s["conditions"] if name in c["loads"]]
-    factor, unit = scale([np.median([abs(x["quantiles"]["95"]["value"]) for x in some])], some[0]["units"])
-    return factor, unit, some[0]
+def each_load(s):
+    """(label, factor, unit, [(condition, statistics of the load)]) of the loads, in the order of the files."""
+    for name in dict.fromkeys(name for c in s["conditions"] for name in c["loads"]):
+        some = [(c, c["loads"][name]) for c in s["conditions"] if name in c["loads"]]
+        first = some[0][1]
+        yield (first["label"], *scale([np.median([abs(x["quantiles"]["95"]["value"]) for _, x in some])],
+                                      first["units"]), some)
 
 
 def signals(s):
-    """Mean, standard deviation, largest and smallest value of every load."""
     head = ["condition", "load", "mean", "95 %", "sd", "95 %", "largest", "smallest", "in the start",
             "unit", "over", "hours"]
-    rows = []
-    for name in names(s):
-        factor, unit, first = _unit(s, name)
-        def cells(x, factor=factor, unit=unit, first=first):
-            start = x["start_up"]
-            return [first["label"], *estimate(x["mean"], factor), *estimate(x["sd"], factor),
-                    number(x["largest"] / factor), number(x["smallest"] / factor),
-                    number(start and start["largest"] / factor), unit, f"{x['time_scale_s']:.3g} s", number(x["hours"])]
-        rows += _rows_of(s, name, cells)
+    rows = [[c["label"], label, *estimate(x["mean"], factor), *estimate(x["sd"], factor),
+             number(x["largest"] / factor), number(x["smallest"] / factor),
+             number(x["start_up"] and x["start_up"]["largest"] / factor), unit, f"{x['time_scale_s']:.3g} s",
+             number(x["hours"])] for label, factor, unit, some in each_load(s) for c, x in some]
     if not rows:
         return [[nothing(s), *left_out(s)]]
     note = ("Moving mean, over the time given, of the signal in the window from its first time scale on; means "
@@ -222,14 +200,9 @@ def estimate(found, factor):
 
 
 def quantiles(s):
-    """Quantiles of every load with their intervals."""
-    rows = []
-    for name in names(s):
-        factor, unit, first = _unit(s, name)
-        def cells(x, factor=factor, unit=unit, first=first):
-            cells = (estimate(x["quantiles"][str(q)], factor) for q in SHOWN)
-            return [first["label"], *(v if ends == "–" else f"{v} ({ends})" for v, ends in cells), unit]
-        rows += _rows_of(s, name, cells)
+    rows = [[c["label"], label, *(v if ends == "–" else f"{v} ({ends})" for v, ends in (
+        estimate(x["quantiles"][str(q)], factor) for q in SHOWN)), unit]
+            for label, factor, unit, some in each_load(s) for c, x in some]
     if not rows:
         return [[nothing(s)]]
     return [Table(["condition", "load", *(f"{q} % of the time below" for q in SHOWN), "unit"], rows, 1),
@@ -239,8 +212,8 @@ def quantiles(s):
 def conversions(s):
     named = sorted({(x["label"], x["conversion"]) for c in s["conditions"] for x in c["loads"].values()
                    if x["conversion"]})
-    return [f"{label[0].upper()}{label[1:]}: a quasi-static load is the mean over a step, the peak of a collision is "
-            f"by {conversion}." for label, conversion in named]
+    return [f"{sentence(label)}: a quasi-static load is the mean over a step, the peak of a collision is by "
+            f"{conversion}." for label, conversion in named]
 
 
 def panel_lines(s):
@@ -288,23 +261,15 @@ def returns(s, markdown):
         return [["No return levels" + (f": {refused[0].partition(';')[0]}{more}." if refused else ".")]]
     head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
     rows, refused, short = [], {}, []
-    for name in names(s):
-        factor, unit, first = _unit(s, name)
-        for kind, label in NAMES.items():
-            for c in s["conditions"]:
-                x = c["loads"].get(name)
-                if x is None:
-                    continue
+    for load, factor, unit, some in each_load(s):
+        for kind, tail in NAMES.items():
+            for c, x in some:
                 f = x[kind]
                 if "refused" in f:
-                    refused.setdefault((first["label"], label), []).append(f"{c['label']}: {f['refused']}")
+                    refused.setdefault((load, tail), []).append(f"{c['label']}: {f['refused']}")
                     continue
-                short += cut(f"{c['label']}, {first['label']}", f, x["hours"])
-                at = {level["hours"]: level for level in f["levels"]}
-                rows.append([c["label"], first["label"], label,
-                             f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
-                             number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
-                             number(x["hours"])])
+                short += cut(f"{c['label']}, {load}", f, x["hours"])
+                rows.append([c["label"], load, tail, *fitted(f, hours, factor), unit, number(x["hours"])])
     note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded on average once "
             "in the given hours of tow. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
             "below 0.05 the tail does not fit. A tail with a shape below 0 has an end. Brackets: 95 %, profile "
@@ -318,9 +283,13 @@ def returns(s, markdown):
     return [Table(head, rows, 1), [note, *cut_note(short), *said]]
 
 
-def level(found, factor):
-    """A return level from the statistics, "–" if there is none."""
-    if found is None or not np.isfinite(found["level"]):
-        return "–"
-    value, ends = text_table.level(found["level"], found["level_95"], factor)
-    return f"{value}{'*' if found['beyond_data'] else ''} ({ends})"
+def fitted(f, hours, factor):
+    """Cells with shape, p and return levels at these hours, "–" for a level that there is not."""
+    at = {level["hours"]: level for level in f["levels"]}
+    def level(found):
+        if found is None or not np.isfinite(found["level"]):
+            return "–"
+        value, ends = text_table.level(found["level"], found["level_95"], factor)
+        return f"{value}{'*' if found['beyond_data'] else ''} ({ends})"
+    return [f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
+            number(f["p_value"], 2), *(level(at.get(T)) for T in hours)]

@@ -3,7 +3,7 @@
 import math
 
 from bergtow.stats.mean import LEVEL
-from bergtow.table import change, number, quantity, table
+from bergtow.table import change, number, quantity, span, table
 
 UNITS = {"work": "J", "time": "s", "peak": "N", "length": "m"}
 WORDS = {"work": "work of the tow", "time": "time to the goal", "peak": "peak force", "length": "length of the way"}
@@ -21,8 +21,7 @@ def amount(x, unit):
     return quantity(x, unit)
 
 
-def plan(found, markdown=False):
-    """The planned routes."""
+def plan(found):
     head = ["route", "length", "time", "ice in the swath", "mean force", "work", "remarks"]
     rows = []
     for r in found["routes"]:
@@ -30,7 +29,7 @@ def plan(found, markdown=False):
         rows.append([r["label"], amount(p["length"], "m"), amount(p["time"], "s"), f"{number(p['ice_area'])} m2",
                      amount(p["mean_force"], "N"), amount(p["work"], "J"),
                      "; ".join([PLANNED[f] for f in r["faults"]] + off_map(r)) or "–"])
-    return "\n\n".join([table(head, rows, markdown), *unreached(found)])
+    return "\n\n".join([table(head, rows, False), *unreached(found)])
 
 
 def off_map(r):
@@ -59,8 +58,7 @@ def warnings(found):
     return [f"warning: {w['text']}" for w in found["warnings"]]
 
 
-def verified(found, markdown=False):
-    """The tows compared with the straight line."""
+def verified(found):
     verdict, unit, limited = found["verdict"], UNITS[found["objective"]], found["force_limit"] is not None
     head = ["route", WORDS[found["objective"]], "against the straight line (95 %)", "mean force", "peak",
             *["largest force"] * limited, "time", "remarks"]
@@ -79,7 +77,7 @@ def verified(found, markdown=False):
         rows.append([r["label"], amount(s[found["objective"]], unit), against, amount(s["mean_force"], "N"),
                      amount(s["peak"], "N"), *[amount(largest(r), "N")] * limited, amount(s["time"], "s"),
                      "; ".join(said) or "–"])
-    return table(head, rows, markdown)
+    return table(head, rows, False)
 
 
 def largest(r):
@@ -89,18 +87,14 @@ def largest(r):
 
 def answer(found):
     """The verdict, and what it does not know."""
-    some = found["routes"]
-    if not any(map(off_map, some)):
-        return decision(found)
     chosen = (found.get("verdict") or {}).get("recommended")
     of = [f"{r['label']} {amount(r['predicted']['off_map'], 'm')} of {amount(r['predicted']['length'], 'm')}"
-          for r in some if off_map(r) and chosen in (None, r["name"])]
-    return " ".join([decision(found)] + [f"Off the map, where nothing is known of the ice and open water is assumed: "
-                                        f"{', '.join(of)}."] * bool(of))
+          for r in found["routes"] if off_map(r) and chosen in (None, r["name"])]
+    return decision(found) + (" Off the map, where nothing is known of the ice and open water is assumed: "
+                              f"{', '.join(of)}." if of else "")
 
 
 def decision(found):
-    """The sentence with the verdict."""
     v, by_name = found.get("verdict"), {r["name"]: r for r in found["routes"]}
     if v is None:
         return "Planned, not towed: no number here is of a simulation."
@@ -142,7 +136,6 @@ def interval(c):
 
 
 def meaning(found):
-    """How the numbers were obtained."""
     v, e = found["verdict"], found["map_errors"]
     if v["members"] < 2:
         members = "One member: the map as it is, without errors. "
@@ -150,7 +143,8 @@ def meaning(found):
         members = (f"{v['members']} members of the map, with errors (standard deviations) of {number(e['position'])} m "
                    f"in position, {number(100 * e['thickness'])} % in thickness and {number(e['drift'])} m/s in drift"
                    f"{' (assumed)' if e['assumed'] else ''}, the same for every route. "
-                   f"Members {span(v['chose'])} chose, members {span(v['judged'])} judged: the intervals are theirs. ")
+                   f"Members {span(v['chose'], str)} chose, members {span(v['judged'], str)} judged: the intervals are "
+                   "theirs. ")
     best = v.get("planner_best")
     lost = "" if not best else "By prediction the straight line is the best. " if best["straight"] else \
         f"The best route by prediction lost to the straight line in {best['lost']} of {best['members']}. "
@@ -163,27 +157,22 @@ def meaning(found):
     return members + peak + lost + fit + "Every number is of the model: floes are rigid plates in a plane."
 
 
-def span(numbers):
-    return f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
-
-
 def calibration(c):
     poor = "; the cost ranks this ice poorly, and the tows alone decide" if c["poor"] else ""
     return (f"Cost fitted to {c['swaths']} straight swaths: R² {number(c['r2'])}, rank correlation "
             f"{number(c['rank_correlation'])}{poor}.")
 
 
-def text(found, markdown=False):
-    parts = ["\n".join(warnings(found))] * bool(found["warnings"]) + [plan(found, markdown)]
+def text(found):
+    parts = ["\n".join(warnings(found))] * bool(found["warnings"]) + [plan(found)]
     if found.get("verdict"):
-        parts += [verified(found, markdown), meaning(found)]
+        parts += [verified(found), meaning(found)]
     if found.get("rounds"):
-        parts.append(rounds(found, markdown))
+        parts.append(rounds(found))
     return "\n\n".join([*parts, answer(found)])
 
 
-def rounds(found, markdown=False):
-    """The rounds of the receding horizon."""
+def rounds(found):
     h = found["horizon"]
     head = ["mapped at", "age of the map", "way to go", "predicted work", "plan"]
     rows = [[amount(r["time"], "s"), amount(h["age"] if r["time"] else 0.0, "s"),
@@ -193,5 +182,5 @@ def rounds(found, markdown=False):
     told = "; ".join(", ".join([f"{names[k]}: {amount(t[found['objective']], UNITS[found['objective']])}",
                                 *(FAULTS[f] for f in t["faults"])]) for k, t in h["tows"].items())
     bound = ("The new maps have no errors, so the gain is an upper bound. " if h["perfect"] else "")
-    return f"{table(head, rows, markdown)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
+    return f"{table(head, rows, False)}\n\nOne tow through the ice of the case, {WORDS[found['objective']]}: " \
            f"{told}. {bound}One tow is one sample, and has no interval."
