@@ -411,6 +411,7 @@ MUTANTS = {
          "confirmed rows are not reviewed again"),
     ]),
     "src/geometry/polygons.c": (["physics/test_passing"], [
+        ("enum { ROUNDS = 1000 };", "enum { ROUNDS = 32 };", "outlines that turn beside each other count as meeting"),
         ("bt_sincos(moving->rate * t, &s, &c);", "bt_sincos(0, &s, &c);", "outlines do not turn"),
         ("const double k = bend + (a", "const double k = 0 * (a", "the bend of the way"),
     ]),

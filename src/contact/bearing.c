@@ -43,8 +43,8 @@ static void name_outlines(const bt_world *world, const bt_cell *cell, shared *ov
     const bt_pair *pair = &cell->search.pairs[overlap->pair];
     overlap->flip = bt_shore_holds(world, pair->a);
     overlap->shore = overlap->flip || bt_shore_holds(world, pair->b);
-    overlap->outlines = (int64_t)(overlap->flip ? pair->b : pair->a) << 32 |
-                        (overlap->shore ? 0 : (int64_t)pair->b + 1);
+    const bt_idx body = overlap->flip ? pair->b : pair->a, other = overlap->flip ? pair->a : pair->b;
+    overlap->outlines = (int64_t)body << 32 | (int64_t)bt_shore_outline(world->shore, world->bodies.gid[other]);
 }
 
 /// The overlap of the polygons of contact j; NULL if both outlines are single polygons.

@@ -84,14 +84,14 @@ void bt_merge_parts(const bt_world *world, bt_manifold *man, size_t n);
 //
 // The bias gap/Δt makes a plane of the nearest feature (pack.c): right for bodies that meet within the step, wrong for
 // those that pass beside each other, which it stops as a wall would. Whether a pair meets or passes is known only from
-// the velocities. So after a solve every loaded row of a pair that was more than the slop apart and unloaded in the
-// previous step is checked against the relative motion of the two outlines, rotation included (geometry/polygons.h), at
-// the velocities without the impulse of this row and with those of all others. A pair that stays more than the slop
-// apart is released: no impulse, no friction, no row in the position projection. The step is solved again from the
-// present impulses. Once nothing is left to release, released pairs are checked against the new velocities in the same
-// way; a pair that meets gets its row back for the rest of the step. (Before that, a load still to be released may be
-// the only reason why it meets.) This is repeated until nothing changes: then every row that bears load stops two
-// bodies that would meet, and no released pair meets.
+// the velocities. So after a solve every loaded row of a pair that was more than the slop apart is checked against the
+// relative motion of the two outlines, rotation included (geometry/polygons.h), at the velocities without the impulse
+// of this row and with those of all others. A pair that stays more than the slop apart is released: no impulse, no
+// friction, no row in the position projection. The step is solved again from the present impulses. Once nothing is left
+// to release, released pairs are checked against the new velocities in the same way; a pair that meets gets its row
+// back for the rest of the step. (Before that, a load still to be released may be the only reason why it meets.) This
+// is repeated until nothing changes: then every row that bears load stops two bodies that would meet, and no released
+// pair meets.
 //
 // Rows that confirm each other. A body that fits between two others meets neither. But the rows of both slow and turn
 // it, so that without one of them it meets the body of the other, and the check above keeps both. So a loaded row must

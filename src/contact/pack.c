@@ -200,11 +200,10 @@ static bt_row_state row_state(const bt_world *world, const bt_cell *cell, bt_idx
 {
     if (world->par.plain_sweeps) return BT_ROW_STAYS; // the reference, and what fields are shaken with
     if (world->stats.repeats > 0 && held->n > 0) return held->row; // from the previous detection in this step
-    if (held->n > 0 && (held->ln[0] != 0 || held->ln[1] != 0)) return BT_ROW_STAYS;
     for (int i = 0; i < manifold->n_points; i++)
         if (manifold->p[i].gap <= world->par.slop || cell->gaps[j].gap[i] <= world->par.slop) return BT_ROW_STAYS;
-    for (int law = 0; cell->laws->limits && law < BT_ALL_LAWS; law++)
-        if (cell->laws->limits[j].record[law] >= 0) return BT_ROW_STAYS; // it is not the outlines that touch
+    for (int law = 0; cell->laws->limits && law < BT_LAWS; law++) // it is not the outlines that touch
+        if (bt_laws[law]->contact && cell->laws->limits[j].record[law] >= 0) return BT_ROW_STAYS;
     return BT_ROW_OPEN;
 }
 

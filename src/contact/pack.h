@@ -8,8 +8,8 @@
 
 /// State of a row by the relative motion of its pair (contact/contacts.h).
 typedef enum {
-    BT_ROW_STAYS,    ///< touching, or loaded in the previous step, or restored after release
-    BT_ROW_OPEN,     ///< apart by more than the slop, unloaded in the previous step: it can be released
+    BT_ROW_STAYS,    ///< touching, or restored after release
+    BT_ROW_OPEN,     ///< apart by more than the slop: it can be released
     BT_ROW_RELEASED, ///< the two pass each other
     BT_ROW_PASSING, BT_ROW_CONFIRMED, ///< OPEN and loaded, within a review (contact/passing.c)
 } bt_row_state;

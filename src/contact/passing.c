@@ -23,8 +23,10 @@ static bt_moving moving_part(const bt_bodies *bodies, bt_idx i, int part, const 
 /// Is the pair of the same bodies as the contact, or of another piece of the same shore?
 static bool of_same_outlines(const bt_world *world, const bt_pair *pair, const bt_contact *contact)
 {
-    return (pair->a == contact->a || (bt_shore_holds(world, pair->a) && bt_shore_holds(world, contact->a))) &&
-           (pair->b == contact->b || (bt_shore_holds(world, pair->b) && bt_shore_holds(world, contact->b)));
+    const bt_gid *gid = world->bodies.gid;
+    const bt_shore *shore = world->shore;
+    return bt_shore_outline(shore, gid[pair->a]) == bt_shore_outline(shore, gid[contact->a]) &&
+           bt_shore_outline(shore, gid[pair->b]) == bt_shore_outline(shore, gid[contact->b]);
 }
 
 /// Would the bodies of the contact meet at these velocities? All their parts and pieces nearby count: where several

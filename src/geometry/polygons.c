@@ -98,7 +98,7 @@ double bt_polygon_shared(int64_t n, int m, const double *by, double *const w[2])
 // Rejected: the distance at the end of the step alone (tunnels); sampling the motion (a number to choose, slower).
 
 #define WITHIN 1.01 // times `near`: near enough
-enum { ROUNDS = 32 }; // after so many they count as meeting
+enum { ROUNDS = 1000 }; // after so many they count as meeting; edges that turn beside each other take dozens
 
 static void turn(const bt_moving *moving, double t, double x, double y, double *out)
 {

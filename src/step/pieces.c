@@ -184,8 +184,11 @@ static void put_pieces(bt_world *world, int64_t from)
     free(keep);
 }
 
+static double deepest(const bt_memory *r) { return r->n_points > 1 ? bt_max(r->value[0], r->value[1]) : r->value[0]; }
+
 /// Turn the records of pairs with parents into records of pairs with their pieces. Impulses are not passed on: the
-/// points of a piece have other names.
+/// points of a piece have other names. Several parts of a parent may have had records with the same body: of these a
+/// piece takes over the deepest.
 static bt_memory *hand_on(const bt_world *world, bt_memory *memory, int64_t *n, int64_t from)
 {
     const bt_splitting *splitting = world->splitting;
@@ -225,7 +228,13 @@ static bt_memory *hand_on(const bt_world *world, bt_memory *memory, int64_t *n, 
             }
     }
     free(memory);
-    *n = m;
+    if (m > 0) qsort(out, (size_t)m, sizeof *out, bt_memory_by_names);
+    *n = 0;
+    for (int64_t k = 0; k < m; k++) {
+        const bool same = *n > 0 && bt_memory_by_names(&out[*n - 1], &out[k]) == 0;
+        if (!same) out[(*n)++] = out[k];
+        else if (deepest(&out[k]) > deepest(&out[*n - 1])) out[*n - 1] = out[k];
+    }
     return out;
 }
 

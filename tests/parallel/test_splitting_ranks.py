@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, TOW, call, changed, differing, environment, launcher, quick, run, write_case
+from harness import BERGTOW, ROOT, TOW, call, changed, differing, environment, launcher, quick, run, write_case
 
 CASE = changed(TOW, run__duration=6, ice__concentration=0.8, ice__size=0.9, ice__crushing={"pressure": 1e5},
                ice__splitting={"toughness": 100.0, "strength": 200.0, "least_size": 0.1},
@@ -65,6 +65,19 @@ def test_a_run_that_stopped_between_splits_goes_on(one, tmp_path):
     done = call("resume", r.dir)
     assert done.returncode == 0, done.stderr
     assert differing(one.dir / "result.h5", r.dir / "result.h5") == []
+
+
+def test_pieces_of_floes_in_parts_take_over_one_record_a_pair(tmp_path):
+    """Both parts of a floe have crushed the same neighbour when it splits: no checkpoint of such a run was read."""
+    words = "--set", "ice.crushing.pressure=100kPa", "--set", "ice.splitting.toughness=50e3", "--threads", "1", "-q"
+    case, out = ROOT / "cases/outlines/outlines.yml", tmp_path / "out"
+    assert call("run", case, "-o", out, *words, "--steps", 200).returncode == 0
+    with h5py.File(out / "checkpoint.h5") as f:
+        contacts = f["contacts"]
+        names = list(zip(contacts["a"], contacts["b"], map(tuple, contacts["part"][()]), contacts["law"]))
+    assert names == sorted(set(names))
+    done = call("resume", out, "--steps", 1)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_kill_within_a_cascade_loses_nothing(one, tmp_path):

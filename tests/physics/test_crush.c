@@ -987,6 +987,61 @@ TEST(a_quay_behind_changes_nothing)
     }
 }
 
+/// A face strikes two piers at once, 2 m apart: each pier is a face of its own, in one piece or two.
+TEST(two_piers_bear_apart)
+{
+    const double speed = 0.25, side = 4, h = 0.1, off = 0.02;
+    // m v²/2 = p h (d + max(0, d − off)) for two faces of 1 m, with d from the nearer pier
+    const double energy = 0.5 * sheet * 10 * side * side * speed * speed;
+    double end[2];
+    for (int halves = 0; halves < 2; halves++) {
+        bt_params p = params(2);
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+        bt_world *w = bt_world_create(&p);
+        bt_gid floe = 0;
+        for (int pier = 0; pier < 2; pier++)
+            for (int i = 0; i <= halves; i++, floe++) {
+                const double wide = halves ? 0.5 : 1, from = 0.5 * side + off * pier;
+                double v[] = {0, 0, 1, 0, 1, wide, 0, wide};
+                const bt_moments m = bt_shape_centre(4, v);
+                bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = v,
+                                               .x = from + m.cx, .y = (pier ? -2 : 1) + wide * i + m.cy});
+            }
+        bt_shore_create(w);
+        double v[8];
+        scene_square(side, v);
+        bt_body_def d = scene_prism(4, v, 10 * sheet);
+        d.vx = speed, d.thickness = h;
+        bt_world_add(w, &d);
+        for (int s = 0; s < 4; s++) bt_world_step(w);
+        end[halves] = pose(w, floe)->x;
+        bt_world_free(w);
+    }
+    CHECK_CLOSE(end[0], energy / (2 * pressure * h) + 0.5 * off, 0.01 * end[0]);
+    CHECK_CLOSE(end[1], end[0], 0.01 * end[0]);
+}
+
+/// Crushed ice is no outline: a floe that has been drawn back from its dent flies past without load.
+TEST(past_a_dent_without_load)
+{
+    bt_params p = params(0.05);
+    p.slop = 1e-3, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0;
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(1, v);
+    bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = v});
+    add_floe(w, 4, v, 0.5 + sqrt(0.5), 0.3, 0.25 * BT_PI, -1, 0.1);
+    for (int s = 0; s < 20; s++) bt_world_step(w);
+    const double deep = 0.5 + sqrt(0.5) - pose(w, 1)->x;
+    assert_true(deep > 0.05);
+    *vel(w, 1) = (bt_vel){.x = deep + 0.05};
+    for (int s = 0; s < 20; s++) bt_world_step(w);
+    *vel(w, 1) = (bt_vel){.x = -7, .y = 70};
+    bt_world_step(w);
+    assert_true(vel(w, 1)->x == -7 && vel(w, 1)->y == 70 && vel(w, 1)->w == 0);
+    bt_world_free(w);
+}
+
 /// Two pieces that fill a period meet at two seams. A floe is crushed alike at both.
 TEST(both_seams_of_a_period_bear_alike)
 {

@@ -5,6 +5,7 @@
 
 #include "contact/pack.h"
 #include "geometry/polygons.h"
+#include "space/shore.h"
 
 enum { INSTANTS = 1500 };
 
@@ -374,6 +375,71 @@ TEST(in_a_jam_loads_are_of_pairs_that_meet_and_released_pairs_do_not)
         bt_world_free(w);
     }
     assert_true(loaded > 500 && released > 100 && misjudged == 0);
+}
+
+/// A square in a quay or pier.
+static void add_fixed(bt_world *w, double x, double y)
+{
+    double v[8];
+    scene_square(1, v);
+    bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = v, .x = x, .y = y});
+}
+
+/// A body passes 0.1 m beside one pier and meets the next, each of two pieces: that it meets this one says nothing
+/// about the other.
+TEST(a_pier_passed_on_the_way_to_another_bears_nothing)
+{
+    const bt_params p = scene_params(1, 1);
+    bt_world *w = bt_world_create(&p);
+    for (int i = 0; i < 2; i++) add_fixed(w, 2, 1.1 + i), add_fixed(w, 4.5 + i, 0);
+    bt_shore_create(w);
+    double v[8];
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, 900);
+    d.vx = 4;
+    const bt_gid gid = bt_world_add(w, &d);
+    bt_world_step(w);
+    const bt_pose pose = w->bodies.pose[bt_world_index(w, gid)];
+    CHECK_CLOSE(pose.x, 3.5, 1e-2);
+    CHECK_CLOSE(pose.y, 0, 1e-9);
+    CHECK_CLOSE(pose.yaw, 0, 1e-9);
+    bt_world_free(w);
+}
+
+/// Two turning bodies hit and, two floe lengths apart, pass in the next step. Impulses of the hit say nothing about it.
+TEST(a_pair_that_has_hit_passes_like_any_other)
+{
+    bt_params p = scene_params(1, 1);
+    p.slop = 1e-3;
+    bt_world *w = bt_world_create(&p);
+    int passed = 0;
+    uint64_t rng = 3;
+    for (int k = 0; k < 2; k++) {
+        double v[8] = {-0.8, -0.2, 0.8, -0.2, 0.8, 0.2, -0.8, 0.2};
+        bt_body_def d = scene_prism(4, v, 900);
+        d.friction = 0.3, d.restitution = 0.5;
+        bt_world_add(w, &d);
+    }
+    for (int trial = 0; trial < 1000; trial++) {
+        for (int g = 0; g < 2; g++) {
+            const bt_idx i = bt_world_index(w, g);
+            w->bodies.pose[i] = (bt_pose){.x = g * (1.2 + scene_uniform(&rng)), .y = scene_uniform(&rng) - 0.5,
+                                          .yaw = 6 * scene_uniform(&rng)};
+            w->bodies.vel[i] = (bt_vel){.x = (g ? -1 : 1) * scene_uniform(&rng), .y = scene_uniform(&rng) - 0.5,
+                                        .w = 2 * scene_uniform(&rng) - 1};
+            bt_bodies_turn(&w->bodies, i);
+        }
+        bt_world_step(w);
+        const bt_idx a = bt_world_index(w, 0), b = bt_world_index(w, 1);
+        const bt_vel v[2] = {w->bodies.vel[a], w->bodies.vel[b]};
+        if (w->stats.n_points == 0 ||
+            nearest_passage(w, a, w->bodies.pose[a], v[0], b, w->bodies.pose[b], v[1]) < 1.02 * p.slop) continue;
+        bt_world_step(w);
+        passed++;
+        for (int g = 0; g < 2; g++) assert_true(same_velocity(w->bodies.vel[bt_world_index(w, g)], v[g]));
+    }
+    assert_true(passed > 100);
+    bt_world_free(w);
 }
 
 TEST_MAIN(NULL, NULL)
