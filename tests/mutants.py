@@ -492,7 +492,7 @@ MUTANTS = {
         ("fabs(side[0].s - side[1].s) - tie)", "fabs(side[0].s - side[1].s))", "an edge within the tie does not count"),
         ("bt_max(most.margin, depth + most.beside)", "most.margin", "a point beside the nearest one is not found"),
         ("(tilt > most.beside ? most.beside / tilt : 1)", "1", "a tilted edge bears along its whole length"),
-        ("if (-side[from_b].s > tie && past_a_corner(from, &side[from_b], to)) continue;", "",
+        ("if (-side[from_b].s > tie && past_an_end(from, &side[from_b], to, true)) continue;", "",
          "a corner may have come through any edge"),
     ]),
     "src/contact/bearing.c": (["physics/test_crush"], [

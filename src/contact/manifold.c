@@ -171,11 +171,14 @@ BT_INLINE int facing_edge(const polygon *shape, const edge *side, int guess)
     return facing;
 }
 
-/// Largest gap of a point; and, where a contact law needs both ends of an edge, by how much the gap of the farther end
-/// may exceed that of the nearer, whatever the margin (contact/law_pair.h, bt_closing).
-typedef struct { double margin, beside; } bounds;
+/// Largest gap of a point; where a contact law needs both ends of an edge, by how much the gap of the farther end may
+/// exceed that of the nearer, whatever the margin (contact/law_pair.h, bt_closing); the slop, m.
+typedef struct { double margin, beside, slop; } bounds;
 
-static bounds bounds_of(const bt_world *world, double margin) { return (bounds){margin, world->cells->beside}; }
+static bounds bounds_of(const bt_world *world, double margin)
+{
+    return (bounds){margin, world->cells->beside, world->par.slop};
+}
 
 /// Points on edge `facing` of the incident polygon that face the reference edge, or only its exposed part on a shore
 /// (shown, or NULL); `flip` if the reference is b.
@@ -393,10 +396,13 @@ static bool bodies_touch(const bt_world *world, bt_idx a, bt_idx b, double margi
 //   a corner V    of the outline, with edges e1 → V → e2, is convex, and the direction n from the body to the other one
 //                 lies in its normal cone: n·e1 >= 0 and n·e2 <= 0.
 // A contact left out here is found with the part that has the edge, or with the part on the other side of the cut.
-// Parts that are apart touch at their nearest features or not at all. Overlapping parts separate along the best axis
-// that counts, unless that is much farther than along the best of all: the middle one of three parts that share a
-// corner has edges of the outline only on its far side. An edge whose end a corner lies past is not the one it came
-// through (past_a_corner).
+// Parts that are apart touch at their nearest features, if these count. If not, and the vertex nearest to the best edge
+// that counts lies past an end where the outline has no corner, that vertex belongs to the next part, and the other
+// vertices still meet this edge: a tilted edge over a seam or a bay has one corner over each part. (Without this the
+// farther one ran into the ice.) Overlapping parts separate along the best axis that counts, unless that is much
+// farther than along the best of all: the middle one of three parts that share a corner has edges of the outline only
+// on its far side. An edge past whose end, a corner, the other's vertex lies is not the one it came through
+// (past_an_end).
 //
 // The pieces of a shore (space/shore.h) are such parts of one outline: their edges and corners count where they lie on
 // its boundary.
@@ -483,22 +489,52 @@ static bool shows_at(const part_of_body *part, int i, const double x[2])
     return face->from < face->to && t >= face->from - slack && t <= face->to + slack;
 }
 
+/// How far edge j of q reaches past the end of edge i of p at `vertex`, m, and the *gap of its end, if p is cut there
+/// from the rest of a straight shore; else −∞.
+static double past_seam(const part_of_body *p, int i, const part_of_body *q, int j, int vertex, double *gap)
+{
+    const int end = vertex != i;
+    double nx, ny, v[2], x[2], past = -INFINITY;
+    if (!p->face || !p->face[i].on[end]) return past;
+    edge_normal(&p->p, i, &nx, &ny);
+    world_vertex(&p->p, end && i + 1 == p->p.count ? 0 : i + end, v);
+    for (int k = 0; k < 2; k++) {
+        world_vertex(&q->p, k && j + 1 == q->p.count ? 0 : j + k, x);
+        const double along = (end ? 1 : -1) * (nx * (x[1] - v[1]) - ny * (x[0] - v[0]));
+        if (along > past) past = along, *gap = nx * (x[0] - v[0]) + ny * (x[1] - v[1]);
+    }
+    return past;
+}
+
 /// clip_points, without points on a cut: if the edge that faces the reference is a cut, only its ends can count; if
-/// others cover an end of it, only its exposed stretch.
-static void clip_what_counts(const part_of_body *ref, const edge *side, const part_of_body *inc, bool flip,
+/// others cover an end of it, only its exposed stretch. A point at the seam of a straight shore, on an edge that
+/// reaches past it, is marked: it goes if the end of the edge has a point on another piece (detect.c), and at once if
+/// that end is too far off for one. False if therefore none is left.
+static bool clip_what_counts(const part_of_body *ref, const edge *side, const part_of_body *inc, bool flip,
                              const double d[2], bounds most, bt_manifold *manifold)
 {
     const int facing = facing_edge(&inc->p, side, -1);
     clip_points(&ref->p, side, ref->face ? &ref->face[side->i] : NULL, &inc->p, facing, flip, d, most, manifold);
-    const bool partly = covered_at_an_end(inc, facing);
-    if (edge_counts(inc, facing) && !partly) return;
-    int kept = 0;
+    const bool partly = covered_at_an_end(inc, facing), all = edge_counts(inc, facing) && !partly;
+    int kept = 0, beyond = 0;
     for (int k = 0; k < manifold->n_points; k++) {
         const uint32_t id = manifold->p[k].feature & 0xfffff; // vertex, and whether it belongs to the reference
-        const bool corner = !(id & 1) && corner_counts(inc, (int)(id >> 1), -side->nx, -side->ny);
-        if (corner || (partly && shows_at(inc, facing, manifold->p[k].ra))) manifold->p[kept++] = manifold->p[k];
+        const int vertex = (int)(id >> 1), of_ref = id & 1;
+        double gap = 0;
+        const double past = of_ref ? past_seam(ref, side->i, inc, facing, vertex, &gap)
+                                   : past_seam(inc, facing, ref, side->i, vertex, &gap);
+        if (past > most.slop && gap > bt_max(most.margin, manifold->p[k].gap + most.beside)) {
+            beyond++;
+            continue;
+        }
+        const bool corner = !of_ref && corner_counts(inc, vertex, -side->nx, -side->ny);
+        if (!all && !corner && !(partly && shows_at(inc, facing, manifold->p[k].ra))) continue;
+        const int8_t way = vertex != (of_ref ? side->i : facing) ? 1 : -1;
+        manifold->p[kept] = manifold->p[k];
+        manifold->past[kept++] = past > most.slop ? (flip == of_ref ? -way : way) : 0;
     }
     manifold->n_points = kept;
+    return kept > 0 || beyond == 0;
 }
 
 /// Do others cover an end of edge `side` of p, or of the edge of q that faces it, leaving no contact point?
@@ -507,7 +543,7 @@ static bool beside_what_shows(const part_of_body *p, const edge *side, const par
     if (!covered_at_an_end(p, side->i) && !(q->face && covered_at_an_end(q, facing_edge(&q->p, side, -1))))
         return false;
     bt_manifold manifold = {0};
-    clip_what_counts(p, side, q, false, (double[2]){0, 0}, (bounds){INFINITY, 0}, &manifold);
+    clip_what_counts(p, side, q, false, (double[2]){0, 0}, (bounds){.margin = INFINITY}, &manifold);
     return manifold.n_points == 0;
 }
 
@@ -538,17 +574,22 @@ static bool is_corner(const part_of_body *part, int i)
     return a[0] * b[1] - a[1] * b[0] > STRAIGHT * bt_hypot(a[0], a[1]) * bt_hypot(b[0], b[1]);
 }
 
-/// Does the vertex of q deepest behind edge `side` of p lie past a corner at an end of it? Then it has not come through
-/// this edge, but through the next one.
-static bool past_a_corner(const part_of_body *p, const edge *side, const part_of_body *q)
+/// Does the vertex of q deepest behind edge `side` of p lie past an end of it that is a corner, or past one that is
+/// none? Past a corner it has not come through this edge, but through the next one.
+static bool past_an_end(const part_of_body *p, const edge *side, const part_of_body *q, bool corner)
 {
     const int i = side->i, next = i + 1 < p->p.count ? i + 1 : 0;
     double x[2], v[2], end[2];
     world_vertex(&q->p, support(&q->p, side->nx, side->ny), x);
     world_vertex(&p->p, i, v);
     world_vertex(&p->p, next, end);
-    return (side->nx * (x[1] - v[1]) < side->ny * (x[0] - v[0]) && is_corner(p, i)) ||
-           (side->nx * (x[1] - end[1]) > side->ny * (x[0] - end[0]) && is_corner(p, next));
+    return (side->nx * (x[1] - v[1]) < side->ny * (x[0] - v[0]) && is_corner(p, i) == corner) ||
+           (side->nx * (x[1] - end[1]) > side->ny * (x[0] - end[0]) && is_corner(p, next) == corner);
+}
+
+static double least_gap(const bt_manifold *m)
+{
+    return m->n_points == 0 ? INFINITY : bt_min(m->p[0].gap, m->p[m->n_points - 1].gap);
 }
 
 /// Contact at the nearest features of two separate parts, if both count.
@@ -557,7 +598,7 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
 {
     int ca = 0, cb = 0, near = 0;
     bool of_b = false;
-    manifold->n_points = 0;
+    *manifold = (bt_manifold){.a = manifold->a, .b = manifold->b};
     if (nearest_features(&a->p, &b->p, &ca, &cb, &near, &of_b)) {
         return join_corners(&a->p, ca, &b->p, cb, d, most.margin, manifold) &&
                corner_counts(a, ca, manifold->nx, manifold->ny) && corner_counts(b, cb, -manifold->nx, -manifold->ny);
@@ -567,9 +608,9 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
     if (!edge_counts(ref, near) || !corner_counts(inc, of_b ? ca : cb, -side.nx, -side.ny) ||
         beside_what_shows(ref, &side, inc))
         return false;
-    clip_what_counts(ref, &side, inc, of_b, d, most, manifold);
+    if (!clip_what_counts(ref, &side, inc, of_b, d, most, manifold)) return false;
     if (manifold->n_points == 0) deepest_point(&ref->p, &side, &inc->p, of_b, d, manifold);
-    return bt_min(manifold->p[0].gap, manifold->p[manifold->n_points - 1].gap) <= most.margin;
+    return least_gap(manifold) <= most.margin;
 }
 
 static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
@@ -601,20 +642,24 @@ static bool parts_touch(const bt_world *world, bt_idx ia, bt_idx ib, const uint1
     const bool ref = reference_is_b(&side[0], &side[1], tie, reference_before);
     const double sep = side[ref].s;
     if (best > TOUCHING * tie) {
+        const part_of_body *from = &p[ref], *to = &p[!ref];
         if (sep > 0 && sep >= best - tie) {
-            clip_what_counts(&p[ref], &side[ref], &p[!ref], ref, d, most, manifold);
-            if (manifold->n_points > 0 && bt_min(manifold->p[0].gap, manifold->p[manifold->n_points - 1].gap) <=
-                sep + tie) return true;
+            if (!clip_what_counts(from, &side[ref], to, ref, d, most, manifold)) return false;
+            if (least_gap(manifold) <= sep + tie) return true;
         }
-        return nearest_contact(&p[0], &p[1], d, most, manifold);
+        if (nearest_contact(&p[0], &p[1], d, most, manifold)) return true;
+        if (!isfinite(sep) || !past_an_end(from, &side[ref], to, false)) return false;
+        *manifold = (bt_manifold){.a = ia, .b = ib};
+        clip_what_counts(from, &side[ref], to, ref, d, most, manifold);
+        return manifold->n_points > 0 && least_gap(manifold) > 0;
     }
     for (int k = 0; k < 2; k++) {
         const bool from_b = k == 0 ? ref : !ref;
         const part_of_body *from = &p[from_b], *to = &p[!from_b];
         if (!(-side[from_b].s <= bt_max(tie, -DETOUR * best))) continue;
-        clip_what_counts(from, &side[from_b], to, from_b, d, most, manifold);
+        if (!clip_what_counts(from, &side[from_b], to, from_b, d, most, manifold)) return false;
         if (manifold->n_points > 0) return true;
-        if (-side[from_b].s > tie && past_a_corner(from, &side[from_b], to)) continue;
+        if (-side[from_b].s > tie && past_an_end(from, &side[from_b], to, true)) continue;
         deepest_point(&from->p, &side[from_b], &to->p, from_b, d, manifold);
         return true;
     }

@@ -12,6 +12,7 @@
 
 static const double CONE = 1e-6; // rad; two pieces of a straight shore may both count, never neither
 static const double ENDS = 4;    // slops: an exposed edge shorter than this does not count, nor a gap to its end
+static const double SEAM = 1e-3; // rad a boundary may turn and go straight on: below a floe it sags less than the slop
 enum { LEAF = 4 };               // polygons per leaf
 
 typedef struct { double low[2], high[2]; } box;
@@ -50,12 +51,14 @@ const bt_face *bt_shore_faces(const bt_shore *shore, bt_gid gid, int part)
     return bt_shore_has(shore, gid) ? shore->face + shore->first[gid] + part : NULL;
 }
 
-bool bt_shore_in_cone(const bt_face *face, double nx, double ny)
+static bool in_cone(const bt_face *face, double nx, double ny, double beside)
 {
     const double *u = face->u, *w = face->w;
-    return u[0] * ny - u[1] * nx >= -CONE && nx * w[1] - ny * w[0] >= -CONE &&
+    return u[0] * ny - u[1] * nx >= -beside && nx * w[1] - ny * w[0] >= -beside &&
            nx * (u[0] + w[0]) + ny * (u[1] + w[1]) > 0;
 }
+
+bool bt_shore_in_cone(const bt_face *face, double nx, double ny) { return in_cone(face, nx, ny, CONE); }
 
 // --- tree ------------------------------------------------------------------------------------------------------------
 
@@ -242,8 +245,8 @@ static void intersect(bt_face *a, const double u[2], const double w[2])
     bt_face both = *a, b = {.u = {u[0], u[1]}, .w = {w[0], w[1]}};
     if (a->u[0] * u[1] - a->u[1] * u[0] > 0) memcpy(both.u, u, sizeof both.u);
     if (w[0] * a->w[1] - w[1] * a->w[0] > 0) memcpy(both.w, w, sizeof both.w);
-    const bool some = bt_shore_in_cone(a, both.u[0], both.u[1]) && bt_shore_in_cone(&b, both.u[0], both.u[1]) &&
-                      bt_shore_in_cone(a, both.w[0], both.w[1]) && bt_shore_in_cone(&b, both.w[0], both.w[1]);
+    const bool some = in_cone(a, both.u[0], both.u[1], SEAM) && in_cone(&b, both.u[0], both.u[1], SEAM) &&
+                      in_cone(a, both.w[0], both.w[1], SEAM) && in_cone(&b, both.w[0], both.w[1], SEAM);
     if (!some) memset(both.u, 0, sizeof both.u), memset(both.w, 0, sizeof both.w);
     memcpy(a->u, both.u, sizeof both.u);
     memcpy(a->w, both.w, sizeof both.w);
@@ -331,6 +334,21 @@ static void trim(about *around, bt_face *face, double length)
     if (face->to - face->from <= bt_min(slack, 0.5 * length)) face->to = face->from;
 }
 
+static bool parallel(const double n[2], const double m[2])
+{
+    return n[0] * m[0] + n[1] * m[1] > 0 && fabs(n[0] * m[1] - n[1] * m[0]) <= SEAM;
+}
+
+/// Does the boundary go straight on past vertex i, an end of an exposed edge with the normal n, but on other polygons?
+static bool goes_on(const polygon *shape, const bt_face *faces, int i, const double n[2])
+{
+    const int at = i % shape->n;
+    double before[2], after[2];
+    normal_of(shape, at > 0 ? at - 1 : shape->n - 1, before);
+    normal_of(shape, at, after);
+    return parallel(faces[at].u, n) && parallel(faces[at].w, n) && !parallel(before, after);
+}
+
 static void find_faces(const bt_world *world, about *around)
 {
     const double none[2] = {0, 0};
@@ -342,6 +360,13 @@ static void find_faces(const bt_world *world, about *around)
         around->n_spans = 0;
         look_beside(world, around);
         trim(around, face, length);
+    }
+    for (int i = 0; i < shape.n; i++) {
+        bt_face *face = &around->face[i];
+        double n[2];
+        const double length = normal_of(&shape, i, n);
+        face->on[0] = face->from == 0 && goes_on(&shape, around->face, i, n);
+        face->on[1] = face->to == length && goes_on(&shape, around->face, i + 1, n);
     }
 }
 

@@ -27,7 +27,9 @@
 /// The part of a vertex of a polygon, and of the edge that starts there, on the boundary of the shore.
 typedef struct bt_face {
     double from, to;   ///< the edge counts from here to here, m from its vertex; from >= to: it does not
-    double u[2], w[2]; ///< unit normals that bound the cone, anticlockwise from u to w; both 0: empty
+    bool on[2];        ///< before `from`, after `to` the boundary goes straight on, on other polygons only
+    double u[2], w[2]; ///< unit normals that bound the cone, anticlockwise from u to w; both 0: empty. In a bay that is
+                       ///< nearly straight, w is before u: empty, too
 } bt_face;
 
 typedef struct bt_shore bt_shore;

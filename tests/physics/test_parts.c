@@ -176,6 +176,31 @@ TEST(gaps_are_distances_of_outlines)
     if (lost > in / 100) fail_msg("%d of %d overlaps were not seen", lost, in);
 }
 
+/// A square, tilted before a front that bends inwards, so that the corner over the one part is nearer than the other
+/// part: its other corner has a point on that part, too.
+TEST(a_tilted_edge_has_a_point_on_each_part)
+{
+    bt_params p = params_of_world(0.1);
+    bt_world *w = bt_world_create(&p);
+    double v[10] = {0.2, 0, 0, -4, 3, -4, 3, 4, 0, 4}, square[8];
+    const bt_moments m = bt_shape_centre(5, v);
+    add_outline(w, 5, v, m.cx, m.cy, 0, 0, 0);
+    scene_square(1, square);
+    add_outline(w, 4, square, -0.6, 0.15, 0.15, 0, 0);
+    bt_manifold *man;
+    bt_idx n;
+    bool lower = false, upper = false;
+    brute_force(w, 0.5, &man, &n);
+    for (bt_idx k = 0; k < n; k++)
+        for (int j = 0; j < man[k].n_points; j++) {
+            const double y = w->bodies.pose[1].y + man[k].p[j].rb[1];
+            lower = lower || fabs(y + 0.27) < 0.01, upper = upper || fabs(y - 0.72) < 0.01;
+        }
+    free(man);
+    bt_world_free(w);
+    assert_true(lower && upper);
+}
+
 /// Two outlines that meet at a corner, to rounding, as those on the two sides of a crack: neither is inside the other.
 TEST(corners_that_meet_are_not_deep)
 {
