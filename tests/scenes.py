@@ -89,6 +89,10 @@ REBOUNDS = {
     "body": {"shape": "none"},
     "guard": {"energy": 0},
 }
+#: between floes that stand fast, many of the same rebound farther within a step than there is room
+NO_ROOM = changed(REBOUNDS, run__dt=0.5, run__duration=4, ice__friction=0.3, guard__unconverged=1000,
+                  floes=[dict(floe, fixed=True, vx=0, vy=0, yaw_rate=0) if k % 5 == 0 else floe
+                         for k, floe in enumerate(REBOUNDS["floes"])])
 GEO_THRUST = {"mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000, "line_damping": 100}
 ORIGIN = {"origin_lon": 18.3, "origin_lat": 76.2}
 PLANE = {"origin_east": 560123.5, "origin_north": 8490321.25}
@@ -216,6 +220,7 @@ SCENES = {
     "no_body": changed(PRESS, run__duration=1, domain__length=18, domain__width=14, ice__concentration=0.8),
     "rebounds": REBOUNDS,
     "gates": GATES,
+    "no_room": NO_ROOM,
 }
 
 

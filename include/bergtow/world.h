@@ -59,7 +59,7 @@ typedef struct bt_step_stats {
     bool locked;             ///< it did not, and some bodies are locked (src/solve/islands.h)
     bool no_load;            ///< some of these touch the towed body: its load is unbounded
     double overlap;          ///< deepest overlap at the start of the step, m
-    bool restitution_cut;    ///< rebounds would have added energy somewhere, and were reduced
+    bool restitution_cut;    ///< rebounds would have added energy or had no room somewhere, and were lowered
     double contact_work;     ///< Σ λ·½(w1 + w2) from the velocities at the start of the step, J
     bool added_energy;       ///< contacts gained more over the step without them than residual and rounding explain
     /// numbers of the program's contact laws, in their order (src/contact/law.h): series, with units and meaning there

@@ -26,7 +26,8 @@
     ROW(LOCKED, "locked", "steps of_steps", "bodies were locked between others that cannot give way")                  \
     ROW(UNPROJECTED, "unprojected", "steps of_steps", "the position projection left overlap")                          \
     ROW(OUTRUN, "outrun", "steps of_steps", "a body moved farther than the contact detection looks ahead")             \
-    ROW(REBOUNDS_LOWERED, "rebounds_lowered", "steps of_steps", "rebounds that would have added energy were lowered")  \
+    ROW(REBOUNDS_LOWERED, "rebounds_lowered", "steps of_steps",                                            \
+        "rebounds that would have added energy, or had no room, were lowered")                                         \
     ROW(ENERGY_ADDED, "energy_added", "steps of_steps", "contacts added energy")                                       \
     ROW(OVERLAP, "overlap", "overlap_m share_percent", "bodies overlap")                                             \
     ROW(CRUSHED, "crushed", "depth_m share_percent", "floes were crushed deeper than the model is valid for")          \

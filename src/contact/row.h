@@ -13,6 +13,9 @@ static inline double bt_normal_velocity(const bt_contact *contact, int i, const 
            contact->ran[i] * va->w;
 }
 
+/// Does a point of a contact with these biases rebound? Gaps give no negative one.
+static inline bool bt_rebounds(const double bias[2]) { return bias[0] < 0 || bias[1] < 0; }
+
 /// Normal velocity at the middle of the two points of a contact, m/s.
 static inline double bt_mean_normal_velocity(const bt_contact *contact, const bt_vel *va, const bt_vel *vb)
 {

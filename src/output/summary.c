@@ -191,7 +191,7 @@ static void warn_of_solver(bt_summary *summary, const bt_history *history, const
                 (long long)history->outrun, (long long)history->n);
     if (history->restitution_cut)
         bt_warn(&summary->warnings, BT_WARN_REBOUNDS_LOWERED,
-                "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
+                "in %lld of %lld steps rebounds would have added energy, or had no room; their restitution was lowered",
                 (long long)history->restitution_cut, (long long)history->n);
     if (history->positive_work)
         bt_warn(&summary->warnings, BT_WARN_ENERGY_ADDED,

@@ -309,6 +309,17 @@ BT_FOR_EACH_CPU
 static void put_back(bt_cell *cell,
                      const bt_contact *contact) { copy_records(cell->contacts, contact, cell->n_contacts); }
 
+const bt_contact *bt_batch_read(const bt_cell *cell, bt_contact *copy)
+{
+    if (!cell->work->packed) return cell->contacts;
+    packing pack;
+    begin_packing(&pack, cell);
+    take_all(cell, &pack);
+    memcpy(copy, pack.u, (size_t)cell->n_contacts * sizeof *copy);
+    end_packing(&pack);
+    return copy;
+}
+
 void bt_batch_unpack(bt_cell *cell)
 {
     if (!cell->work->packed) return;

@@ -45,6 +45,10 @@ bt_found bt_batch_residual(bt_cell *cell, const bt_vel *v, const bt_inv *inv, co
 /// previous pass has not left calm.
 void bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *sweep, int times, bt_totals *totals);
 
+/// The records of the contacts of a cell [n_contacts]: its own, or, if it is packed, those written to `copy`. Batches
+/// stay, and so do the rests, which an unpacking in the middle of the sweeps would end.
+const bt_contact *bt_batch_read(const bt_cell *cell, bt_contact *copy);
+
 /// Restore the records of the contacts, with their impulses; does nothing if the cell is not packed.
 void bt_batch_unpack(bt_cell *cell);
 

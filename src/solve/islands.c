@@ -9,6 +9,7 @@
 #include "base/elementary.h"
 #include "contact/row.h"
 #include "partition/domain.h"
+#include "solve/batch.h"
 #include "solve/kernel.h"
 #include "solve/rounds.h"
 #include "solve/solver.h"
@@ -54,20 +55,17 @@ static void make_room(const bt_bodies *bodies, bt_islands *islands)
     }
 }
 
-void bt_islands_make(bt_world *world, bt_islands *islands, bool (*joins)(const bt_cell *cell, bt_idx contact))
+static void join(const bt_world *world, bt_islands *islands, const bt_contact *contact)
 {
-    const bt_cells *ts = world->cells;
+    const bt_inv *inv = world->bodies.inv;
+    if (inv[contact->a].m == 0 || inv[contact->b].m == 0) return;
+    islands->root[islands_root(islands, contact->b)] = islands_root(islands, contact->a);
+}
+
+/// Collective. Give the islands of several ranks that meet in a body one name.
+static void join_ranks(bt_world *world, bt_islands *islands)
+{
     const bt_bodies *bodies = &world->bodies;
-    make_room(bodies, islands);
-    for (bt_idx i = 0; i < ts->n_order; i++) {
-        const bt_cell *cell = &ts->cell[ts->order[i]];
-        for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            const bt_contact *contact = &cell->contacts[j];
-            if (bodies->inv[contact->a].m == 0 || bodies->inv[contact->b].m == 0 || (joins && !joins(cell, j)))
-                continue;
-            islands->root[islands_root(islands, contact->b)] = islands_root(islands, contact->a);
-        }
-    }
     if (!world->domain) return;
     bt_gid *name = bt_alloc((size_t)bodies->n, sizeof *name);
     for (bt_idx i = 0; i < bodies->n; i++) name[i] = islands->name[islands_root(islands, i)];
@@ -75,6 +73,17 @@ void bt_islands_make(bt_world *world, bt_islands *islands, bool (*joins)(const b
     for (bt_idx i = 0; i < bodies->n; i++)
         if (islands->root[i] == i) islands->name[i] = name[i];
     free(name);
+}
+
+void bt_islands_make(bt_world *world, bt_islands *islands)
+{
+    const bt_cells *ts = world->cells;
+    make_room(&world->bodies, islands);
+    for (bt_idx i = 0; i < ts->n_order; i++) {
+        const bt_cell *cell = &ts->cell[ts->order[i]];
+        for (bt_idx j = 0; j < cell->n_contacts; j++) join(world, islands, &cell->contacts[j]);
+    }
+    join_ranks(world, islands);
 }
 
 void bt_islands_clear(const bt_world *world, bt_islands *islands)
@@ -105,34 +114,38 @@ typedef struct {
     double closing; ///< the largest closing speed without loads, m/s
 } loads;
 
-/// Is the contact loaded, and its load unbounded?
-static bool is_hard(const bt_cell *cell, bt_idx j)
+/// Is contact j of the cell loaded, and its load unbounded?
+static bool is_hard(const bt_cell *cell, const bt_contact *contact, bt_idx j)
 {
-    const bt_contact *contact = &cell->contacts[j];
     if (contact->n == 0 || contact->ln[0] + contact->ln[1] == 0) return false;
     const bt_limit *limit = cell->laws->limits ? &cell->laws->limits[j] : NULL;
     return !limit || !(isfinite(limit->most[0]) || (contact->n > 1 && isfinite(limit->most[1])));
 }
 
-/// Collect these contacts, and the largest closing speed without loads.
-static loads collect(const bt_world *world)
+/// Collect these contacts, and the largest closing speed without loads. whole: only those of these islands whose share
+/// is not 0, or NULL.
+static loads collect(const bt_world *world, bt_islands *whole)
 {
     const bt_cells *cells = world->cells;
     const bt_vel *at_first = world->bodies.vel_free;
     loads found = {.first = bt_alloc((size_t)cells->n + 1, sizeof *found.first), .closing = world->par.tolerance};
     bool *works = bt_alloc((size_t)cells->n, sizeof *works);
-    size_t n = 0;
+    size_t n = 0, most = 0;
     for (bt_idx i = 0; i < cells->n_order; i++) {
+        const size_t n_here = (size_t)cells->cell[cells->order[i]].n_contacts;
         works[cells->order[i]] = true;
-        n += (size_t)cells->cell[cells->order[i]].n_contacts;
+        n += n_here, most = bt_max(most, n_here);
     }
+    bt_contact *copy = bt_alloc_unset(most + 1, sizeof *copy);
     found.contact = bt_alloc(n + 1, sizeof *found.contact);
     for (bt_idx k = 0; k < cells->n; k++) {
         const bt_cell *cell = &cells->cell[k];
         found.first[k + 1] = found.first[k];
+        const bt_contact *contacts = works[k] ? bt_batch_read(cell, copy) : NULL;
         for (bt_idx j = 0; works[k] && j < cell->n_contacts; j++) {
-            if (!is_hard(cell, j)) continue;
-            const bt_contact *contact = &cell->contacts[j];
+            const bt_contact *contact = &contacts[j];
+            if (!is_hard(cell, contact, j) || (whole && whole->share[bt_islands_of(world, whole, contact)] == 0))
+                continue;
             hard *h = &found.contact[found.first[k + 1]++];
             *h = (hard){*contact, {contact->bias[0], contact->bias[1]}, contact->ln[0] + contact->ln[1]};
             h->u.bias[0] = h->u.bias[1] = 0;
@@ -141,9 +154,19 @@ static loads collect(const bt_world *world)
                                        -bt_normal_velocity(contact, c, &at_first[contact->a], &at_first[contact->b]));
         }
     }
-    free(works);
+    free(works), free(copy);
     bt_domain_maxima(world, &found.closing, 1);
     return found;
+}
+
+/// Collective. The islands of these contacts.
+static bt_islands *islands_of(bt_world *world, const loads *found)
+{
+    bt_islands *islands = bt_islands_create();
+    make_room(&world->bodies, islands);
+    for (bt_idx i = 0; i < found->first[world->cells->n]; i++) join(world, islands, &found->contact[i].u);
+    join_ranks(world, islands);
+    return islands;
 }
 
 static void no_change(bt_world *world, bt_idx k, const void *context, bt_totals *totals)
@@ -335,15 +358,43 @@ static bt_lock by_balance(bt_world *world, bt_islands *islands, const loads *fou
 
 bt_lock bt_locked(bt_world *world)
 {
-    bt_islands *islands = world->solver->islands;
-    const loads found = collect(world);
+    const loads found = collect(world, NULL);
+    bt_islands *islands = islands_of(world, &found);
     bt_rounds_make_shift(world);
-    bt_islands_make(world, islands, is_hard);
     bt_lock lock = {0};
     for (int held = 0; held < 2 && !lock.towed; held++) {
         const bt_lock more = by_balance(world, islands, &found, held);
         lock = (bt_lock){lock.found || more.found, more.towed};
     }
+    bt_islands_free(islands);
     free(found.contact), free(found.first);
     return lock;
+}
+
+static double rebounds(const hard *h) { return bt_rebounds(h->bias); }
+
+bool bt_locked_by_rebounds(bt_world *world, bt_islands *whole)
+{
+    bt_domain_settle(world, NULL);
+    const loads found = collect(world, whole);
+    bt_islands *islands = islands_of(world, &found);
+    bt_rounds_make_shift(world);
+    double any = 0;
+    bt_islands_clear(world, whole);
+    for (int held = 0; held < 2; held++) {
+        if (!by_balance(world, islands, &found, held).found) continue;
+        add_contacts(world, islands, &found, rebounds);
+        for (bt_idx i = 0; i < found.first[world->cells->n]; i++) {
+            const bt_contact *contact = &found.contact[i].u;
+            const bt_idx part = bt_islands_of(world, islands, contact);
+            if (!(islands->share[part] > 0 && bt_sum_value(&islands->sum[part]) > 0)) continue;
+            bt_sum_add(&whole->sum[bt_islands_of(world, whole, contact)], 1);
+            any = 1;
+        }
+    }
+    bt_islands_add(world, whole);
+    bt_domain_maxima(world, &any, 1);
+    bt_islands_free(islands);
+    free(found.contact), free(found.first);
+    return any > 0;
 }

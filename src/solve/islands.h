@@ -23,8 +23,8 @@ typedef struct bt_islands {
 bt_islands *bt_islands_create(void);
 void bt_islands_free(bt_islands *islands);
 
-/// Collective. Join the bodies of all contacts of this step for which `joins` is true (NULL: of all contacts).
-void bt_islands_make(bt_world *world, bt_islands *islands, bool (*joins)(const bt_cell *cell, bt_idx contact));
+/// Collective. Join the bodies of all contacts of this step.
+void bt_islands_make(bt_world *world, bt_islands *islands);
 
 /// The root of the island of a contact with at least one movable body.
 bt_idx bt_islands_of(const bt_world *world, bt_islands *islands, const bt_contact *contact);
@@ -104,5 +104,11 @@ typedef struct bt_lock {
 /// Collective. After a solution that has not converged. Uses the array of the position projection; impulses and
 /// velocities stay.
 bt_lock bt_locked(bt_world *world);
+
+/// Collective, between rounds of sweeps. Are bodies locked by rebounds? `whole` are the islands of all contacts, with
+/// the share of restitution that each has left. Counts in their sums the contacts in locked parts where a row that
+/// rebounds is loaded. By normal impulses the proof holds for the loads of any sweep; with friction they count only
+/// once they are so large that they balance each other within BT_LOCKED_OTHER, as at the end of the sweeps.
+bool bt_locked_by_rebounds(bt_world *world, bt_islands *whole);
 
 #endif

@@ -19,6 +19,7 @@
 #define LEAST_CAP 0.3   // below this: no momentum
 #define NO_MOMENTUM 0.3 // further work, over the limit of work, without momentum
 #define HARD 0.5        // share of the limit of work, from where the best unknowns are kept
+#define PROOF 0x1p-4    // share of the limit of work after which a proof is first tried, and again after each doubling
 #define FAR 4           // tolerances: with a larger residual the iteration continues beyond the limit of work
 #define LEAST_LOWERED 0.5 // least factor on the update that ends a round
 #define LEAST_SWEEP 0.01 // share of the contacts that a sweep costs in itself, in the limit of work
@@ -405,7 +406,9 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
     double best = INFINITY, small = (problem->plain ? 1 : BT_NEAR) * problem->tolerance; // update that ends a round
     const double all_work = problem->limit * (problem->plain ? 1 : (double)(work->contacts + 1));
     // between `fast` and `limit`: no momentum
-    double fast = spent(problem, work) + all_work, limit = fast + (problem->plain ? 0 : NO_MOMENTUM * all_work);
+    const double begun = spent(problem, work);
+    double fast = begun + all_work, limit = fast + (problem->plain ? 0 : NO_MOMENTUM * all_work);
+    double proof = problem->refuted ? begun + PROOF * all_work : INFINITY; // when to try next
     int more = 0; // further attempts
     bool settled = true; // velocities and residual have been formed from the impulses
     bool all = false;    // the last round was over the whole field
@@ -430,6 +433,10 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
         if (!settled && work->residual <= problem->tolerance) {
             bt_rounds_residual(world, problem, BT_SETTLES, work);
             settled = true;
+        }
+        if (work->residual > problem->tolerance && spent(problem, work) >= proof) {
+            proof += proof - begun;
+            if (problem->refuted(world)) break;
         }
         if (spent(problem, work) < limit || bt_min(best, work->residual) <= FAR * problem->tolerance) continue;
         if (problem->plain || !problem->keep || more++ == MAX_MORE) continue;

@@ -111,6 +111,8 @@ typedef struct bt_problem {
     double cap;           ///< of the momentum at the start
     int length;           ///< sweeps of a round at the start
     double limit;         ///< of the work, in updates of every contact; plain: in sweeps
+    /// Is it proved that there is no solution? It ends the rounds. Collective, leaves all as it is; or NULL
+    bool (*refuted)(bt_world *world);
     bool plain;           ///< sweeps over all contacts, without momentum
 } bt_problem;
 

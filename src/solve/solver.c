@@ -41,34 +41,107 @@ bool bt_restitution_begin(bt_world *world)
     bt_phases_any_order(world, restore, NULL, &totals);
     bt_domain_maxima(world, &totals.most, 1);
     if (totals.most == 0) return false;
-    bt_islands_make(world, world->solver->islands, NULL);
+    bt_islands_make(world, world->solver->islands);
     return true;
 }
 
-bool bt_restitution_lower(bt_world *world)
+/// The energy that a contact has given beyond the error of the solution, J.
+static double gain(const bt_world *world, const bt_cell *cell, bt_idx j)
+{
+    const bt_contact *contact = &cell->contacts[j];
+    // work lost by sheets must not hide energy gained by rebounds
+    if (contact->ln[0] + contact->ln[1] == 0 || contact->n == 0) return 0;
+    return bt_contacts_gain(world, contact) - bt_contacts_unsolved_gain(contact, world->stats.residual);
+}
+
+static double rebounds(const bt_world *world, const bt_cell *cell, bt_idx j)
+{
+    (void)world;
+    return bt_rebounds(cell->contacts[j].bias);
+}
+
+static double is_unsolved(const bt_world *world, const bt_cell *cell, bt_idx j)
+{
+    const bt_contact *contact = &cell->contacts[j];
+    const bt_limit *limit = cell->laws->limits ? &cell->laws->limits[j] : NULL;
+    const bt_mass m = bt_mass_of(contact, world->bodies.inv);
+    double squares = 0;
+    return !(bt_contact_residual(contact, &m, limit, world->bodies.vel, world->par.tolerance, &squares) <=
+             world->par.tolerance);
+}
+
+/// Write the sum of a quantity of the contacts of each island to sum.
+static void add_up(bt_world *world, double (*of)(const bt_world *world, const bt_cell *cell, bt_idx j))
 {
     const bt_cells *ts = world->cells;
     bt_islands *islands = world->solver->islands;
     bt_islands_clear(world, islands);
     for (bt_idx i = 0; i < ts->n_order; i++) {
         const bt_cell *cell = &ts->cell[ts->order[i]];
-        for (bt_idx j = 0; j < cell->n_contacts; j++) {
-            const bt_contact *contact = &cell->contacts[j];
-            // work lost by sheets must not hide energy gained by rebounds
-            if (contact->ln[0] + contact->ln[1] == 0 || contact->n == 0) continue;
-            bt_sum_add(&islands->sum[bt_islands_of(world, islands, contact)],
-                       bt_contacts_gain(world, contact) - bt_contacts_unsolved_gain(contact, world->stats.residual));
-        }
+        for (bt_idx j = 0; j < cell->n_contacts; j++)
+            bt_sum_add(&islands->sum[bt_islands_of(world, islands, &cell->contacts[j])], of(world, cell, j));
     }
     bt_islands_add(world, islands);
+}
+
+/// Is the sum of an island more than 0, and has it any restitution left?
+static bool is_named(const bt_islands *islands, bt_idx root)
+{
+    return islands->share[root] > 0 && bt_sum_value(&islands->sum[root]) > 0;
+}
+
+static bool any_named(const bt_world *world)
+{
+    const bt_islands *islands = world->solver->islands;
     double any = 0;
-    for (bt_idx i = 0; i < world->bodies.n; i++) {
-        if (islands->root[i] != i || islands->share[i] == 0 || !(bt_sum_value(&islands->sum[i]) > 0)) continue;
-        islands->share[i] = islands->share[i] > 0.2 ? 0.5 * islands->share[i] : 0;
-        any = 1;
-    }
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (islands->root[i] == i && is_named(islands, i)) any = 1;
     bt_domain_maxima(world, &any, 1);
-    if (any == 0) return false;
+    return any > 0;
+}
+
+/// Name the islands that hold rebounds and are not solved. True if there are any.
+static bool name_unsolved(bt_world *world)
+{
+    const bt_islands *islands = world->solver->islands;
+    add_up(world, rebounds);
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (!is_named(islands, i)) islands->share[i] = 0;
+    add_up(world, is_unsolved);
+    return any_named(world);
+}
+
+static void drop_named_impulses(bt_world *world)
+{
+    const bt_cells *ts = world->cells;
+    bt_islands *islands = world->solver->islands;
+    for (bt_idx i = 0; i < ts->n_order; i++) {
+        bt_cell *cell = &ts->cell[ts->order[i]];
+        for (bt_idx j = 0; j < cell->n_contacts; j++) {
+            bt_contact *contact = &cell->contacts[j];
+            if (is_named(islands, bt_islands_of(world, islands, contact)))
+                contact->ln[0] = contact->ln[1] = contact->lt = 0;
+        }
+    }
+}
+
+bool bt_restitution_lower(bt_world *world)
+{
+    const bt_cells *ts = world->cells;
+    bt_solver *solver = world->solver;
+    bt_islands *islands = solver->islands;
+    bool unsolved = false;
+    if (!solver->refuted) {
+        add_up(world, gain);
+        unsolved = !any_named(world);
+        // plain sweeps are the reference, and what fields are shaken with, never to convergence
+        if (unsolved && (world->stats.converged || world->par.plain_sweeps || !name_unsolved(world))) return false;
+    }
+    if (solver->refuted || unsolved) drop_named_impulses(world);
+    solver->refuted = false;
+    for (bt_idx i = 0; i < world->bodies.n; i++)
+        if (is_named(islands, i))
+            islands->share[i] = islands->share[i] > 0.2 && !unsolved ? 0.5 * islands->share[i] : 0;
     for (bt_idx i = 0; i < ts->n_order; i++) {
         bt_cell *cell = &ts->cell[ts->order[i]];
         for (bt_idx j = 0; j < cell->n_contacts; j++) {
@@ -350,6 +423,12 @@ static void unpack_cell(bt_world *world, bt_idx k, const void *context, bt_total
     bt_batch_unpack(&world->cells->cell[k]);
 }
 
+/// Do rebounds lock bodies?
+static bool refuted(bt_world *world)
+{
+    return world->solver->refuted = bt_locked_by_rebounds(world, world->solver->islands);
+}
+
 static bt_problem contact_problem(const bt_world *world)
 {
     bt_problem problem = {
@@ -364,6 +443,7 @@ static bt_problem contact_problem(const bt_world *world)
         .length = 20,
         .limit = (double)world->par.max_sweeps * (world->par.plain_sweeps ? 1 : UPDATES),
         .plain = world->par.plain_sweeps,
+        .refuted = world->solver->rebounds && !world->par.plain_sweeps ? refuted : NULL,
     };
     bt_rounds_scale(&problem, world->cells);
     return problem;

@@ -36,7 +36,7 @@ static bt_world *row(double restitution)
         w->bodies.vel_start[i].x = w->bodies.vel_free[i].x = before[k];
         w->bodies.vel[i].x = after[k];
     }
-    w->stats.residual = 0;
+    w->stats.residual = 0, w->stats.converged = true;
     contact_of(w, 0, 1)->ln[0] = contact_of(w, 1, 2)->ln[0] = 1;
     return w;
 }
