@@ -268,7 +268,7 @@ def test_floes_that_split_have_trajectories(tmp_path):
         floes = [row for row in rows if row["name"].startswith("floe")]
         assert len(floes) == np.isfinite(pose[:, :, 0]).sum()
         for row in floes:
-            k, i = r.frame_at(float(row["time_s"])), int(row["name"].split()[1])
+            k, i = r.frame_at(float(row["time_s"])), r.ids.tolist().index(int(row["name"].split()[1]))
             assert (float(row["x_m"]), float(row["y_m"])) == tuple(pose[k, i, :2])
     assert [float(row["speed_m_s"]) for row in rows if row["name"] == "iceberg"][-1] == body
 

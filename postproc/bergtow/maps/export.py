@@ -168,7 +168,7 @@ def floes_layer(run, frames):
 
     fixed = {} if run.fixed is None else {"fixed": ("", run.fixed[index])}
     return Layer("floes", "Polygon", {
-        "id": ("", index), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
+        "id": ("", run.ids[index]), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
         "area_m2": ("m2", run.area[index]), "speed_m_s": ("m/s", of(run.speed)),
         "force_n": ("N, largest normal contact force in the step", of(run.contact_force))} | fixed, places)
 
@@ -230,12 +230,12 @@ class Trajectories:
         xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
         speed = np.stack([run.speed(f) for f in frames], axis=1)
         piece = _pieces(xy, np.array(run.period))
-        rows = []
+        ids, rows = run.ids, []
         for i in range(run.n_floes):
             for k in range(piece[i].max() + 1):
                 at = (piece[i] == k) & np.isfinite(xy[i]).all(axis=1)
                 if at.any():
-                    rows.append((f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
+                    rows.append((f"floe {ids[i]}" + f".{k}" * (k > 0), np.where(at[:, None], xy[i], np.nan),
                                  np.where(at, speed[i], np.nan), run.thickness[i]))
         for name, x, y in TRACKS:
             if x in run and np.isfinite(run[x]).any():

@@ -116,7 +116,8 @@ class Replay:
             "deflate": compress, "times": run.frame_times[frames].tolist(), "stored_frames": run.n_frames,
             "n": len(floes), "n_floes": run.n_floes, "geographic": run.geographic, "box": list(run.box),
             "period": list(run.period), "moving": run.case.get("domain.ends") == "moving", "quanta": self.quanta,
-            "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
+            "colouring": self._colourings(frames),
+            "ids": run.ids[floes].tolist() if len(floes) < run.n_floes or run.n_pieces else None,
             "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
             "style": {k.lower(): getattr(style, k)
                       for k in ("INK", "WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK", "RAFTED")

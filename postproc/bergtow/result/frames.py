@@ -85,6 +85,13 @@ class Frames:
         return {name: self._read(f"splits/{name}") for name in self._file.get("splits", ())}
 
     @property
+    def ids(self):
+        """[N] ids of the floes, as in /impacts/floe and frames.xdmf: rows of /floes, /bodies and /pieces, one after the
+        other. A piece is listed here before the bodies, so its index is less than its id."""
+        index = np.arange(self.n_floes)
+        return index + (index >= self.n_start) * len(self.bodies)
+
+    @property
     def generation(self):
         """[N] number of successive splits that made each floe: 0 for those that existed at the start."""
         made = np.zeros(self.n_floes, int)
