@@ -294,7 +294,8 @@ def test_a_number_stands_for_one_floe_in_all_files(split, tmp_path):
                 text = item.text.strip()
                 drawn[block.get("Name")] = (f[text.partition(":")[2]][()] if item.get("Format") == "HDF" else
                                             np.array(text.split(), int))
-        born = n + bodies + f["frames/piece"][f["frames/piece_end"][-2]:]  # test_a_collision_names_its_floe_or_its_piece
+        # as in test_a_collision_names_its_floe_or_its_piece
+        born = n + bodies + f["frames/piece"][f["frames/piece_end"][-2]:]
     assert drawn["pieces"].tolist() == born.tolist() and len(born) > 3 and bodies > 1
     every = np.concatenate(list(drawn.values()))
     assert len(set(every.tolist())) == len(every)

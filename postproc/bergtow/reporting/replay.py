@@ -209,13 +209,9 @@ class Replay:
             })
         return out
 
-    def _samples(self, frames):
-        """Index of the series sample at each frame; -1 before the first."""
-        return np.searchsorted(self.run["time"], self.run.frame_times[frames] * (1 + 1e-9), side="right") - 1
-
     def _unwrap(self, pose, frames):
         """Unwrap, in place, poses [T, 3] of the towed body to agree with the series body_x and body_y."""
-        run, sample = self.run, self._samples(frames)
+        run, sample = self.run, self.run.samples(frames)
         for axis, name in enumerate(("body_x", "body_y")):
             if run.period[axis] and name in run:
                 at = np.where(sample < 0, pose[:, axis], run[name][np.maximum(sample, 0)])
@@ -245,9 +241,8 @@ class Replay:
             kept = thinned(len(run["time"]), TRACK)
             out["track"] = {"time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
                             "y": run["body_y"][kept].round(5).tolist()}
-        if "window_x" in run and np.isfinite(run["window_x"]).any():
-            sample = self._samples(frames)
-            out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()
+        if (low := run.window_low(frames)) is not None:
+            out["window_low"] = low.tolist()
             out["follow"] = True
         return out
 

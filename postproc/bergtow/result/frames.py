@@ -167,6 +167,19 @@ class Frames:
     def n_frames(self):
         return len(self.frame_times)
 
+    def samples(self, frames):
+        """Index of the last sample of the series at or before each of some frames; -1 before the first."""
+        return np.searchsorted(self["time"], self.frame_times[frames] * (1 + 1e-9), side="right") - 1
+
+    def window_low(self, frames):
+        """Low end of the moving window along x at some frames, m; None without one. It follows the body in strides, so
+        its distance from the body holds only at the start, before the first sample."""
+        if "window_x" not in self or not np.isfinite(self["window_x"]).any():
+            return None
+        sample, half = self.samples(frames), self.period[0] / 2
+        ahead = (np.sign(self.headings[0, 0]) or 1.0) * (self.number("moving_window.ahead_m", half) - half)
+        return np.where(sample < 0, self.value("body.x", 0.0) + ahead - half, self["window_x"][np.maximum(sample, 0)])
+
     def need_frames(self):
         """Raises RunError if there are none."""
         if not self.n_frames:
