@@ -361,7 +361,8 @@ def test_ice_that_a_moving_window_moves_within_the_front_is_another_trajectory()
     1.3 m/s where the floe drifts with 0.2 m/s."""
     x, speed = np.array([[0.0, 4, 8, 34, 38], [0, 4, 13, 20, 20.5]]), np.array([[0.2] * 5, [0.2, 0.2, 0.5, 0.1, 0.0]])
     def pieces(low):
-        scene = SimpleNamespace(window_low=lambda frames: low, frame_times=20.0 * np.arange(5), area=np.array([400.0, 4]))
+        scene = SimpleNamespace(window_low=lambda frames: low, frame_times=20.0 * np.arange(5),
+                                area=np.array([400.0, 4]))
         reach = export._reach(scene, np.arange(5), speed)
         return export._pieces(np.stack([x, 0 * x], axis=2), np.array([100.0, 0]), reach).tolist()
     assert pieces(0.0) == [[0, 0, 0, 1, 1], [0] * 5] and pieces(None) == [[0] * 5] * 2
@@ -369,8 +370,8 @@ def test_ice_that_a_moving_window_moves_within_the_front_is_another_trajectory()
 
 @pytest.mark.parametrize("direction", [0, 180])
 def test_ice_lies_where_the_moving_window_is(tmp_path, direction):
-    """Between its ends, which follow the iceberg in strides. Red: ends at a fixed distance from the iceberg, so floes of
-    the wake ahead of it, and trajectories with steps that the floes' speeds do not allow."""
+    """Between its ends, which follow the iceberg in strides. Red: ends at a fixed distance from the iceberg, so floes
+    of the wake ahead of it, and trajectories with steps that the floes' speeds do not allow."""
     case = {"run": {"dt": 0.5, "duration": 120}, "domain": {"frame": "geographic", "length": 60, "width": 30,
             "ends": "moving", "sides": "periodic", "ahead": 33}, "ice": {"concentration": 0.7, "size": 3,
             "thickness": 0.3}, "body": {"shape": "disc", "length": 6, "draft": 2}, "water": {"current_y": 0.2},

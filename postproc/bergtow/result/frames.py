@@ -43,7 +43,7 @@ def lonlat_of(east_north, origin):
 
 
 class Frames:
-    """Frames of result.h5, using what Run reads from it: the file, its datasets, the domain and its period."""
+    """Frames of result.h5, using what Run reads from it: the file, its data, the case, the domain and its period."""
 
     # ---- floes and bodies
 
@@ -119,10 +119,25 @@ class Frames:
         own = self._read("floes/thickness", ndim=1)
         return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
 
+    @cached_property
+    def ice(self):
+        """[N] of bool: the floes at the start that a run counts as its ice in concentration, mean size and thickness of
+        summary.json (bt_setup_mean_floe): those generated or read; without any, those by hand that move. Quays, piers
+        and coasts are no ice."""
+        index = np.arange(self.n_floes)
+        made = index < self.n_start - self.n_by_hand
+        by_hand = (index < self.n_start) & ~made
+        return made if made.any() else by_hand if self.fixed is None else by_hand & ~self.fixed
+
     @property
     def mean_thickness(self):
-        """Mean thickness of the floes at the start, m, weighted with their areas like that of the estimates."""
-        return float(np.average(self.thickness[:self.n_start], weights=self.area[:self.n_start]))
+        """Mean thickness of the ice, m, weighted with area like that of the estimates; NaN without ice."""
+        return float(np.average(self.thickness[self.ice], weights=self.area[self.ice])) if self.ice.any() else np.nan
+
+    @property
+    def sizes(self):
+        """Diameters of circles with the areas of the floes that are the ice, m; their mean is mean_size_m."""
+        return np.sqrt(4 * self.area[self.ice] / np.pi)
 
     @cached_property
     def area(self):
