@@ -296,6 +296,28 @@ def test_fixed_floes_are_told_and_do_not_come_back_adrift(tmp_path):
     assert "fixed" not in json.loads((tmp_path / "old.geojson").read_text())["features"][0]["properties"]
 
 
+def test_rafted_floes_do_not_come_back_before_they_are_cut(tmp_path):
+    """The export and the refusal name the command that does it. Red: neither; "move or shrink one of them" of hundreds
+    of pairs."""
+    pressed = changed(BASIN, domain={"length": 15, "width": 8, "ends_closing": 0.15}, ice__concentration=0.75,
+                      ice__rafting={"kappa": 5}, run__duration=15)
+    for case, rafts in (pressed, True), (BASIN, False):
+        there = run(tmp_path, changed(case, body={"shape": "none"}, tow={"mode": "none"}), name=str(rafts)).dir
+        done = call("export", there, "-o", tmp_path / f"{rafts}.geojson")
+        assert done.returncode == DONE and ("bergtow outlines" in done.stdout) == rafts
+    cut = call("outlines", tmp_path / "True.geojson", "-o", tmp_path / "cut.geojson", "--centre", "0,0")
+    assert cut.returncode == DONE
+    codes = {}
+    for name in "True", "cut":
+        case = changed(BASIN, ice={"outlines": f"{name}.geojson", "nonconvex": "split"}, body={"shape": "none"},
+                       domain={"length": 30, "width": 20, "ends": "open", "sides": "open"}, tow={"mode": "none"})
+        (tmp_path / "case.yml").write_text(json.dumps(case))
+        done = call("check", tmp_path / "case.yml")
+        codes[name] = done.returncode
+        assert ("bergtow outlines" in done.stderr) == (name == "True"), done.stderr
+    assert codes == {"True": REFUSED, "cut": DONE}
+
+
 @pytest.mark.parametrize("mode, name", [("line", "towing end"), ("thrust", "vessel")])
 def test_the_towing_end_is_that_of_the_frames(tmp_path, mode, name):
     """However few samples there are, and none of it between them once the line has parted. Red: interpolated, metres

@@ -497,6 +497,10 @@ def perform(a):
                 raise RunError(run.result, f"has no {a.layer or 'floes'}", "choose another --layer")
             _write(layers, place, path, kind, a.force)
             say(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
+            rafted = layers[0].name == "floes" and run.number("max_rafted_area_m2", 0.0) > 0
+            if rafted and kind in (".geojson", ".json"):
+                say("floes: where ice rafted they lie over each other; ice.outlines refuses such floes, and bergtow "
+                    "outlines cuts them")
             if any(layer.name in FRAMED for layer in layers):
                 at = run.frame_times[frames]
                 say(f"frame: t = {times_text(at[0])}" if len(at) == 1 else
