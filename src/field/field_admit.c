@@ -96,6 +96,7 @@ typedef struct place {
     bt_parts **parts;      ///< [n] of floes that are not convex; NULL otherwise
     double allowed;        ///< overlap left to the position projection, m
     const char *noun;
+    bool map;              ///< of ice.outlines
     bt_refusals *r;
     int64_t overlapping;   ///< pairs that overlap by more than that
     double deepest;        ///< their deepest overlap, m
@@ -144,8 +145,9 @@ static void visit(void *context, bt_idx i, bt_idx j, double dx, double dy)
     if (!(deepest > where->allowed)) return;
     where->overlapping++;
     where->deepest = bt_max(where->deepest, deepest);
-    bt_refuse(where->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s",
+    bt_refuse(where->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s%s",
               where->noun, (int)(i < j ? i : j), where->noun, (int)(i < j ? j : i), deepest, where->allowed,
+              where->map ? ", or let bergtow outlines cut the file, as floes that raft" : "",
               where->f->outlines.hulled ? ", or set ice.nonconvex: split if only their hulls overlap" : "");
 }
 
@@ -227,7 +229,7 @@ static void check_places(const bt_case *input, const bt_field *field, const char
                          bt_refusals *refusals)
 {
     double *outline = bt_field_outlines(field);
-    place where = {.f = field, .outline = outline, .noun = noun, .r = refusals};
+    place where = {.f = field, .outline = outline, .noun = noun, .map = input->ice.outlines, .r = refusals};
     bt_region region;
     for (bt_idx i = 0; i < field->n; i++) check_bounds(input, &where, i);
     begin_places(&where, &region, input, field);

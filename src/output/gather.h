@@ -24,6 +24,14 @@ static inline bt_gid bt_roster_row(const bt_roster *roster, bt_gid gid)
     return gid < roster->n_free ? gid : gid < roster->n_free + roster->n_kept ? -1 : gid - roster->n_kept;
 }
 
+/// Id of a body in the files, one for each: its row in /floes, /bodies and /pieces, one after the other. Ids of pieces
+/// in the world lie between those of the others. n_bodies: floes and bodies at the start.
+static inline bt_gid bt_roster_id(const bt_roster *roster, bt_gid n_bodies, bt_gid gid)
+{
+    const bt_gid row = bt_roster_row(roster, gid);
+    return row >= 0 ? row : n_bodies + gid - roster->n_free;
+}
+
 /// Release the contents of a roster.
 void bt_roster_free(bt_roster *roster);
 

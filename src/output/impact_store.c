@@ -106,11 +106,9 @@ void bt_impact_store_pieces(bt_impact_store *store, const bt_roster *roster, int
     store->n_bodies = n_bodies;
 }
 
-/// Row of a body in /floes, /bodies and /pieces, one after the other. Ids of pieces lie between those of the others.
-static double row_of(const bt_impact_store *store, double gid)
+static double id_of(const bt_impact_store *store, double gid)
 {
-    const bt_gid row = store->roster ? bt_roster_row(store->roster, (bt_gid)gid) : (bt_gid)gid;
-    return (double)(row >= 0 ? row : store->n_bodies + (bt_gid)gid - store->roster->n_free);
+    return store->roster ? (double)bt_roster_id(store->roster, store->n_bodies, (bt_gid)gid) : gid;
 }
 
 static void write_rows(bt_impact_store *store)
@@ -137,7 +135,7 @@ static void take_closed(bt_impact_store *store)
     }
     memcpy(store->rows + store->n_rows, store->from->closed, (size_t)n * sizeof *store->rows);
     for (int64_t i = store->n_rows; i < store->n_rows + n; i++)
-        store->rows[i].gid = row_of(store, store->rows[i].gid);
+        store->rows[i].gid = id_of(store, store->rows[i].gid);
     store->n_rows += n;
     if (store->n_rows >= CHUNK) write_rows(store);
 }

@@ -54,9 +54,10 @@ static hid_t grow(bt_h5 *h5, const char *name, hid_t type, hsize_t width)
 }
 
 void bt_piece_store_create(bt_piece_store *store, bt_h5 *h5, const bt_splitting *splitting, const bt_roster *roster,
-                           double dt, const bt_map_axes *axes)
+                           int64_t n_bodies, double dt, const bt_map_axes *axes)
 {
-    *store = (bt_piece_store){.h = h5, .s = splitting, .roster = roster, .dt = dt, .axes = *axes};
+    *store = (bt_piece_store){
+        .h = h5, .s = splitting, .roster = roster, .n_bodies = n_bodies, .dt = dt, .axes = *axes};
     bt_h5_group(h5, "/splits");
     bt_h5_group(h5, "/pieces");
     for (int k = 0; k < BT_SPLIT_COLUMNS; k++) {
@@ -154,7 +155,8 @@ static void write_paraview(const bt_piece_store *store, const bt_piece_row *rows
             bt_map_axes_value(&store->axes, bt_frame_numbers(&rows[i], part), part.n, value + width * i);
         bt_h5_write(store->h, NAMED(pieces[k].drawn), H5T_NATIVE_FLOAT, cells, width > 1 ? width : 0, value);
     }
-    for (size_t i = 0; i < cells; i++) id[i] = (int32_t)(store->roster->n_floes + (int64_t)rows[i].piece);
+    for (size_t i = 0; i < cells; i++)
+        id[i] = (int32_t)bt_roster_id(store->roster, store->n_bodies, store->s->first + (bt_gid)rows[i].piece);
     bt_h5_write(store->h, NAMED("_id"), H5T_NATIVE_INT32, cells, 0, id);
 #undef NAMED
     BT_FREE(topology, id, points, value);

@@ -25,6 +25,7 @@ typedef struct bt_piece_store {
     bt_h5 *h;                       ///< NULL: floes do not split
     const struct bt_splitting *s;
     const bt_roster *roster;
+    int64_t n_bodies;               ///< floes and bodies at the start
     double dt;
     bt_map_axes axes;
     hid_t split[BT_SPLIT_COLUMNS], area, offsets, vertices, end, piece[BT_PIECE_COLUMNS];
@@ -36,7 +37,7 @@ typedef struct bt_piece_store {
 
 /// Set up the store, on rank 0 before the first frame. All arguments must stay valid.
 void bt_piece_store_create(bt_piece_store *store, bt_h5 *h5, const struct bt_splitting *splitting,
-                           const bt_roster *roster, double dt, const bt_map_axes *axes);
+                           const bt_roster *roster, int64_t n_bodies, double dt, const bt_map_axes *axes);
 /// Write the splits since the last call.
 void bt_piece_store_write(bt_piece_store *store);
 /// Write the pieces [n] of a frame, in the order of their ids; the frame is already in /xdmf.

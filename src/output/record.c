@@ -187,8 +187,10 @@ bt_status bt_record_watch_splitting(bt_record *record, const struct bt_splitting
 {
     if (record->comm->rank != 0) return BT_OK;
     record->h5.err = err;
-    bt_piece_store_create(&record->pieces, &record->h5, splitting, roster, record->c->run.dt, &record->frames.axes);
-    bt_impact_store_pieces(&record->impacts, roster, record->frames.n_floes + record->frames.n_others);
+    const int64_t n_bodies = record->frames.n_floes + record->frames.n_others;
+    bt_piece_store_create(&record->pieces, &record->h5, splitting, roster, n_bodies, record->c->run.dt,
+                          &record->frames.axes);
+    bt_impact_store_pieces(&record->impacts, roster, n_bodies);
     return record->h5.status;
 }
 

@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: MIT
 """What the design report says beside its numbers: limits of operation, the check by hand, evidence, sources."""
+import json
 import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from harness import ROOT, TOW, changed, run
+from harness import ROOT, TOW, call, changed, run, write_case
 
+from bergtow.plot import style
 from bergtow.reporting import document
 from bergtow.reporting import ensemble as report_ensemble
 from bergtow.reporting import run as report_run
 from bergtow.result import origins
+from bergtow.result.members import Members
 from bergtow.result.run import Run
+from bergtow.stats import design_value
 
 UNKNOWN = SimpleNamespace(bollard_pull=np.nan)
 
@@ -29,12 +33,11 @@ def value(key, text, kind="given", origin=""):
 CONDITIONS = {"conditions": [condition("50 %", value=4e5, interval_95=(3e5, 5e5), largest=3.9e5),
                              condition("70 %", value=7e5, interval_95=(6e5, 9e5), largest=6e5),
                              condition("90 %", largest=2e6)]}
-VALUES = [value("ice.concentration", "varied, 50 to 90 %"), value("air.wind_x", "-10 m/s"),
-          value("air.wind_y", "0 m/s")]
+MET = {"concentration of the ice": "varied, 50 to 90 %", "wind": "air wind x -10 m/s"}
 
 
 def rows(cases, answer=None):
-    text, table = document.operation(CONDITIONS, cases, VALUES, answer)
+    text, table = document.operation(CONDITIONS, cases, MET, answer)
     return " ".join(text["lines"]), {row[0]: row[1:] for row in table["rows"]}
 
 
@@ -51,7 +54,7 @@ def test_without_a_vessel_no_limit_is_made_up():
     assert "No vessel is named" in rule and found["concentration of the ice"][0] == "varied, 50 to 90 %"
     assert found.pop("concentration of the ice")[1] == "no vessel to hold it against"
     assert {limit for _, limit in found.values()} == {"not looked for"}
-    assert found["wind"][0] == "-10 m/s and 0 m/s"
+    assert found["wind"][0] == "air wind x -10 m/s"
     assert found["thickness of the ice"][0] == "–"
 
 
@@ -82,7 +85,7 @@ def test_limits_of_what_was_varied():
     the concentration alone."""
     some = {"conditions": [condition(name, largest=n) | {"values": {"ice.thickness": h, "air.wind_x": w}}
                            for name, n, h, w in (("thin", 3e5, 0.8, -10.0), ("thick", 9e5, 1.6, -10.0))]}
-    _, table = document.operation(some, [(None, SimpleNamespace(bollard_pull=8e5))], VALUES, None)
+    _, table = document.operation(some, [(None, SimpleNamespace(bollard_pull=8e5))], MET, None)
     found = {row[0]: row[2] for row in table["rows"]}
     said = found["thickness of the ice"]
     assert said.startswith("the largest simulated, a lower bound, within 800 kN") and said.endswith(": thick")
@@ -97,7 +100,7 @@ def test_a_speed_that_was_varied_was_looked_at():
     some = {"conditions": [condition(name, largest=n) | {"values": {"tow.speed": v}}
                            for name, n, v in (("slow", 3e5, 0.4), ("fast", 9e5, 0.6))]}
     for pull, said in ((8e5, ": slow; above"), (np.nan, "no vessel to hold it against")):
-        _, table = document.operation(some, [(None, SimpleNamespace(bollard_pull=pull))], VALUES, None)
+        _, table = document.operation(some, [(None, SimpleNamespace(bollard_pull=pull))], MET, None)
         assert said in next(row[2] for row in table["rows"] if row[0] == "speed of the tow")
 
 
@@ -119,6 +122,57 @@ def test_the_check_by_hand_is_that_of_the_numbers_it_names(tmp_path):
     n = [float(row[2].split()[0]) for row in found]
     assert n[0] + n[1] == pytest.approx(n[2], rel=0.01)
     assert [row[0] for row in blocks[-1]["rows"]] == [e["label"] for e in estimates]
+
+
+def test_what_was_simulated_differs_between_conditions_and_is_varied():
+    some = [{"label": k, "values": {}, "units": {}} for k in "ab"]
+    cases = [SimpleNamespace(texts={"ice.concentration": "0.5", "ice.thickness": h, "air.wind_x": "0 m/s",
+                                    "air.wind_y": w, "water.tide.major": "0.5 m/s", "water.current_x": "0 m/s"})
+             for h, w in (("0.80000000001 m", "0 m/s"), ("1 m", "-3 m/s"))]
+    said = document.simulated(list(zip(some, cases)), {"ice.concentration": "varied, 50 to 90 %", "ice.size": "varied"})
+    assert said == {"concentration of the ice": "varied, 50 to 90 %", "thickness of the ice": "0.8 m (a); 1 m (b)",
+                    "size of the floes": "", "speed of the tow": "", "wind": "no wind (a); air wind y -3 m/s (b)",
+                    "current": "water tide major 0.5 m/s", "draft of the berg": ""}
+    assert set(document.simulated([], {}).values()) == {""}
+
+
+def test_limits_are_those_of_what_was_simulated(tmp_path):
+    """Of ice from a map, a wind from a table and a tide, beside a quay: as "Holds for" has them, and not the keys that
+    had no effect. Red: 80 % ice of 3 m, no wind and no current, and a thickness with the quay in it."""
+    assert call("field", write_case(tmp_path, changed(TOW, ice__concentration=0.3)), "-o",
+                tmp_path / "made.geojson").returncode == 0
+    (tmp_path / "wind.csv").write_text("t,u,v\n0,-12,0\n4,-16,0\n")
+    quay = {"shape": "rectangle", "length": 12, "width": 0.5, "x": 8, "y": 3.7, "thickness": 2, "fixed": True}
+    case = changed(TOW, output=None, run__duration=4, output__window_start=1, ice={"outlines": "made.geojson"},
+                   air__wind_table="wind.csv", water__tide__major=0.05, domain__sides="open", floes=[quay])
+    drawn = json.loads((tmp_path / "made.geojson").read_text())
+    for feature in drawn["features"]:
+        feature["properties"] = {"thickness": 0.05}
+    drawn["features"] = [f for f in drawn["features"] if max(p[1] for p in f["geometry"]["coordinates"][0]) < 3]
+    (tmp_path / "made.geojson").write_text(json.dumps(drawn))
+    write_case(tmp_path, case, "base.yml")
+    left = {"ice.concentration": 0.8, "ice.size": 40, "ice.thickness": 3}  # no effect
+    study = {"base": "base.yml", "set": left, "parameters": {"body.draft": [0.4]}, "repeats": 1}
+    done = call("ensemble", write_case(tmp_path, study, "study.yml"), "-o", tmp_path / "out", "--jobs", 1)
+    assert done.returncode == 0, done.stderr
+    found = report_ensemble.context(tmp_path / "out")
+    table = {row[0]: row[1] for row in found["operation"][1]["rows"]}
+    member = next((tmp_path / "out/members").iterdir())
+    with Run(member) as r:
+        n, share, size = r.summary["n_floes"] - 1, r.summary["concentration"], r.summary["mean_size_m"]
+        assert r.summary["estimates"]["thickness_m"] == pytest.approx(0.05) and n > 50
+        assert style.conditions(r).startswith(f"{100 * share:.0f} % ice, {n} floes, 0.05 m thick")
+        rows = {v.key: v.value for v in origins.of_field(r)}
+    assert (rows["floes"], rows["floe thickness"]) == (str(n), "0.05 m")
+    assert rows["floe size"].startswith(f"{size:.3g} m") and "12" not in rows["floe size"]
+    assert table == {"concentration of the ice": f"{share:.3g}", "thickness of the ice": "0.05 m",
+                     "size of the floes": f"{size:.3g} m", "speed of the tow": "0.13 m/s",
+                     "wind": "air wind table wind.csv (12.1 to 15.9 m/s)", "current": "water tide major 0.05 m/s",
+                     "draft of the berg": "0.4 m"}
+    members = Members(tmp_path / "out")
+    holds = design_value._holds_for(members, design_value.case_of(members, np.array([0])))
+    for words in (f"floes of {size:.3g} m", "0.05 m thick", table["wind"], table["current"]):
+        assert words in holds
 
 
 @pytest.mark.parametrize("wind_y, current", [(0, 0), (15, 0), (0, 0.3)])

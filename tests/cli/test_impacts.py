@@ -283,14 +283,14 @@ def test_the_first_touch_of_a_corner_is_met(tmp_path, slop):
 
 
 def test_a_wall_that_is_struck_is_no_floe():
-    """Rows from the number of floes on are those of bodies, then of pieces."""
+    """Rows from the number of floes on are those of bodies, then of pieces, which are floes with these ids."""
     def said(struck):
         largest = dict.fromkeys(("peak_n", "mean_n", "duration_s", "impulse_ns", "approach_m_s", "time_s"), 1.0)
         impacts = {"collisions": 3, "collisions_whole_run": 3, "conversion": "", "largest": largest | {"floe": struck}}
         run = SimpleNamespace(summary={"impacts": impacts}, number=lambda key: 1.0, n_start=7,
                               bodies=[SimpleNamespace(name="berg"), SimpleNamespace(name="wall_y1")])
         return dict(report_run.impacts(run)["rows"])["largest peak"]
-    assert ", floe 6 at" in said(6) and ", wall_y1 at" in said(8) and ", piece 3 at" in said(12)
+    assert ", floe 6 at" in said(6) and ", wall_y1 at" in said(8) and ", floe 12 at" in said(12)
 
 
 def test_none_tells_nothing_and_changes_nothing(line, tmp_path):

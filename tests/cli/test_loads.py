@@ -551,7 +551,7 @@ def test_what_moves_water_and_air_and_a_lead_stand_in_what_a_value_holds_for():
         return statement_module._holds_for(argparse.Namespace(parameters=dict.fromkeys(varied)), case)
     still = {"water__current_x": "0 m/s", "air__wind_x": "0 m/s", "air__wind_table": "none", "lead__mode": "none"}
     assert said(**still) == "no current, no wind"
-    moved = still | {"water__current_x": "-0.5 m/s", "air__wind_table": "/home/me/wind.csv",
+    moved = still | {"water__current_x": "-0.5 m/s", "air__wind_table": "wind.csv",
                      "water__tide__major": "1 m/s"}
     assert said(**moved) == "water current x -0.5 m/s, water tide major 1 m/s, air wind table wind.csv"
     assert said(["water.current_x", "air.wind_x"], **moved) == "water tide major 1 m/s, air wind table wind.csv"

@@ -136,6 +136,7 @@ def test_floes_in_each_other(tmp_path, way, xs, pairs, deepest):
     }[way]
     named = {1: (0, 1), 2: (1, 2)}  # the deepest; of 15 alike it may be any
     assert pairs not in named or name % named[pairs] in ran.stderr, ran.stderr
+    assert ("bergtow outlines" in ran.stderr) == (way == "GeoJSON")
     if pairs > 1 or way == "by hand":
         assert re.search(rf"{pairs} pairs? of \S+ .*overlap,? by (up to )?{deepest} m", ran.stderr), ran.stderr
 

@@ -350,11 +350,18 @@ def test_the_head_tells_the_speed_ordered_from_the_one_made_good(tmp_path):
 
 def test_the_head_tells_the_thickness_of_the_floes(tmp_path):
     """The mean is that of the estimates, weighted with area. Red: ice.thickness, also where the floes have another; the
-    plain mean, 0.375 m, beside the other on one page; 1 floes."""
-    with Run(make_run(tmp_path / "run")) as run:
-        assert ", 2 floes, 0.432 m thick, " in style.conditions(run)
-        run.n_pieces = 1
-        assert ", 1 floe, 0.5 m thick, " in style.conditions(run)
+    plain mean, 0.375 m, beside the other on one page; 1 floes. The second of the two is by hand, and ice only without
+    the first, or if nothing is fixed."""
+    def said(**known):
+        with Run(make_run(tmp_path / "run")) as run:
+            assert run.n_floes == len(run.area) == len(run.thickness) == 2  # all are read before a piece is made up
+            run.__dict__.update(known)
+            return style.conditions(run)
+    assert ", 2 floes, 0.432 m thick, " in said(n_by_hand=0) and ", 1 floe, 0.5 m thick, " in said()
+    assert ", 1 floe, 0.5 m thick, " in said(n_by_hand=0, n_pieces=1)
+    for fixed, words in (None, ", 2 floes, 0.432 m thick, "), ([False, True], ", 1 floe, 0.5 m thick, "):
+        assert words in said(n_by_hand=2, fixed=fixed if fixed is None else np.array(fixed))
+    assert "floe" not in said(n_by_hand=2, fixed=np.array([True, True]))
 
 
 def test_times_of_a_run_are_those_of_the_console():

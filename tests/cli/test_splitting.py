@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Floes that split in whole runs: known answers of the law, what a split keeps, what is counted, and what files say."""
+import xml.etree.ElementTree as ElementTree
+
 import h5py
 import numpy as np
 import pytest
@@ -275,6 +277,36 @@ def test_a_collision_names_its_floe_or_its_piece(split):
     gone = np.full(len(born), np.inf)
     gone[made["parent"] + bodies * (made["parent"] >= n)] = born[n + bodies::2]
     assert (struck >= n + bodies).any() and (born[struck] <= t + 1e-9).all() and (t <= gone[struck] + 1e-9).all()
+
+
+def test_a_number_stands_for_one_floe_in_all_files(split, tmp_path):
+    """The id of a piece is that of /impacts/floe, in frames.xdmf, an export, its trajectories, and the replay. Red: the
+    first piece with the id of the towed body."""
+    from bergtow.maps import export
+    from bergtow.reporting.replay import Replay
+    from bergtow.result.run import Run
+    step = ElementTree.parse(split.dir / "frames.xdmf").getroot().findall("Domain/Grid/Grid")[-1]
+    with h5py.File(split.dir / "result.h5") as f:
+        n, bodies = len(f["floes/area"]), len(f["bodies/names"])
+        drawn = {}
+        for block in step.findall("Grid"):
+            for item in block.findall("Attribute[@Name='id']/DataItem"):
+                text = item.text.strip()
+                drawn[block.get("Name")] = (f[text.partition(":")[2]][()] if item.get("Format") == "HDF" else
+                                            np.array(text.split(), int))
+        # as in test_a_collision_names_its_floe_or_its_piece
+        born = n + bodies + f["frames/piece"][f["frames/piece_end"][-2]:]
+    assert drawn["pieces"].tolist() == born.tolist() and len(born) > 3 and bodies > 1
+    every = np.concatenate(list(drawn.values()))
+    assert len(set(every.tolist())) == len(every)
+    with Run(split.dir) as folder:
+        last = folder.n_frames - 1
+        floes = export.floes_layer(folder, [last]).columns["id"][1]
+        assert set(drawn["pieces"]) <= set(floes.tolist()) <= set(every.tolist()) - set(drawn["bodies"].tolist())
+        names = export.Trajectories.of(folder, [last]).name
+        assert [name for name in names if name.startswith("floe")] == [f"floe {i}" for i in floes]
+        own = [*range(n), *range(n + bodies, len(folder.ids) + bodies)]
+        assert Replay(folder).head["ids"] == folder.ids.tolist() == own
 
 
 def test_force_chains_go_through_pieces(split):

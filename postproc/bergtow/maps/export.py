@@ -134,13 +134,12 @@ def _led(run, frame, names):
 
 
 def _about(run, frame):
-    """Centre of the ice exported from a periodic domain: with a moving window, the middle of the window, whose end lies
-    a fixed distance ahead of the iceberg; otherwise the iceberg. None without an iceberg."""
+    """Centre of the ice exported from a periodic domain: along a moving window its middle, otherwise the iceberg. None
+    without an iceberg."""
     if run.towed is None:
         return None
-    ahead = run.number("moving_window.ahead_m", run.period[0] / 2)
-    sign = np.sign(run.headings[0, 0]) or 1.0
-    return _iceberg(run, frame) + np.array([sign * (ahead - run.period[0] / 2), 0.0])
+    at, low = _iceberg(run, frame), run.window_low(frame)
+    return at if low is None else np.array([low + run.period[0] / 2, at[1]])
 
 
 def floes_layer(run, frames):
@@ -156,7 +155,7 @@ def floes_layer(run, frames):
 
     fixed = {} if run.fixed is None else {"fixed": ("", run.fixed[index])}
     return Layer("floes", "Polygon", {
-        "id": ("", index), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
+        "id": ("", run.ids[index]), "time_s": ("s", run.frame_times[at]), "thickness": ("m", run.thickness[index]),
         "area_m2": ("m2", run.area[index]), "speed_m_s": ("m/s", of(run.speed)),
         "force_n": ("N, largest normal contact force in the step", of(run.contact_force))} | fixed, places)
 
@@ -206,13 +205,13 @@ def trajectories(run, frames):
     """Raises RunError."""
     xy = np.stack([run.wrap(run.pose(f)[:, :2], _about(run, f)) for f in frames], axis=1)
     speed = np.stack([run.speed(f) for f in frames], axis=1)
-    piece = _pieces(xy, np.array(run.period))
-    rows = []
+    piece = _pieces(xy, np.array(run.period), _reach(run, frames, speed))
+    ids, rows = run.ids, []
     for i in range(run.n_floes):
         for k in range(piece[i].max() + 1):
             at = (piece[i] == k) & np.isfinite(xy[i]).all(axis=1)
             if at.any():
-                rows.append((f"floe {i}" if k == 0 else f"floe {i}.{k}", np.where(at[:, None], xy[i], np.nan),
+                rows.append((f"floe {ids[i]}" + f".{k}" * (k > 0), np.where(at[:, None], xy[i], np.nan),
                              np.where(at, speed[i], np.nan), run.thickness[i]))
     for name, x, y in TRACKS:
         if x in run and np.isfinite(run[x]).any():
@@ -226,10 +225,21 @@ def trajectories(run, frames):
     return Trajectories(list(names), run.frame_times[frames], *map(np.array, columns))
 
 
-def _pieces(xy, period):
+def _reach(run, frames, speed):
+    """[n, T - 1] m, how far a floe can be from one frame to the next without being put elsewhere by the moving window.
+    A floe that waits for its place lies, by periodicity, among the ice at the front, from where it is put there: a
+    step of less than half a period, and of more than twice its speed allows. The twentieth of a floe is for a start
+    and a stop between two frames."""
+    if run.window_low(frames) is None:
+        return np.inf
+    return 2 * np.fmax(speed[:, 1:], speed[:, :-1]) * np.diff(run.frame_times[frames]) + np.sqrt(run.area)[:, None] / 20
+
+
+def _pieces(xy, period, reach=np.inf):
     """[n, T] index of the piece of ice that a floe represents at each time: in a periodic domain a floe left behind
-    reappears one period ahead as other ice."""
-    jumps = (np.abs(np.diff(xy, axis=1)) > np.where(period > 0, period / 2, np.inf)).any(axis=2)
+    reappears one period ahead as other ice. reach: of _reach()."""
+    step = np.diff(xy, axis=1)
+    jumps = (np.abs(step) > np.where(period > 0, period / 2, np.inf)).any(axis=2) | (np.hypot(*step.T).T > reach)
     return np.concatenate([np.zeros((len(xy), 1), int), np.cumsum(jumps, axis=1)], axis=1)
 
 
@@ -459,6 +469,10 @@ def perform(a):
                 raise RunError(run.result, f"has no {a.layer or 'floes'}", "choose another --layer")
             _write(layers, place, path, kind, a.force)
             say(f"{path}: {', '.join(f'{layer.name} {len(layer.places)}' for layer in layers)}")
+            rafted = layers[0].name == "floes" and run.number("max_rafted_area_m2", 0.0) > 0
+            if rafted and kind in (".geojson", ".json"):
+                say("floes: where ice rafted they lie over each other; ice.outlines refuses such floes, and bergtow "
+                    "outlines cuts them")
             if any(layer.name in FRAMED for layer in layers):
                 at = run.frame_times[frames]
                 say(f"frame: t = {times_text(at[0])}" if len(at) == 1 else

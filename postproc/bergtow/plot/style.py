@@ -109,9 +109,8 @@ def conditions(run):
     concentration = run.number("concentration", run.value("ice.concentration"))
     if run.n_floes and np.isfinite(concentration):
         words.append(f"{100 * concentration:.0f} % ice")
-    if run.n_floes:
-        words += [f"{run.n_start} floe{'s' if run.n_start > 1 else ''}",
-                  f"{run.mean_thickness:.3g} m thick"]
+    if n := int(run.ice.sum()):
+        words += [f"{n} floe{'s' if n > 1 else ''}", f"{run.mean_thickness:.3g} m thick"]
     mode, speed, made = run.case.get("tow.mode", ""), run.value("tow.speed"), run.speed_made_good
     if run.towed is not None and mode != "none" and np.isfinite(speed):
         words.append(f"towed{TOWED_BY.get(mode, '')}, {speed:.3g} m/s ordered" +

@@ -3,8 +3,8 @@
 hand calculation, the validation evidence, sources, symbols, standards. Blocks are those of reporting/ensemble.py."""
 import numpy as np
 
-from bergtow.result.origins import short as in_short
 from bergtow.result.run import within
+from bergtow.stats.design_value import STILL, in_words, moves, named
 from bergtow.table import number, quantity
 from bergtow.text import loads as loads_text
 
@@ -32,10 +32,10 @@ STANDARDS = ("No rule of a standard or of a class society is applied, and none w
              "35106, not DNV-ST-N001. Every number is a load without a safety factor, unless the answer names one; "
              "the user named that factor and any efficiencies of the vessel. Whoever approves the tow chooses the "
              "standard, factors and weather window.")
-#: keys that limit an operation, with their names; the first known one describes what was simulated
+#: keys that limit an operation, with their names
 LIMITING = (("concentration of the ice", ("ice.concentration", )), ("thickness of the ice", ("ice.thickness", )),
             ("size of the floes", ("ice.size", )), ("speed of the tow", ("tow.speed", )),
-            ("wind", ("air.wind_x", "air.wind_y")), ("current", ("water.current_x", "water.current_y")),
+            ("wind", STILL["no wind"]), ("current", STILL["no current"]),
             ("draft of the berg", ("body.draft", )))
 
 
@@ -87,12 +87,24 @@ def at_speeds(answer):
     return f"can the vessel named hold the steady tow? {some}" if some else ""
 
 
-def operation(s, cases, values, answer):
-    text = {v.key: in_short(v.value) for v in values}
+def simulated(cases, varied):
+    """{limit: what was simulated, in words}, from the cases that also say where a design value holds. varied: {key:
+    range} of what a study varies."""
+    still = {keys: words for words, keys in STILL.items()}
+    def said(case, keys):
+        there = [(k, varied.get(k) or in_words(case, k)) for k in keys if k in case.texts]
+        if keys in still:
+            return " and ".join(named(k, text) for k, text in there if k in varied or moves(case, k)) or still[keys]
+        return " and ".join(text for _, text in there)
+    return {name: "; ".join(loads_text.qualified(loads_text.shared([(c, said(case, keys)) for c, case in cases])))
+            for name, keys in LIMITING}
+
+
+def operation(s, cases, met, answer):
+    """Blocks of the operational limits. met: of simulated()."""
     (pull, what), rows = pull_of(cases, answer), []
     head_sea = next((c for c in (answer or {}).get("load_cases", []) if c["id"] == "case.head_sea"), None)
     for name, keys in LIMITING:
-        said = " and ".join(text[k] for k in keys if k in text) or "–"
         looked_at = keys[0] == "ice.concentration" or any(
             len({c["values"].get(k) for c in s["conditions"]}) > 1 for k in keys)
         limit = "no vessel to hold it against" if looked_at and not np.isfinite(pull) else "not looked for"
@@ -104,7 +116,7 @@ def operation(s, cases, values, answer):
             air, water = (number(head_sea["values"][k]) for k in ("wind_m_s", "current_m_s"))
             limit = (f"at {air} m/s with {water} m/s of current from ahead the tow needs "
                      f"{quantity(head_sea['n'], 'N')}")
-        rows.append([name, said, limit])
+        rows.append([name, met.get(name) or "–", limit])
     rule = ("Nothing is known outside the simulated conditions. Where ice is denser, thicker or of larger floes, wind "
             "or current stronger, or the tow faster than in this table, the tow stops, or the load is computed anew.")
     if not np.isfinite(pull):

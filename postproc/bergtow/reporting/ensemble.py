@@ -316,15 +316,21 @@ def first_runs(e, s):
     return [(c, *first) for c, first in found if first]
 
 
-def varied(e, runs):
-    """Values of all conditions, from first_runs(): for a parameter its range; for anything else that differs between
-    conditions, each value and each origin with its conditions."""
-    words = {"ice.seed": "varied", "run.title": "that of the study, with condition and field"}
+def parameters(e):
+    """{key: "varied, 50 to 90 %"} of what a study varies."""
+    out = {}
     for key, some in e.parameters.items():
         if len(set(some.tolist())) > 1:
             factor, unit = reading(key, e.units[key])
-            words[key] = "varied" if some.dtype == object else \
+            out[key] = "varied" if some.dtype == object else \
                 f"varied, {factor * np.nanmin(some):.4g} to {factor * np.nanmax(some):.4g} {unit}".strip()
+    return out
+
+
+def varied(e, runs):
+    """Values of all conditions, from first_runs(): for a parameter its range; for anything else that differs between
+    conditions, each value and each origin with its conditions."""
+    words = {"ice.seed": "varied", "run.title": "that of the study, with condition and field"} | parameters(e)
     def together(some, text):
         return "; ".join(loads_text.qualified(loads_text.shared([(c, text(v)) for (c, *_), v in zip(runs, some)])))
     def of_all(some):
@@ -407,7 +413,8 @@ def context(folder, place=None, given=None, also=()):
         "marked": report_case.marked(block),
         "sentence": scrubbed(sentence), "remarks": [scrubbed(text) for text in remarks],
         "answer": answer(e, s, cases, results, told), "tables": tables,
-        "operation": document.operation(s, cases, values, told), "check": checked, "evidence": document.evidence(),
+        "operation": document.operation(s, cases, document.simulated(cases, parameters(e)), told), "check": checked,
+        "evidence": document.evidence(),
         "sources": document.sources(values, estimates),
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned],

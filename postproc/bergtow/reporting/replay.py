@@ -113,7 +113,8 @@ class Replay:
             "deflate": compress, "times": run.frame_times[frames].tolist(), "stored_frames": run.n_frames,
             "n": len(floes), "n_floes": run.n_floes, "geographic": run.geographic, "box": list(run.box),
             "period": list(run.period), "moving": run.case.get("domain.ends") == "moving", "quanta": self.quanta,
-            "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
+            "colouring": self._colourings(frames),
+            "ids": run.ids[floes].tolist() if len(floes) < run.n_floes or run.n_pieces else None,
             "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
             "style": {k.lower(): getattr(style, k) for k in ("INK", "WATER", "WALL", "FIXED", "BODY", "BODY_EDGE",
                                                              "TRACK", "RAFTED")},
@@ -196,13 +197,9 @@ class Replay:
                         "above": c.extend == "max", "table": table.tolist()})
         return out
 
-    def _samples(self, frames):
-        """Index of the series sample at each frame; -1 before the first."""
-        return np.searchsorted(self.run["time"], self.run.frame_times[frames] * (1 + 1e-9), side="right") - 1
-
     def _unwrap(self, pose, frames):
         """Unwrap, in place, poses [T, 3] of the towed body to agree with the series body_x and body_y."""
-        run, sample = self.run, self._samples(frames)
+        run, sample = self.run, self.run.samples(frames)
         for axis, name in enumerate(("body_x", "body_y")):
             if run.period[axis] and name in run:
                 at = np.where(sample < 0, pose[:, axis], run[name][np.maximum(sample, 0)])
@@ -232,9 +229,8 @@ class Replay:
             kept = thinned(len(run["time"]), TRACK)
             out["track"] = {name: run[series][kept].round(digits).tolist() for name, series, digits in (
                 ("time", "time", 6), ("x", "body_x", 5), ("y", "body_y", 5))}
-        if "window_x" in run and np.isfinite(run["window_x"]).any():
-            sample = self._samples(frames)
-            out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()
+        if (low := run.window_low(frames)) is not None:
+            out["window_low"] = low.tolist()
             out["follow"] = True
         return out
 

@@ -200,8 +200,7 @@ def impacts(run):
     big = i.get("largest")
     if isinstance(big, dict):
         body = int(big["floe"]) - run.n_start
-        struck = f"floe {big['floe']}" if body < 0 else \
-            run.bodies[body].name if body < len(run.bodies) else f"piece {body - len(run.bodies)}"
+        struck = run.bodies[body].name if 0 <= body < len(run.bodies) else f"floe {big['floe']}"
         rows.append(("largest peak", f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over "
                      f"{style.short(big['duration_s'])} s, impulse {style.short(big['impulse_ns'])} N s, approach "
                      f"{style.short(big['approach_m_s'])} m/s), {struck} at {style.times_text(big['time_s'])}" +

@@ -43,7 +43,7 @@ def lonlat_of(east_north, origin):
 
 
 class Frames:
-    """Frames of result.h5, using what Run reads from it: the file, its datasets, the domain and its period."""
+    """Frames of result.h5, using what Run reads from it: the file, its data, the case, the domain and its period."""
 
     # ---- floes and bodies
 
@@ -85,6 +85,13 @@ class Frames:
         return {name: self._read(f"splits/{name}") for name in self._file.get("splits", ())}
 
     @property
+    def ids(self):
+        """[N] ids of the floes, as in /impacts/floe and frames.xdmf: rows of /floes, /bodies and /pieces, one after the
+        other. A piece is listed here before the bodies, so its index is less than its id."""
+        index = np.arange(self.n_floes)
+        return index + (index >= self.n_start) * len(self.bodies)
+
+    @property
     def generation(self):
         """[N] number of successive splits that made each floe: 0 for those that existed at the start."""
         made = np.zeros(self.n_floes, int)
@@ -112,10 +119,25 @@ class Frames:
         own = self._read("floes/thickness", ndim=1)
         return np.concatenate([own, np.repeat(self.splits["thickness"], 2)]) if self.n_pieces else own
 
+    @cached_property
+    def ice(self):
+        """[N] of bool: the floes at the start that a run counts as its ice in concentration, mean size and thickness of
+        summary.json (bt_setup_mean_floe): those generated or read; without any, those by hand that move. Quays, piers
+        and coasts are no ice."""
+        index = np.arange(self.n_floes)
+        made = index < self.n_start - self.n_by_hand
+        by_hand = (index < self.n_start) & ~made
+        return made if made.any() else by_hand if self.fixed is None else by_hand & ~self.fixed
+
     @property
     def mean_thickness(self):
-        """Mean thickness of the floes at the start, m, weighted with their areas like that of the estimates."""
-        return float(np.average(self.thickness[:self.n_start], weights=self.area[:self.n_start]))
+        """Mean thickness of the ice, m, weighted with area like that of the estimates; NaN without ice."""
+        return float(np.average(self.thickness[self.ice], weights=self.area[self.ice])) if self.ice.any() else np.nan
+
+    @property
+    def sizes(self):
+        """Diameters of circles with the areas of the floes that are the ice, m; their mean is mean_size_m."""
+        return np.sqrt(4 * self.area[self.ice] / np.pi)
 
     @cached_property
     def area(self):
@@ -159,6 +181,19 @@ class Frames:
     @property
     def n_frames(self):
         return len(self.frame_times)
+
+    def samples(self, frames):
+        """Index of the last sample of the series at or before each of some frames; -1 before the first."""
+        return np.searchsorted(self["time"], self.frame_times[frames] * (1 + 1e-9), side="right") - 1
+
+    def window_low(self, frames):
+        """Low end of the moving window along x at some frames, m; None without one. It follows the body in strides, so
+        its distance from the body holds only at the start, before the first sample."""
+        if "window_x" not in self or not np.isfinite(self["window_x"]).any():
+            return None
+        sample, half = self.samples(frames), self.period[0] / 2
+        ahead = (np.sign(self.headings[0, 0]) or 1.0) * (self.number("moving_window.ahead_m", half) - half)
+        return np.where(sample < 0, self.value("body.x", 0.0) + ahead - half, self["window_x"][np.maximum(sample, 0)])
 
     def need_frames(self):
         """Raises RunError if there are none."""

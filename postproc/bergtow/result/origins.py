@@ -156,13 +156,13 @@ def spread(values, unit, mean):
 def of_field(run):
     """[Value] of the actual ice, if it was read from a file: the keys for generated ice do not describe it."""
     ice = source_of_ice(run.case)
-    if ice is None or not run.n_floes:
+    if ice is None or not run.ice.any():
         return []
-    said, size = f"counted in the ice that {ice} read", np.sqrt(4 * run.area[:run.n_start] / np.pi)
-    rows = (("floes", str(run.n_start), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
+    said, size = f"counted in the ice that {ice} read", run.sizes
+    rows = (("floes", str(len(size)), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
                                   "area fraction of ice in the ice region at the start, before a lead"),
             ("floe size", spread(size, "m", np.mean(size)), "diameter of the circle of a floe's area: mean and range"),
-            ("floe thickness", spread(run.thickness[:run.n_start], "m", run.mean_thickness),
+            ("floe thickness", spread(run.thickness[run.ice], "m", run.mean_thickness),
              "mean weighted with area, and range"))
     return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
 

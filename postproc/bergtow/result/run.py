@@ -399,6 +399,12 @@ class Run(Frames):
         """{"section.key": text} of the resolved case: every key, numbers with their units."""
         return parse_case(self.resolved_text)
 
+    @cached_property
+    def n_by_hand(self):
+        """Number of floes given by hand, which are the last of those at the start."""
+        found = yaml.load(self.resolved_text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader)) or {}
+        return len(found.get("floes") or ())
+
     def value(self, key, default=np.nan):
         """Number of a case key in SI units and radians; default if it is missing or not a number."""
         return case_value(self.case, key, default)

@@ -10,12 +10,13 @@ included in any number) with a load above the value, fields that are not alike. 
 the body back.
 """
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from bergtow import _library
 from bergtow.result.members import short_key
-from bergtow.result.origins import source_of_ice
+from bergtow.result.origins import not_used, source_of_ice
 from bergtow.result.origins import short as in_short
 from bergtow.result.run import case_value
 from bergtow.stats import loads
@@ -58,7 +59,7 @@ class Case:
     breaking_loads: dict   #: {series of a branch's tension: N}, of the branches that can part
     bollard_pull: float    #: N, NaN without a vessel
     ramp: float            #: s, over which the tow is accelerated to its speed
-    texts: dict            #: {key: value as written}
+    texts: dict            #: {key: text}, of simulated()
 
     @property
     def breaking_load(self):
@@ -80,10 +81,27 @@ def _breaking_loads(run, mode):
 
 def ice_as_read(run):
     """{key: actual value} for a run whose ice is read from a file, since the keys do not describe that ice."""
-    if source_of_ice(run.case) is None or not run.n_floes:
+    if source_of_ice(run.case) is None or not run.ice.any():
         return {}
-    size = np.sqrt(4 * run.area[:run.n_start] / np.pi).mean()
-    return {"ice.size": f"{size:.3g} m", "ice.thickness": f"{run.mean_thickness:.3g} m"}
+    return {"ice.concentration": f"{run.number('concentration'):.3g}", "ice.size": f"{run.sizes.mean():.3g} m",
+            "ice.thickness": f"{run.mean_thickness:.3g} m"}
+
+
+def tables_as_read(run):
+    """{key: name of the table, with the range of speeds in the run}, of wind and current that are read from tables."""
+    out = {}
+    for key, name in (("air.wind_table", "wind"), ("water.current_table", "current")):
+        if run.case.get(key, "none") != "none":
+            file, speed = Path(run.case[key]).name, np.hypot(*(run[f"{name}_{a}"] for a in "xy"))
+            out[key] = f"{file} ({speed.min():.3g} to {speed.max():.3g} m/s)" if len(speed) else file
+    return out
+
+
+def simulated(run):
+    """{key: text} of what a run simulated: the keys of its case that had an effect, and for those of files what was
+    read there. The keys that a file replaces can have any value."""
+    unused = not_used(run, run.case)
+    return {k: text for k, text in run.case.items() if k not in unused} | ice_as_read(run) | tables_as_read(run)
 
 
 def case_of(e, rows):
@@ -93,7 +111,7 @@ def case_of(e, rows):
         mode, pull = run.case.get("tow.mode", ""), run.value("tow.vessel.bollard_pull", 0.0)
         return Case(not any(x > 0 for x in limits), unbounded(e, rows), mode, _breaking_loads(run, mode),
                     pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0),
-                    run.case | ice_as_read(run))
+                    simulated(run))
     return next(e.each(rows, of), None)
 
 
@@ -353,17 +371,27 @@ def statement(e, rows, c):
         "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)}
 
 
+def in_words(case, key):
+    """The value of a key of a Case; a table is in words already, with its name, which may contain numbers."""
+    return case.texts[key] if key.endswith("_table") else in_short(case.texts[key])
+
+
+def moves(case, key):
+    """Is a key of current or wind set?"""
+    return case.texts.get(key, "none").split(" ")[0] not in ("0", "none")
+
+
+def named(key, words):
+    return f"{short_key(key).replace('.', ' ')} {words}"
+
+
 def _moved(e, case):
     """Current and wind in words: "no current", or the values of the case, unless the study varies them. They must be
     stated, because a current changes the speed of the tow through the water."""
     for words, keys in STILL.items():
-        there = [key for key in keys if case.texts.get(key, "none").split(" ")[0] not in ("0", "none")]
-        if there:
-            for key in (key for key in there if key not in e.parameters):
-                text = case.texts[key]
-                yield f"{short_key(key).replace('.', ' ')} " + (
-                    text.rpartition("/")[2] if key.endswith("table") else in_short(text))
-        elif not any(key in e.parameters for key in keys):
+        there = [key for key in keys if moves(case, key)]
+        yield from (named(key, in_words(case, key)) for key in there if key not in e.parameters)
+        if not there and not any(key in e.parameters for key in keys):
             yield words
 
 
@@ -384,7 +412,7 @@ def _holds_for(e, case):
     """"floes of 30 m, 1 m thick, ...": the keys that the study does not vary, with the values of the case."""
     if case is None:
         return ""
-    said = [(in_short(case.texts[key]), before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
+    said = [(in_words(case, key), before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
             for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters
             and (key != "body.length" or case.texts.get("body.shape") != "polygon")]
     return ", ".join([" ".join(part for part in (before, value, behind.strip()) if part)
