@@ -400,7 +400,7 @@ def test_ice_lies_where_the_moving_window_is(tmp_path, direction):
             "tow": {"mode": "speed", "speed": 1, "direction": f"{direction} deg"}, "output": {"frame_interval": 5}}
     with Run(run(tmp_path, case).dir) as r:
         frames = np.arange(r.n_frames)
-        t, low = export.Trajectories.of(r, frames), np.append(
+        t, low = export.trajectories(r, frames), np.append(
             -33 if direction else -27, r["window_x"][np.searchsorted(r["time"], r.frame_times[1:] * (1 - 1e-9))])
         np.testing.assert_allclose(r.window_low(frames), low, atol=1e-9)
         np.testing.assert_allclose(replay.Replay(r).head["window_low"], low, atol=1e-9)

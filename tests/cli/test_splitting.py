@@ -303,7 +303,7 @@ def test_a_number_stands_for_one_floe_in_all_files(split, tmp_path):
         last = folder.n_frames - 1
         floes = export.floes_layer(folder, [last]).columns["id"][1]
         assert set(drawn["pieces"]) <= set(floes.tolist()) <= set(every.tolist()) - set(drawn["bodies"].tolist())
-        names = export.Trajectories.of(folder, [last]).name
+        names = export.trajectories(folder, [last]).name
         assert [name for name in names if name.startswith("floe")] == [f"floe {i}" for i in floes]
         own = [*range(n), *range(n + bodies, len(folder.ids) + bodies)]
         assert Replay(folder).head["ids"] == folder.ids.tolist() == own
