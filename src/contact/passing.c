@@ -20,13 +20,19 @@ static bt_moving moving_part(const bt_bodies *bodies, bt_idx i, int part, const 
     return (bt_moving){bodies->mark[first].count, bodies->outline + 2 * first, v->x, v->y, v->w};
 }
 
-/// Is the pair of the same bodies as the contact, or of another piece of the same shore?
+/// Is body i, or its shore, a of the contact (0) or b (1)? −1: neither.
+static int side_of(const bt_world *world, const bt_contact *contact, bt_idx i)
+{
+    const bt_gid *gid = world->bodies.gid, outline = bt_shore_outline(world->shore, gid[i]);
+    return outline == bt_shore_outline(world->shore, gid[contact->a])   ? 0
+           : outline == bt_shore_outline(world->shore, gid[contact->b]) ? 1 : -1;
+}
+
+/// Is the pair of the same bodies as the contact, or of another piece of the same shore? That piece may be the other
+/// one of its pair.
 static bool of_same_outlines(const bt_world *world, const bt_pair *pair, const bt_contact *contact)
 {
-    const bt_gid *gid = world->bodies.gid;
-    const bt_shore *shore = world->shore;
-    return bt_shore_outline(shore, gid[pair->a]) == bt_shore_outline(shore, gid[contact->a]) &&
-           bt_shore_outline(shore, gid[pair->b]) == bt_shore_outline(shore, gid[contact->b]);
+    return side_of(world, contact, pair->a) + side_of(world, contact, pair->b) == 1;
 }
 
 /// Would the bodies of the contact meet at these velocities? All their parts and pieces nearby count: where several
@@ -35,17 +41,19 @@ static bool meets(const bt_world *world, const bt_cell *cell, const bt_contact *
                   const bt_vel *vb)
 {
     const bt_bodies *bodies = &world->bodies;
+    const bt_vel *const v[] = {va, vb};
     const bt_pair *pairs = cell->search.pairs;
     bt_idx first = contact->pair, end = contact->pair + 1; // the list is in the order of gids
     if (bt_shore_holds(world, contact->a) || bt_shore_holds(world, contact->b)) first = 0, end = cell->search.n_pairs;
     while (first > 0 && of_same_outlines(world, &pairs[first - 1], contact)) first--;
     while (end < cell->search.n_pairs && of_same_outlines(world, &pairs[end], contact)) end++;
     for (bt_idx i = first; i < end; i++) {
-        if (!of_same_outlines(world, &pairs[i], contact)) continue;
+        const bt_pair *pair = &pairs[i];
+        if (!of_same_outlines(world, pair, contact)) continue;
         double d[2];
-        bt_bodies_offset(world, pairs[i].a, pairs[i].b, d);
-        const bt_moving p = moving_part(bodies, pairs[i].a, pairs[i].part[0], va),
-                        q = moving_part(bodies, pairs[i].b, pairs[i].part[1], vb);
+        bt_bodies_offset(world, pair->a, pair->b, d);
+        const bt_moving p = moving_part(bodies, pair->a, pair->part[0], v[side_of(world, contact, pair->a)]),
+                        q = moving_part(bodies, pair->b, pair->part[1], v[side_of(world, contact, pair->b)]);
         if (bt_sweep_meets(&p, &q, d[0], d[1], world->par.slop, world->par.dt)) return true;
     }
     return false;

@@ -51,8 +51,8 @@
 // Restitution that never adds energy (private to the solver).
 //
 // Newton's law can add energy when several contacts of a body rebound at once, or slip (Kane & Levinson 1985). Movable
-// bodies that touch form an island; if the contacts of an island do positive work, the step is solved again with the
-// restitution of that island halved, repeatedly, and finally with none, when the work is never positive.
+// bodies joined by contacts, loaded or not, form an island; if its contacts do positive work, the step is solved again
+// with the restitution of that island halved, repeatedly, and finally with none, when the work is never positive.
 //
 // A rebound may also go farther within the step than there is room behind the body. The rows of the rebound,
 // J U2 ≥ e × approach, and of the body behind, J U2 ≥ −gap/Δt, then contradict each other, and the sweeps raise the
@@ -91,7 +91,7 @@ typedef struct bt_solver {
     bool rebounds;               ///< some contact of this step has a restitution
     bool refuted;                ///< rebounds lock the bodies of the islands whose sums are not 0
     bool extends;                ///< the present solution of this step may still hold with the added contacts
-    struct bt_islands *islands;  ///< bodies that touch (solve/islands.h)
+    struct bt_islands *islands;  ///< of all contacts (solve/islands.h)
 } bt_solver;
 
 bt_solver *bt_solver_create(void);

@@ -406,6 +406,33 @@ TEST(a_pier_passed_on_the_way_to_another_bears_nothing)
     bt_world_free(w);
 }
 
+/// A floe comes down on the second of two pieces of a quay, whatever their order: its id is below, between or above.
+TEST(a_quay_is_one_outline_in_any_order)
+{
+    for (int place = 0; place < 3; place++) {
+        bt_params p = scene_params(0.5, 1);
+        bt_world *w = bt_world_create(&p);
+        bt_gid gid = -1;
+        for (int i = 0; i < 3; i++) {
+            if (i == place) {
+                double v[] = {0, -0.5, 0.4, 0.5, -0.4, 0.5};
+                bt_body_def d = scene_prism(3, v, 900);
+                d.x = 14.9, d.y = 5 + 2.3 / 3, d.vx = 1, d.vy = -0.3;
+                gid = bt_world_add(w, &d);
+                continue;
+            }
+            double v[] = {-5, -1, 5, -1, 5, 1, -5, 1};
+            const int piece = i > place ? i - 1 : i;
+            bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = v,
+                                           .x = 10 + 10 * piece, .y = 4});
+        }
+        bt_shore_create(w);
+        bt_world_step(w);
+        CHECK_CLOSE(w->bodies.pose[bt_world_index(w, gid)].y, 5 + 2.0 / 3, 1e-9);
+        bt_world_free(w);
+    }
+}
+
 /// Two turning bodies hit and, two floe lengths apart, pass in the next step. Impulses of the hit say nothing about it.
 TEST(a_pair_that_has_hit_passes_like_any_other)
 {
