@@ -44,13 +44,14 @@
 // gets some more without momentum, since momentum that does not converge circles far from the solution. If the residual
 // is still FAR above the tolerance, the iteration restarts with half of the work, at most twice.
 //
-// Momentum may also be unstable. With friction a sweep turns the unknowns as well as shrinking them (complex eigenvalues),
-// and β near 1 then makes them grow, by a factor of ten every 20 sweeps, before the cap is low enough: 8 kJ of 430 floes
-// and pieces became 10¹³ J where plain sweeps converge. The restart does not see it, as growing steps point along the
-// move, and sweeps without momentum do not come back from there within their work. So if the residual at the limit is
-// LOST, and larger than without any impulses, the problem begins once more, without impulses or momentum. Not sooner:
-// some iterations grow a thousandfold and converge nevertheless. Bodies that prescribed walls lock have a large residual,
-// too, but none larger than without impulses; their loads stay, since the proof of islands.h needs them.
+// Momentum may also be unstable. With friction a sweep turns the unknowns as well as shrinking them (complex
+// eigenvalues), and β near 1 then makes them grow, by a factor of ten every 20 sweeps, before the cap is low enough: 8
+// kJ of 430 floes and pieces became 10¹³ J where plain sweeps converge. The restart does not see it, as growing steps
+// point along the move, and sweeps without momentum do not come back from there within their work. So if the residual
+// at the limit is LOST, and larger than without any impulses, the problem begins once more, without impulses or
+// momentum. Not sooner: some iterations grow a thousandfold and converge nevertheless. Bodies that prescribed walls
+// lock have a large residual, too, but none larger than without impulses; their loads stay, since the proof of
+// islands.h needs them.
 //
 // A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the
 // unknowns of the best residual pass are kept, from half of the work on, and are the result.
