@@ -55,6 +55,8 @@ typedef struct bt_field {
     double ice_area;       ///< m², area to which concentration refers: ice region less the body's footprint
     double concentration;  ///< Σ area / ice_area as made; for outlines without floes outside the ice region
     double strip;          ///< width of the strip at the cut where floes were scaled (ice.extent), m; 0 = not cut
+    int64_t drawn;         ///< floes drawn from the size law, for the whole ice.extent; 0 = unknown
+    int64_t unplaced;      ///< of these, those that found no place among larger ones, and are not in the field
     char frame[16];        ///< domain.frame of the case for which a field file was made; "" if unknown
     bt_outline_counts outlines; ///< of a field that was read
     bt_idx cap;            ///< capacity in floes
@@ -121,12 +123,15 @@ typedef struct bt_field_sizes {
     bt_idx n;     ///< floes
     double mean;  ///< m; NaN without floes
     double least; ///< m; infinite without floes
-    bt_idx below; ///< floes of generated ice smaller than ice.size_min
+    bt_idx below; ///< floes as drawn that are smaller than ice.size_min
+    int64_t drawn, unplaced; ///< as in the field
 } bt_field_sizes;
-/// Sizes of the floes of the case's field. Pieces of a lead are not counted in `below`.
+/// Sizes of the floes of the case's field. Parts of floes, in a lead, at a cut of ice.extent or beside a body, are not
+/// counted in `below`.
 bt_field_sizes bt_field_sizes_of(const bt_case *input, const bt_field *field);
 
-/// Add warnings about generated ice: a mean diameter other than that of the size law, floes below its limit.
+/// Add warnings about generated ice: floes without a place, a mean diameter other than that of the size law, floes
+/// below its limit.
 void bt_field_size_warn(const bt_case *input, const bt_field_sizes *sizes, bt_errors *warnings);
 
 /// Mean equivalent diameter of the floes, m; NaN without floes.

@@ -120,6 +120,20 @@ static void warn_of_track(const bt_case *input, const bt_field *field, const bt_
     bt_setup_track_free(&track);
 }
 
+#define DENSE_POLYGONS 0.8 // concentration up to which regular polygons packed, with 3 to 32 sides
+
+/// Warn of ice that a run may refuse once it has tried to make it.
+static void warn_of_making(const bt_case *input, bt_errors *warnings)
+{
+    if (!bt_case_makes_ice(input)) return;
+    bt_case_warn_large(input, warnings);
+    if (input->ice.shape == BT_ICE_POLYGONS && input->ice.concentration > DENSE_POLYGONS)
+        bt_warn(warnings, BT_WARN_DENSE_POLYGONS,
+                "ice.shape: regular polygons may not pack to a concentration of %g, and the run is then refused only "
+                "after it has tried; lower ice.concentration to about %g, or choose another ice.shape",
+                input->ice.concentration, DENSE_POLYGONS);
+}
+
 void bt_check_warn(const bt_case *input, const bt_field *field, const bt_check_ice *ice, bt_errors *warnings)
 {
     warn_of_track(input, field, ice, warnings);
@@ -136,6 +150,7 @@ void bt_check_warn(const bt_case *input, const bt_field *field, const bt_check_i
     free(digests);
     bt_case_warn_body(input, warnings);
     bt_outline_warn(&field->outlines, input, warnings);
+    warn_of_making(input, warnings);
     const double area = field->n > 0 ? bt_field_floe_area(field) : bt_case_made_area(input);
     bt_ice_warn_closed(input, area + bt_case_area_by_hand(input), warnings);
     if (ice->count < 1) return;

@@ -4,6 +4,7 @@
 #include "bergtow/field.h"
 #include "app/cmd.h"
 #include "base/checksum.h"
+#include "case/case_check.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
 
@@ -115,6 +116,7 @@ int bt_cmd_field(int argc, char **argv)
                    "only\n", field.strip);
         bt_outline_warn(&field.outlines, &input, &warnings);
         bt_field_size_warn(&input, &sizes, &warnings);
+        bt_case_warn_large(&input, &warnings);
     }
     for (size_t i = 0; i < warnings.n; i++) printf("  warning: %s\n", warnings.text[i]);
     bt_errors_free(&warnings);

@@ -480,6 +480,25 @@ bt_status bt_case_check(bt_case *input, bt_origin *from, bt_errors *err)
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
 
+// Corners of squares reach 1.25 times as far as circles of their area, broken ice about as far. The two largest of the
+// few floes that a period then holds are on average 1.5 standard deviations above the mean. Of 16 fields each, at a
+// spread of 0.2, a period of 100 m refused 1 at 30 m, 13 at 35 m, and all at 40 m; this warns from 31 m on.
+#define REACH 1.25
+#define LARGEST 1.5
+
+void bt_case_warn_large(const bt_case *input, bt_errors *warnings)
+{
+    const double period = bt_case_period(input), size = input->ice.size;
+    // the limits of a power law are known, and refused
+    if (!bt_case_makes_ice(input) || input->ice.size_law == BT_SIZE_POWER ||
+        REACH * (1 + LARGEST * input->ice.size_spread) * size < period / 2)
+        return;
+    bt_warn(warnings, BT_WARN_LARGE_FLOES,
+            "ice.size: of floes of %g m the largest may have no room to turn side by side in the period of %g m, and "
+            "the run is then refused; use smaller floes or a larger domain",
+            size, period);
+}
+
 void bt_case_warn_body(const bt_case *input, bt_errors *warnings)
 {
     double v[2 * BT_MAX_VERTICES];

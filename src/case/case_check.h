@@ -53,6 +53,10 @@ void bt_case_lead_follow(bt_case *input, int n, const double *v);
 /// Warn of an implausible mass, draft or stability of the body, and of implausibly long collisions.
 void bt_case_warn_body(const bt_case *input, bt_errors *warnings);
 
+/// Warn of floes too large for the period of the domain, in which two must have room to turn side by side: whether a
+/// run is refused depends on the floes made.
+void bt_case_warn_large(const bt_case *input, bt_errors *warnings);
+
 /// Warn of rows of the tables of current and wind less than a step apart: a step does not see what lies between.
 void bt_case_warn_tables(const bt_case *input, bt_errors *warnings);
 

@@ -247,6 +247,19 @@ bt_case bt_case_of_extent(const bt_case *input)
     return of;
 }
 
+bool bt_case_cuts_ice(const bt_case *input)
+{
+    const bt_case of = bt_case_of_extent(input);
+    return of.ice.x_min < input->ice.x_min || of.ice.x_max > input->ice.x_max || of.ice.y_min < input->ice.y_min ||
+           of.ice.y_max > input->ice.y_max;
+}
+
+double bt_case_period(const bt_case *input)
+{
+    return bt_min(bt_bound_wraps(input->domain.ends) ? input->domain.length : INFINITY,
+                  bt_bound_wraps(input->domain.sides) ? input->domain.width : INFINITY);
+}
+
 double bt_case_floes_made(const bt_case *input)
 {
     const bt_case of = bt_case_of_extent(input);

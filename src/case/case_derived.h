@@ -77,6 +77,12 @@ double bt_case_expected_floes(const bt_case *input);
 /// images included, if the ice region fills its domain there, and are walls otherwise. Owns no memory.
 bt_case bt_case_of_extent(const bt_case *input);
 
+/// Is the ice cut from a larger extent?
+bool bt_case_cuts_ice(const bt_case *input);
+
+/// The shorter period of the domain, m; INFINITY without one.
+double bt_case_period(const bt_case *input);
+
 /// Number of floes that are made, those beyond the ice region included.
 double bt_case_floes_made(const bt_case *input);
 

@@ -305,8 +305,7 @@ static limit *list_limits(const bt_case *input, int *n)
     // a region without room, or sizes in the wrong order, are refused for that alone
     const double room = bt_min(input->ice.x_max - input->ice.x_min, input->ice.y_max - input->ice.y_min);
     const bool roomy = made && room > 0 && ordered;
-    const double period = bt_min(bt_bound_wraps(input->domain.ends) ? input->domain.length : INFINITY,
-                                 bt_bound_wraps(input->domain.sides) ? input->domain.width : INFINITY);
+    const double period = bt_case_period(input);
     const double largest = power ? size_max : input->ice.size;
     const bool lon = !isnan(input->ice.origin_lon), lat = !isnan(input->ice.origin_lat),
                east = !isnan(input->ice.origin_east), north = !isnan(input->ice.origin_north);

@@ -60,10 +60,10 @@ double bt_cost_making(const bt_case *input, double floes)
     if (!bt_case_makes_ice(input)) return 0;
     const double x = input->ice.concentration;
     const double loose = bt_min(1, bt_max(0, (0.9 - x) / 0.3)); // 1 up to 60 %, 0 from 90 % on
-    const double shape = input->ice.shape == BT_ICE_RECTANGLES ? 0.75
-                         : input->ice.shape == BT_ICE_POLYGONS ? bt_min(2.2, bt_max(0.8, 7 * x - 0.6))
-                                                               : 1;
-    return 1e-3 * shape * (0.09 + 0.02 * input->ice.shake * (0.4 + 0.6 * loose)) * floes;
+    const double shape = input->ice.shape == BT_ICE_RECTANGLES ? 0.75 : 1;
+    // Regular polygons grow between shakes: the longer, the nearer they come to what fits, and longest if they give up.
+    const double growth = input->ice.shape == BT_ICE_POLYGONS ? 0.2 + 0.1 / (0.9 - bt_min(x, 0.89)) : 0;
+    return 1e-3 * (shape * (0.09 + 0.02 * input->ice.shake * (0.4 + 0.6 * loose)) + growth) * floes;
 }
 
 double bt_cost_stepping(const bt_case *input, const bt_cost_ice *ice)

@@ -100,7 +100,10 @@
     ROW(LOW_REFERENCE_SPEED, "low_reference_speed", "reference_m_s ice_m_s",                                           \
         "the reference speed is below that of the ice")                                                                \
     ROW(ICE_OVERTAKES, "ice_overtakes", "distance_m", "ice will overtake the body in a moving window")                 \
+    ROW(LARGE_FLOES, "large_floes", "size_m period_m", "the largest floes may not turn side by side in a period")      \
+    ROW(DENSE_POLYGONS, "dense_polygons", "concentration most", "regular polygons may not pack so densely")            \
     /* the ice */                                                                                                      \
+    ROW(UNPLACED, "unplaced", "floes of_floes share_percent", "floes drawn from the size law found no place")          \
     ROW(MEAN_SIZE, "mean_size", "floes size_m share_percent", "the mean size of the floes is not the requested one")   \
     ROW(SPREAD, "spread", "- spread asked", "floe sizes spread less than requested")                                   \
     ROW(SMALL_FLOES, "small_floes", "small floes share_percent least_m", "some floes are smaller than requested")      \

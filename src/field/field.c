@@ -72,6 +72,14 @@ void bt_field_free(bt_field *field)
     *field = (bt_field){0};
 }
 
+bt_field bt_field_like(const bt_field *field)
+{
+    bt_field like = bt_field_numbers(field);
+    like.n = like.cap = 0, like.cap_vertices = 0;
+    like.offsets = bt_alloc(1, sizeof *like.offsets); // offsets[0] = 0
+    return like;
+}
+
 static void reserve(bt_field *field, int64_t floes, int64_t n_vertices)
 {
     if (floes > field->cap) {
@@ -195,13 +203,10 @@ void bt_field_sort(bt_field *f, const bt_region *region)
         order[i] = (key){spread_bits(a) | spread_bits(b) << 1, i};
     }
     qsort(order, (size_t)f->n, sizeof *order, by_code);
-    bt_field g;
-    bt_field_init(&g);
+    bt_field g = bt_field_like(f);
     reserve(&g, f->n, f->offsets[f->n]);
     // Copy floes unchanged: bt_field_add would centre them again and change last digits.
     for (bt_idx k = 0; k < f->n; k++) bt_field_append(&g, f, order[k].i);
-    g.ice_area = f->ice_area;
-    g.concentration = f->concentration;
     free(order);
     bt_field_free(f);
     *f = g;

@@ -174,23 +174,21 @@ bt_status bt_field_cut(const bt_case *input, const bt_region *whole, const bt_re
     const int over_x = axes[0].period > 0, over_y = axes[1].period > 0;
     double *outline = bt_field_outlines(field);
     bool *parted = NULL;
-    bt_field part;
-    bt_field_init(&part);
+    bt_field part = bt_field_like(field);
     for (bt_idx i = 0; i < field->n; i++)
         for (int ix = -over_x; ix <= over_x; ix++)
             for (int iy = -over_y; iy <= over_y; iy++)
                 add_part(region, axes, field, outline, i, ix * axes[0].period, iy * axes[1].period, &part, &parted);
     free(outline);
     const double wanted = input->ice.concentration * region->ice_area,
-                 area = part.n > 0 ? scale_strip(region, axes, parted, size, wanted, &part) : 0, strip = part.strip;
+                 area = part.n > 0 ? scale_strip(region, axes, parted, size, wanted, &part) : 0;
     free(parted);
     bt_field_free(field);
     *field = part;
     bt_field_sort(field, region);
-    field->strip = strip;
     if (fabs(area - wanted) <= TOLERANCE * wanted) return BT_OK;
     return bt_fail(err, BT_ERR_CASE,
         "%s: ice.extent: the field cut to the ice region has a concentration of %.4g instead of %g, with floes scaled "
         "within %.3g m of the cut; use another ice.seed, smaller floes, or a larger ice region",
-        bt_case_name(input), area / region->ice_area, input->ice.concentration, strip);
+        bt_case_name(input), area / region->ice_area, input->ice.concentration, field->strip);
 }

@@ -9,7 +9,8 @@
 //     /floes            attributes ice_area m² (to which concentration refers), concentration, n_floes, frame (the
 //                       domain.frame of x and y), x_min, y_min, x_max, y_max m (the ice region); the place of x = y =
 //                       0, if known: origin_lon, origin_lat deg, or crs, origin_east, origin_north m, where the crs
-//                       of metres that are of no projection is BT_MAP_LOCAL_NAME
+//                       of metres that are of no projection is BT_MAP_LOCAL_NAME; of made ice n_drawn, n_unplaced,
+//                       floes drawn from the size law, and those of them that found no place
 //     /case             the resolved case the field was made from
 // The reader trusts nothing: the file may be cut off, damaged, or made by hand. Files of this program carry a checksum
 // (checksum.h), so damage is refused before HDF5, which some damage crashes, reads a byte. In a file without one, made
@@ -31,6 +32,7 @@
 #include "base/largest.h"
 #include "case/ice_bounds.h"
 #include "field/field_admit.h"
+#include "field/field_make.h"
 #include "field/map_crs.h"
 
 static const char *const region_names[4] = {"x_min", "y_min", "x_max", "y_max"};
@@ -62,6 +64,10 @@ bt_status bt_field_write(const bt_field *field, const bt_case *input, const char
         bt_h5_attr_double(&h5, "/floes", "ice_area", field->ice_area);
         bt_h5_attr_double(&h5, "/floes", "concentration", field->concentration);
         bt_h5_attr_int(&h5, "/floes", "n_floes", field->n);
+        if (field->drawn > 0) {
+            bt_h5_attr_int(&h5, "/floes", "n_drawn", field->drawn);
+            bt_h5_attr_int(&h5, "/floes", "n_unplaced", field->unplaced);
+        }
         const double own[4] = {input->ice.x_min, input->ice.y_min, input->ice.x_max, input->ice.y_max};
         const bool read = input->ice.field || input->ice.outlines;
         const double *region = read ? field->outlines.region : own;
@@ -200,6 +206,14 @@ static void read_place(reader *in)
     }
 }
 
+/// The counts of the size law, of a field that was made.
+static void read_drawn(const reader *in, bt_field *field)
+{
+    const double drawn = read_number(in, "n_drawn"), unplaced = read_number(in, "n_unplaced");
+    if (drawn <= BT_MAX_FLOES && unplaced >= 0 && unplaced <= drawn)
+        field->drawn = (int64_t)drawn, field->unplaced = (int64_t)unplaced;
+}
+
 static double read_ice_area(reader *in)
 {
     if (in->r.status != BT_OK) return NAN;
@@ -281,6 +295,7 @@ static void read_floes(reader *in, bt_field *field)
     read_word(in, "frame", sizeof field->frame, field->frame);
     read_place(in);
     read_region(in, in->counts.region);
+    read_drawn(in, field);
     if (in->r.status == BT_OK) {
         field->n = field->cap = (bt_idx)n;
         field->cap_vertices = (int64_t)n_vertices;
@@ -305,8 +320,7 @@ static void read_floes(reader *in, bt_field *field)
 /// Replace the outlines of floes that are not convex by the admitted ones; unchanged outlines stay bit-identical.
 static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
 {
-    bt_field g;
-    bt_field_init(&g);
+    bt_field g = bt_field_like(f);
     double sum = 0, before = 0;
     for (bt_idx i = 0; i < f->n; i++) {
         const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * (size_t)i;
@@ -324,8 +338,6 @@ static void take_admitted(bt_field *f, bt_nonconvex nonconvex)
         }
         sum += g.area[i], before += f->area[i];
     }
-    g.ice_area = f->ice_area;
-    memcpy(g.frame, f->frame, sizeof g.frame);
     // the file's concentration may leave out floes beyond its ice region
     g.concentration = bt_min(f->concentration * (sum / before), bt_max(f->concentration, 1));
     bt_field_free(f);

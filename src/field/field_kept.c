@@ -20,7 +20,7 @@
 #include "case/schema.h"
 #include "field/field_make.h"
 
-#define MAGIC "bergtow kept field 2\n"
+#define MAGIC "bergtow kept field 3\n"
 
 /// Keys of these sections that do not affect the ice field, generated or read.
 static const char *const idle[] = {

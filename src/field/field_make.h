@@ -92,6 +92,8 @@ void bt_field_scale(bt_field *field, bt_idx i, double s);
 double bt_field_area_at(const bt_field *field, const double *clearance, const bool *held, double lambda);
 /// Scale floes in this way by the λ for which Σ area = wanted; returns the area reached.
 double bt_field_fit(bt_field *field, const double *clearance, const bool *held, double wanted);
+/// A field without floes, with the other numbers of this one.
+bt_field bt_field_like(const bt_field *field);
 /// Append floe i of another field as it is, to the bit.
 void bt_field_append(bt_field *field, const bt_field *from, bt_idx i);
 /// Cut the field of region `whole` to the region of the case, at the case's concentration; size: mean diameter, m.

@@ -227,9 +227,7 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
             "narrower or shorter lead",
             lead->name, lead->floe_size, most, BT_MAX_FLOES);
     if (status == BT_OK) {
-        bt_field out;
-        bt_field_init(&out);
-        out.ice_area = field->ice_area;
+        bt_field out = bt_field_like(field);
         double pieces = 0;
         for (bt_idx i = 0; i < field->n; i++) {
             const bt_idx first = out.n;
@@ -240,7 +238,6 @@ bt_status bt_lead_cut(const bt_lead *lead, bt_field *field, bt_lead_stats *st, b
         out.concentration = st->concentration_after =
             field->ice_area > 0 ? bt_field_floe_area(&out) / field->ice_area : 0;
         st->mean_piece = st->pieces > 0 ? pieces / (double)st->pieces : 0;
-        out.outlines = field->outlines;
         bt_field_free(field);
         *field = out;
     }

@@ -144,6 +144,12 @@ static bt_status save_outlines(const bt_world *world, const bt_comm *comm, bt_gi
     return status;
 }
 
+// not in checkpoints of earlier versions
+static const bt_state_row drawn_rows[] = {
+    FIELD(I64, "drawn", drawn, "1", COUNT, "floes drawn from the size law"),
+    FIELD(I64, "unplaced", unplaced, "1", COUNT, "of these, those that found no place"),
+};
+
 bt_status bt_state_save_field(const bt_field *field, const bt_world *world, const bt_comm *comm, bt_snapshot *snap,
                               bt_errors *err)
 {
@@ -151,6 +157,7 @@ bt_status bt_state_save_field(const bt_field *field, const bt_world *world, cons
     bt_comm_reduce(comm, NULL, 0, &n, 1, NULL, 0);
     if (comm->rank == 0) {
         bt_snapshot_add_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
+        bt_snapshot_add_rows(snap, "field", drawn_rows, BT_N_OF(drawn_rows), field);
         bt_snapshot_add_text(snap, "field/crs", field->outlines.crs);
         bt_snapshot_add_text(snap, "field/nearly", field->outlines.nearly);
         bt_snapshot_add_text(snap, "field/chart", field->outlines.chart);
@@ -170,6 +177,8 @@ void bt_state_load_field(bt_field *field, bt_snapshot *snap)
     bt_field_init(field);
     int64_t n = 0, n_vertices = 0;
     bt_snapshot_take_rows(snap, "field", field_rows, BT_N_OF(field_rows), field);
+    if (bt_snapshot_find(snap, "field/unplaced"))
+        bt_snapshot_take_rows(snap, "field", drawn_rows, BT_N_OF(drawn_rows), field);
     snprintf(field->outlines.crs, sizeof field->outlines.crs, "%s", bt_snapshot_text(snap, "field/crs"));
     snprintf(field->outlines.nearly, sizeof field->outlines.nearly, "%s", bt_snapshot_text(snap, "field/nearly"));
     if (bt_snapshot_find(snap, "field/chart")) // not in checkpoints of earlier versions

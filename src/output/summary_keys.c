@@ -242,6 +242,8 @@ static const bt_json_key rows[] = {
         "batches and velocities that a sweep goes through for a contact point, in the last step"),
     OF_TOTALS("concentration", concentration, "1", "ice concentration as made"),
     OF_TOTALS("mean_size_m", mean_size, "m", "mean equivalent diameter of the floes"),
+    OF_TOTALS("floes_unplaced", sizes.unplaced, "1",
+        "floes drawn from ice.size_law that found no place among larger ones, and are not in the ice"),
     GROUP("domain", has_body, "whether the forces are a property of the domain"),
     OF_SUMMARY("domain.across", arch.key, "", "key of the extent of the domain across the tow"),
     OF_SUMMARY("domain.body_widths", arch.bodies, "1",

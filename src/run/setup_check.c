@@ -213,7 +213,7 @@ static bool check_periods(const bt_case *input, const bt_world *world, bt_idx n_
     bool sound = true;
     for (int k = 0; k < 2; k++) {
         const double need = 2 * (first + second), beside = 2 * (first + fixed[k]);
-        if (periods[k] > 0 && first > 0 && beside >= periods[k]) {
+        if (periods[k] > 0 && first > 0 && longest[k] >= 0 && beside >= periods[k]) {
             bt_errors_add(err,
                           "%s: domain.%s: the period of %g m has no room for the largest body, as it turns, beside "
                           "floes[%d], which is fixed, and its image, %.4g m; cut that floe in two: fixed floes that "

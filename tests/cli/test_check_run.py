@@ -508,3 +508,31 @@ def test_what_splits_the_mean_floe(tmp_path):
     assert f"moves {MAP['run']['dt'] * speed / 3:.3g} of the least width of a piece per step" in text
     text = call("check", write_case(tmp_path, MAP)).stdout
     assert "least width of a piece" not in text and "without the time for splits" not in text
+
+
+PERIODS = {"run": {"dt": 0.1, "duration": 1}, "body": {"shape": "none"}, "tow": {"mode": "none"},
+           "domain": {"length": 100, "width": 100, "ends": "periodic", "sides": "periodic"},
+           "ice": {"concentration": 0.6, "size": 2, "thickness": 0.5}}
+
+
+def test_floes_too_large_to_turn_in_a_period(tmp_path):
+    """Which size is refused depends on the floes made: `check` warns from 31 m on. Where nothing is fixed, nothing is
+    said of a fixed floe."""
+    for size, warns in (20, False), (40, True), (90, True):
+        case = changed(PERIODS, ice__size=size)
+        path = write_case(tmp_path, case)
+        codes = {w["code"] for w in json.loads(call("check", path, "--json").stdout)["warnings"]}
+        assert ("large_floes" in codes) == warns
+        done = run(tmp_path, case, "--steps", 1, "--force", code=CASE if warns else DONE)
+        assert ("two largest bodies" in done.result.stderr) == warns and "floes[" not in done.result.stderr
+
+
+def test_dense_polygons_may_not_pack(tmp_path):
+    def checked(concentration, shape):
+        path = write_case(tmp_path, changed(PERIODS, ice__concentration=concentration, ice__shape=shape))
+        found = json.loads(call("check", path, "--json").stdout)
+        return "dense_polygons" in {w["code"] for w in found["warnings"]}, found["cost"]["making_of_ice_s"]
+
+    assert not checked(0.8, "polygons")[0] and not checked(0.9, "voronoi")[0]
+    warned, seconds = checked(0.9, "polygons")
+    assert warned and seconds > 10

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Ice fields made from the command line, measured here by other means: areas, overlap, edges of the region,
 randomness."""
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -287,7 +289,7 @@ def test_the_remedy_is_of_the_law_of_the_case(tmp_path):
             "ice": {"concentration": 0.6, "size_law": "power", "size_min": 5, "size_max": 250, "size_exponent": 1.8,
                     "thickness": 0.8}, "body": {"shape": "none"}, "tow": {"mode": "none"}}
     done = call("field", write_case(tmp_path, case), "-o", tmp_path / "f.h5")
-    assert "that of ice.size_law" in done.stdout and "narrow ice.size_min to size_max" in done.stdout
+    assert "that of ice.size_law" in done.stdout and "narrow their range" in done.stdout
     assert "ice.size_spread" not in done.stdout
 
 
@@ -304,3 +306,67 @@ def test_sizes_that_are_not_those_of_the_law_are_said(tmp_path, spread, said):
     assert f"mean diameter {mean:.4g} m" in done.stdout
     assert (abs(mean / 20 - 1) > 0.05) == said == ("that of ice.size_law" in done.stdout), done.stdout
     assert any("that of ice.size_law" in w for w in run(tmp_path, case).warnings) == said
+
+
+WIDE = {"run": {"dt": 0.1, "duration": 1}, "body": {"shape": "none"}, "tow": {"mode": "none"},
+        "domain": {"length": 60, "width": 60, "ends": "periodic", "sides": "periodic"},
+        "ice": {"concentration": 0.6, "size_law": "power", "size_min": 0.5, "size_max": 20, "size_exponent": 1,
+                "shake": 0, "seed": 4, "thickness": 0.5}}
+
+
+def without_a_place(r):
+    """The count of a run's summary, and the values of its warning."""
+    (said,) = [w["values"] for w in r.summary["warnings"] if w["code"] == "unplaced"]
+    assert said["floes"] == r.summary["floes_unplaced"]
+    return said["floes"], said["of_floes"]
+
+
+def test_floes_without_a_place_are_counted(tmp_path):
+    """All are drawn alike, and rectangles have a place for each. The count stays with the ice: in the file, in a run
+    that reads it, after a lead or a cut, and once resumed."""
+    def attributes(case, name):
+        with h5py.File(make(tmp_path, case, name=name)) as f:
+            return [int(f["floes"].attrs[a]) for a in ("n_floes", "n_drawn", "n_unplaced")]
+
+    n, drawn, lost = attributes(WIDE, "f.h5")
+    assert attributes(changed(WIDE, ice__shape="rectangles"), "r.h5") == [drawn, drawn, 0]
+    assert lost > 0.1 * drawn and n + lost == drawn
+    assert without_a_place(run(tmp_path, WIDE, "--steps", 1, name="made")) == (lost, drawn)
+    assert without_a_place(run(tmp_path, changed({**WIDE, "ice": {}}, ice__field="f.h5"), name="read")) == (lost, drawn)
+    assert call("resume", "made", "--quiet", cwd=tmp_path).returncode == DONE
+    whole = run(tmp_path, WIDE, name="whole")
+    assert without_a_place(whole) == (lost, drawn)
+    assert (tmp_path / "made/summary.json").read_text().count('"code": "unplaced"') == 1
+    half = changed(WIDE, domain__length=30, ice__size_max=12)
+    full = changed(WIDE, ice__size_max=12)
+    assert attributes(changed(half, ice__extent={"x_max": 60}), "c.h5")[1:] == attributes(full, "w.h5")[1:]
+
+
+def test_few_floes_without_a_place_are_no_warning(tmp_path):
+    r = run(tmp_path, changed(WIDE, ice={"concentration": 0.6, "size": 2, "thickness": 0.5}), "--steps", 1)
+    assert "unplaced" not in {w["code"] for w in r.summary["warnings"]}
+
+
+@pytest.mark.parametrize("case", [
+    changed(WIDE, domain={"length": 100, "width": 40, "ends": "periodic", "sides": "wall"},
+            ice={"concentration": 0.3, "size_law": "power", "size_min": 1, "size_max": 10, "shape": "rectangles",
+                 "thickness": 0.3, "extent": {"y_min": -40, "y_max": 40}}),
+    changed(WIDE, domain={"length": 100, "width": 80}, tow={"speed": 0.1}, body={"length": 4, "x": 10},
+            ice={"concentration": 0.3, "size_law": "power", "size_min": 1, "size_max": 10, "shape": "rectangles",
+                 "thickness": 0.3})], ids=["at a cut", "beside a body"])
+def test_parts_of_floes_are_not_floes_too_small(tmp_path, case):
+    """There is room for each floe drawn: what is smaller has been cut."""
+    codes = {w["code"] for w in run(tmp_path, case, "--steps", 1).summary["warnings"]}
+    assert not codes & {"small_floes", "mean_size"}
+
+
+@pytest.mark.parametrize("sides, asked", [(6, 0.9), (3, 0.95)])
+def test_the_concentration_told_can_be_packed(tmp_path, sides, asked):
+    case = {**WIDE, "domain": {**WIDE["domain"], "length": 20, "width": 20},
+            "ice": {"concentration": asked, "size": 2, "shape": "polygons", "sides": sides, "thickness": 0.5}}
+    path = write_case(tmp_path, case)
+    told = call("field", path, "-o", tmp_path / "f.h5")
+    assert told.returncode == CASE
+    most = re.search(r"0\.\d+, or", told.stderr)[0][:-4]
+    assert float(most) > 0.75
+    assert call("field", path, "-o", tmp_path / "f.h5", "--set", f"ice.concentration={most}").returncode == DONE

@@ -59,6 +59,10 @@ TEST(time_by_hand)
     assert_float_equal(bt_cost_making(&c, 1000), 0.39, 1e-9);
     c.ice.concentration = 0.95, c.ice.shape = BT_ICE_RECTANGLES;
     assert_float_equal(bt_cost_making(&c, 1000), 0.75 * 0.21, 1e-9);
+    c.ice.shape = BT_ICE_POLYGONS, c.ice.concentration = 0.85; // 0.2 + 0.1/(0.9 - 0.85) ms more a floe
+    assert_float_equal(bt_cost_making(&c, 1000), 0.24 + 2.2, 1e-9);
+    c.ice.concentration = 0.99;
+    assert_float_equal(bt_cost_making(&c, 1000), 0.21 + 10.2, 1e-9);
     c.ice.field = (char *)"read.h5";
     assert_float_equal(bt_cost_making(&c, 1000), 0, 0);
 }
