@@ -267,7 +267,8 @@ MUTANTS = {
          "loads of the proof need not be those of the sweeps"),
         ("    drop_islands_below(world, islands, world->par.tolerance);\n", "", "what passes for rest is locked"),
     ]),
-    "src/solve/project.c": (PROJECT, [
+    "src/solve/project.c": (PROJECT + ["physics/test_crush"], [
+        (" && !(limit->rise && limit->rise->dent > 0);", ";", "a dent past a seam is pushed apart"),
         ("gaps->gap[i] += world->par.dt * ", "if (world->par.dt < 0) gaps->gap[i] += world->par.dt * ",
          "overlap of the start"),
         ("gaps->gap[i] += cell->laws->limits[j].grown[i];", ";", "crushed ice is pushed apart"),

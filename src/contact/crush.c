@@ -143,6 +143,7 @@ static void recall(const bt_world *world, bt_cell *cell, bt_idx j, const bt_pair
         deepest = bt_max(deepest, depth_of(memory));
         if (bt_memory_by_names(memory, &names) == 0) own = memory;
     }
+    limit->rise->dent = deepest;
     if (own) limit->record[BT_LAW_CRUSHING] = (int32_t)(own - cell->laws->memory);
     for (int i = 0; i < manifold->n_points; i++) {
         limit->rise->depth[i] = bt_min(deepest, bt_max(0, -manifold->p[i].gap));

@@ -32,9 +32,8 @@
 //
 // An edge over a seam of a straight shore is cut off there on both pieces. In one piece it has points at its ends only;
 // one between them would take load from these, and rebound in their place. So a point at a seam goes where another one
-// is farther along. Only then: a corner just past a seam may not be found by the next piece, and the point at the seam
-// stands for it. With crushing such points stay: one may hold the record of the dent, and the load is shared out
-// without them (bearing.h).
+// is farther along. Only then: a corner that has crushed its way just past a seam is not found by the next piece, and
+// the point at the seam stands for it.
 
 #define PLACE 0.01  // of the smaller radius, as for reference edges
 
@@ -111,7 +110,7 @@ static void pass_seams(const bt_world *world, const touch *t, size_t n)
 /// Remove duplicate points among the contacts t[n] of one body with the polygons of one outline.
 static void unite(const bt_world *world, const touch *t, size_t n)
 {
-    if (!bt_laws_rise(&world->par)) pass_seams(world, t, n);
+    pass_seams(world, t, n);
     // Flush edges say more than single points, so single points are dropped first, whatever their order.
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)

@@ -77,6 +77,7 @@ typedef struct bt_rise {
     double slope[2]; ///< kg
     bt_hit hit[2];   ///< before = 0: none
     double depth[2]; ///< crushed so far, m
+    double dent;     ///< the deepest that polygons of the same two outlines have crushed so far, m
 } bt_rise;
 
 /// Bounds of the points of one contact, and the laws that set them; all INFINITY (and slope 0) where no law applies.

@@ -52,7 +52,8 @@ static bool turns(const bt_world *world, const bt_cell *cell, bt_idx j, double l
     const bt_limit *limit = &cell->laws->limits[j];
     for (int law = 0; law < BT_ALL_LAWS; law++)
         if (limit->record[law] >= 0) return false;
-    return limit->grown[0] == 0 && limit->grown[1] == 0;
+    // a corner that comes over a seam is in the dent of another polygon
+    return limit->grown[0] == 0 && limit->grown[1] == 0 && !(limit->rise && limit->rise->dent > 0);
 }
 
 static void find_overlap(bt_world *world, bt_idx k, const void *context, bt_totals *totals)

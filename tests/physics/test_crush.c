@@ -1176,6 +1176,41 @@ TEST(a_dent_stays_open_past_an_oblique_seam)
     for (int i = 0; i < 2; i++) CHECK_CLOSE(end[0][i], end[1][i], 2e-3);
 }
 
+/// A turning block ploughs along a quay at a long step. Where its corner comes over a seam, the next piece has no
+/// record of the dent yet, and the position projection must not push the block out of it.
+TEST(a_corner_ploughs_over_a_seam)
+{
+    const double seams[] = {9, -1.2, -1.4, -1.6, -1.8};
+    double end[5];
+    for (int i = 0; i < 5; i++) {
+        bt_params p = params(0.1);
+        p.slop = 1e-3, p.tilt_ax = 0.2, p.tilt_ay = -0.5;
+        p.law_own[BT_LAW_CRUSHING][BT_CRUSH_PRESSURE] = 2e3, p.law_own[BT_LAW_CRUSHING][BT_CRUSH_LEAST] = 0.1;
+        bt_world *w = bt_world_create(&p);
+        for (int piece = 0; piece < (i > 0 ? 2 : 1); piece++) {
+            const double from = piece ? seams[i] : -9, to = piece ? 9 : seams[i];
+            double v[] = {from, -2, to, -2, to, 0, from, 0};
+            const bt_moments m = bt_shape_centre(4, v);
+            bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .n_vertices = 4, .vertices = v,
+                                           .x = m.cx, .y = m.cy});
+        }
+        bt_shore_create(w);
+        double v[] = {-0.77, -0.44, 0.77, -0.44, 0.77, 0.44, -0.77, 0.44};
+        bt_body_def d = scene_prism(4, v, 900);
+        d.x = -3.78, d.y = 1.43, d.yaw = 4.863, d.vx = 1.25, d.vy = -0.757, d.yaw_rate = -0.36;
+        d.thickness = 1, d.friction = 0.2;
+        const bt_gid block = bt_world_add(w, &d);
+        for (int s = 0; s < 30; s++) {
+            const double before = pose(w, block)->y;
+            bt_world_step(w);
+            assert_true(pose(w, block)->y < before + 0.01);
+        }
+        end[i] = pose(w, block)->y;
+        bt_world_free(w);
+        CHECK_CLOSE(end[i], end[0], 0.05);
+    }
+}
+
 /// A tilted face that turns on a quay until it lies flush bears at its ends, not at the seams between them, and ends as
 /// on a quay in one piece. The second corner to come bears no share of the first, whose ice is gone.
 TEST(a_tilted_face_turns_about_its_ends)
