@@ -37,7 +37,6 @@ typedef struct bt_manifold {
     /// for two edges, the length along the tangent, m, over which the gap exceeds that of the nearest point by at most
     /// cells->beside, whether or not the other end is a contact point; 0 = a corner, or no law bounds contacts
     double flush;
-    int8_t past[2];   ///< at the seam of a straight shore 1 or −1: the edge goes on past it along ±(−ny, nx); else 0
     bt_point p[2];
 } bt_manifold;
 

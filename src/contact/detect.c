@@ -29,11 +29,6 @@
 // J gained). Normals farther apart than those of edges that face each other squarely (manifold.c) belong to different
 // sides, as in a notch, and stay. Of two points at one place the deeper stays: the other may be the end of an edge cut
 // off at the seam, above the corner just beyond it.
-//
-// An edge over a seam of a straight shore is cut off there on both pieces. In one piece it has points at its ends only;
-// one between them would take load from these, and rebound in their place. So a point at a seam goes where another one
-// is farther along. Only then: a corner that has crushed its way just past a seam is not found by the next piece, and
-// the point at the seam stands for it.
 
 #define PLACE 0.01  // of the smaller radius, as for reference edges
 
@@ -59,7 +54,7 @@ static bool same_place(const touch *p, int i, const touch *q, int j, double reac
 
 static void drop(bt_manifold *manifold, int i)
 {
-    if (i + 1 < manifold->n_points) manifold->p[i] = manifold->p[i + 1], manifold->past[i] = manifold->past[i + 1];
+    if (i + 1 < manifold->n_points) manifold->p[i] = manifold->p[i + 1];
     manifold->n_points--;
 }
 
@@ -83,34 +78,9 @@ static void settle(const bt_world *world, const touch *p, const touch *q)
         }
 }
 
-/// Has q a point on the same face past the seam at point i of p?
-static bool lies_past(const bt_world *world, const touch *p, int i, const touch *q)
-{
-    const double sign = p->flip == q->flip ? 1 : -1, nx = p->m->nx, ny = p->m->ny, *x = arm(p, i);
-    if (sign * (nx * q->m->nx + ny * q->m->ny) < BT_SQUARE) return false;
-    for (int j = 0; j < q->m->n_points; j++) {
-        const double *y = arm(q, j);
-        if (p->m->past[i] * (nx * (y[1] - x[1]) - ny * (y[0] - x[0])) > world->par.slop) return true;
-    }
-    return false;
-}
-
-/// Remove points at seams that an edge goes past.
-static void pass_seams(const bt_world *world, const touch *t, size_t n)
-{
-    for (size_t i = 0; i < n; i++)
-        for (int k = t[i].m->n_points - 1; k >= 0; k--) {
-            bool past = false;
-            for (size_t j = 0; j < n && t[i].m->past[k] != 0 && !past; j++)
-                past = i != j && lies_past(world, &t[i], k, &t[j]);
-            if (past) drop(t[i].m, k);
-        }
-}
-
 /// Remove duplicate points among the contacts t[n] of one body with the polygons of one outline.
 static void unite(const bt_world *world, const touch *t, size_t n)
 {
-    pass_seams(world, t, n);
     // Flush edges say more than single points, so single points are dropped first, whatever their order.
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)

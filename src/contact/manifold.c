@@ -508,8 +508,7 @@ static double past_seam(const part_of_body *p, int i, const part_of_body *q, int
 
 /// clip_points, without points on a cut: if the edge that faces the reference is a cut, only its ends can count; if
 /// others cover an end of it, only its exposed stretch. A point at the seam of a straight shore, on an edge that
-/// reaches past it, is marked: it goes if the end of the edge has a point on another piece (detect.c), and at once if
-/// that end is too far off for one. False if therefore none is left.
+/// reaches past it, goes if the end of the edge is too far off for a point. False if therefore none is left.
 static bool clip_what_counts(const part_of_body *ref, const edge *side, const part_of_body *inc, bool flip,
                              const double d[2], bounds most, bt_manifold *manifold)
 {
@@ -529,9 +528,7 @@ static bool clip_what_counts(const part_of_body *ref, const edge *side, const pa
         }
         const bool corner = !of_ref && corner_counts(inc, vertex, -side->nx, -side->ny);
         if (!all && !corner && !(partly && shows_at(inc, facing, manifold->p[k].ra))) continue;
-        const int8_t way = vertex != (of_ref ? side->i : facing) ? 1 : -1;
-        manifold->p[kept] = manifold->p[k];
-        manifold->past[kept++] = past > most.slop ? (flip == of_ref ? -way : way) : 0;
+        manifold->p[kept++] = manifold->p[k];
     }
     manifold->n_points = kept;
     return kept > 0 || beyond == 0;

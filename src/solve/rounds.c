@@ -21,7 +21,6 @@
 #define HARD 0.5        // share of the limit of work, from where the best unknowns are kept
 #define PROOF 0x1p-4    // share of the limit of work after which a proof is first tried, and again after each doubling
 #define FAR 4           // tolerances: with a larger residual the iteration continues beyond the limit of work
-#define LOST 3000       // the same, 3 reference speeds by default: with a larger one, are no impulses at all better?
 #define LEAST_LOWERED 0.5 // least factor on the update that ends a round
 #define LEAST_SWEEP 0.01 // share of the contacts that a sweep costs in itself, in the limit of work
 enum { ROUNDS = 3, MAX_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MAX_MORE = 2 };
@@ -385,14 +384,6 @@ static bool back_to_best(bt_world *world, const bt_problem *problem, bt_work *wo
     return true;
 }
 
-/// Set the unknowns to 0 if the best ones are farther from a solution than that. True if so.
-static bool begin_anew(bt_world *world, const bt_problem *problem, bt_work *work, double best)
-{
-    bt_phases_any_order(world, problem->keep, &(bt_keeping){BT_DROP}, &(bt_totals){0});
-    bt_rounds_residual(world, problem, BT_SETTLES, work);
-    return !back_to_best(world, problem, work, best);
-}
-
 void bt_rounds_make_shift(bt_world *world)
 {
     bt_solver *solver = world->solver;
@@ -449,16 +440,8 @@ void bt_rounds_run(bt_world *world, const bt_problem *problem, bt_work *work)
         }
         if (spent(problem, work) < limit || bt_min(best, work->residual) <= FAR * problem->tolerance) continue;
         if (problem->plain || !problem->keep || more++ == MAX_MORE) continue;
-        all = false;
-        const bool lost = best > LOST * problem->tolerance;
-        settled = settled || lost;
-        if (lost && begin_anew(world, problem, work, best)) {
-            keep_better(world, problem, work, &best);
-            a.cap = 0, more = MAX_MORE;
-            fast = spent(problem, work), limit = fast + all_work;
-            continue;
-        }
         a = (pace){.cap = problem->cap, .mark = INFINITY, .length = problem->length};
+        all = false;
         fast = spent(problem, work) + HARD * all_work, limit = fast + NO_MOMENTUM * all_work;
     }
     if (!settled) bt_rounds_residual(world, problem, BT_SETTLES, work);

@@ -44,15 +44,6 @@
 // gets some more without momentum, since momentum that does not converge circles far from the solution. If the residual
 // is still FAR above the tolerance, the iteration restarts with half of the work, at most twice.
 //
-// Momentum may also be unstable. With friction a sweep turns the unknowns as well as shrinking them (complex
-// eigenvalues), and β near 1 then makes them grow, by a factor of ten every 20 sweeps, before the cap is low enough: 8
-// kJ of 430 floes and pieces became 10¹³ J where plain sweeps converge. The restart does not see it, as growing steps
-// point along the move, and sweeps without momentum do not come back from there within their work. So if the residual
-// at the limit is LOST, and larger than without any impulses, the problem begins once more, without impulses or
-// momentum. Not sooner: some iterations grow a thousandfold and converge nevertheless. Bodies that prescribed walls
-// lock have a large residual, too, but none larger than without impulses; their loads stay, since the proof of
-// islands.h needs them.
-//
 // A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the
 // unknowns of the best residual pass are kept, from half of the work on, and are the result.
 //
@@ -102,8 +93,8 @@ enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
 #define BT_NEAR 0.7 // share of the tolerance: an update that ends a round, and a residual that is not bad
 
-/// Action on the unknowns of the best residual pass; BT_DROP: set the present ones to 0.
-typedef enum { BT_KEEP, BT_PUT_BACK, BT_FORGET, BT_DROP } bt_keeping;
+/// Action on the unknowns of the best residual pass.
+typedef enum { BT_KEEP, BT_PUT_BACK, BT_FORGET } bt_keeping;
 
 /// The problem to iterate.
 typedef struct bt_problem {

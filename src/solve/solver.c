@@ -403,13 +403,6 @@ static void keep_impulses(bt_world *world, bt_idx k, const void *context, bt_tot
         return;
     }
     bt_batch_unpack(cell);
-    if (what == BT_DROP) {
-        bt_batch_begin(cell); // extrapolates nothing: the last change may not be finite
-        for (bt_idx i = 0; i < cell->n_contacts; i++)
-            cell->contacts[i].ln[0] = cell->contacts[i].ln[1] = cell->contacts[i].lt = 0;
-        for (int c = 0; line && c < line->n_branches; c++) line->branch[c].lambda = 0;
-        return;
-    }
     if (!cell->work->best) cell->work->best = bt_alloc((size_t)cell->n_contacts + 1, sizeof *cell->work->best);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         bt_contact *contact = &cell->contacts[i];

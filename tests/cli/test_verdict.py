@@ -153,7 +153,9 @@ def test_check_says_the_same_to_scripts_and_so_does_the_run(tmp_path):
                                    "body_widths": pytest.approx(5, rel=1e-3), "body_widths_needed": widths,
                                    "packed_s": None, "packed_way_m": None, "packed_concentration": None,
                                    "load_unbounded": c >= 0.75}
-        assert len(found["warnings"]) == (widths is not None) + (c >= 0.75) and found["ice"]["concentration"] == c
+        dense = any(w["code"] == "dense_polygons" for w in found["warnings"])
+        assert len(found["warnings"]) == (widths is not None) + (c >= 0.75) + dense
+        assert found["ice"]["concentration"] == c
         assert found["run"]["n_steps"] == 5 and found["run"]["tow_distance_m"] == 2.5
         assert found["cost"]["core_time_s"] > 0 and found["cost"]["memory_b"] > 1e6
         assert call("run", path, "-o", "out", "--force", cwd=tmp_path).returncode == DONE

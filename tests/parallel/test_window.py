@@ -223,4 +223,4 @@ def test_ice_that_drifts_past_a_body_is_renewed_as_that_which_it_is_towed_throug
         assert np.all(np.diff(r.series("body_in_ice_x")) > 0)
     laps, places, force = np.array(found).T
     assert np.ptp(laps) < 0.1 and np.ptp(places) < 0.1 * places[0]
-    assert force.min() > 0.6 * force.max(), force
+    assert force.min() > 0.5 * force.max(), force  # each of other ice: means scatter by some 20 %
